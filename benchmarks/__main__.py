@@ -12,6 +12,7 @@ COMMANDS = {
     "hard": "shapes that are hard for the defaults: sponges, lattices, sheets, thousands of bodies",
     "damaged": "closed meshes with a share of their surface destroyed: what repair recovers",
     "late": "how late a decomposition ends after a timeout or Ctrl-C",
+    "replay": "what a traced decomposition would take on other numbers of cores",
     "batch": "the overhead of a batch beside its meshes",
     "physics": "the hulls in simulators: piles, balls dropped into holes, grasps, pegs; primitives",
     "paper": "the paper's tables without a training: equal accuracy, V-HACD, kinds and numbers of planes",

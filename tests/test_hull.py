@@ -124,11 +124,12 @@ def test_joint_hull_volumes() -> None:
     rng = np.random.default_rng(1)
     groups = [rng.normal(size=(n, 3)) for n in (5, 20, 9)]
     pairs = np.array([[0, 1], [1, 2], [2, 0]], dtype=np.int32)
-    volumes = _native.joint_hull_volumes(groups, pairs, 2)
+    hulls = [_native.HullCorners(group) for group in groups]
+    volumes = _native.joint_hull_volumes(hulls, pairs, 2)
     expected = [ConvexHull(np.concatenate([groups[i], groups[j]])).volume for i, j in pairs]
     assert volumes == pytest.approx(expected, rel=1e-9)
     with pytest.raises(ValueError, match="range"):
-        _native.joint_hull_volumes(groups, np.array([[0, 3]], dtype=np.int32), 1)
+        _native.joint_hull_volumes(hulls, np.array([[0, 3]], dtype=np.int32), 1)
 
 
 def test_same_bits_every_time() -> None:

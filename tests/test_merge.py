@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
+from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.criteria.navigable import Navigable
 from rlacd.merge import merge_parts
-from rlacd.merge.boxes import Boxes
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.primitive import Balls
@@ -143,4 +143,5 @@ def test_pairs_of_nearby_boxes(across: bool) -> None:
             for j in parts
             if i != j and (near(i, j) or (across and any(near(i, k) and near(k, j) for k in parts)))
         }
-        assert Boxes(parts).pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]
+        boxes = _native.Boxes([part.hull.corners for part in parts.values()], list(parts))
+        assert boxes.pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/geometry.hpp"
+#include "base/kernel_time.hpp"
 
 namespace rlacd {
 
@@ -104,7 +105,15 @@ inline MeshOut out(Mesh mesh) {
 }
 
 // The GIL is held while arguments and results are converted, and not in between.
-using Released = nb::call_guard<nb::gil_scoped_release>;
+struct WithoutGil {
+  nb::gil_scoped_release released;
+  double begun = thread_seconds();
+  ~WithoutGil() {
+    kernel_time.unlocked += thread_seconds() - begun;
+    ++kernel_time.kernels;
+  }
+};
+using Released = nb::call_guard<WithoutGil>;
 
 }  // namespace rlacd
 

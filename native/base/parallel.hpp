@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/kernel_time.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -55,14 +56,17 @@ void parallel_for(std::size_t count, int threads, const Task& task) {
   std::mutex running_guard;
   std::condition_variable finished;
   std::size_t running = 0;
+  double helped = 0;
   std::vector<std::thread> pool;
   pool.reserve(workers - 1);
   try {
     for (std::size_t w = 1; w < workers; ++w) {
       pool.emplace_back([&] {
         const ThisStop same(stop);
+        const double begun = thread_seconds();
         work();
         const std::lock_guard<std::mutex> lock(running_guard);
+        helped += thread_seconds() - begun;
         --running;
         finished.notify_all();
       });
@@ -72,7 +76,9 @@ void parallel_for(std::size_t count, int threads, const Task& task) {
   } catch (const std::system_error&) {
     // The system grants no more threads: those already started do all the work.
   }
+  const double begun = thread_seconds();
   work();
+  const double own = thread_seconds() - begun;
   while (stop != nullptr) {  // only this thread can check whether it must stop
     {
       std::unique_lock<std::mutex> lock(running_guard);
@@ -85,6 +91,8 @@ void parallel_for(std::size_t count, int threads, const Task& task) {
     }
   }
   for (std::thread& thread : pool) thread.join();
+  kernel_time.in_loops += own;
+  kernel_time.of_loops += own + helped;
   if (failure) std::rethrow_exception(failure);
 }
 

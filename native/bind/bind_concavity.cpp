@@ -45,7 +45,7 @@ void bind_concavity(nb::module_& m) {
       "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
       "told\n"
       "apart: the interval may then be as wide as (0, floor), which is much faster for nearly convex parts.");
-  nb::class_<HullCorners>(m, "HullCorners", "The corners of a convex hull, prepared for `joint_feasibilities`.")
+  nb::class_<HullCorners>(m, "HullCorners", "The corners of a convex hull, prepared for tests of joint hulls.")
       .def(
           "__init__",
           [](HullCorners* self, const PointsIn& corners) {
@@ -53,7 +53,11 @@ void bind_concavity(nb::module_& m) {
             require_finite(points);
             new (self) HullCorners(std::move(points));
           },
-          nb::arg("corners"));
+          nb::arg("corners"))
+      .def_prop_ro(
+          "box",
+          [](const HullCorners& self) { return to_array<double>(std::vector<Vec3>{self.box.lower, self.box.upper}); },
+          nb::rv_policy::move, "Lower and upper corner of the bounding box [2, 3].");
   nb::class_<Filling>(m, "Filling", "A closed solid that hulls of its parts are held against.")
       .def(
           "__init__",

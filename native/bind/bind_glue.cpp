@@ -1,4 +1,7 @@
 // Python bindings of gluing.
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
 
 #include "base/arrays.hpp"
 #include "distance/glue.hpp"
@@ -17,11 +20,15 @@ void bind_glue(nb::module_& m) {
       "without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring only.");
   m.def(
       "do_touch",
-      [](const PointsIn& va, const FacesIn& fa, const PointsIn& vb, const FacesIn& fb) {
-        return do_touch(to_mesh(va, fa), to_mesh(vb, fb));
+      [](const std::vector<PointsIn>& va, const std::vector<FacesIn>& fa, const std::vector<PointsIn>& vb,
+         const std::vector<FacesIn>& fb) {
+        const std::vector<Mesh> first = to_finite_meshes(va, fa), second = to_finite_meshes(vb, fb);
+        return std::any_of(first.begin(), first.end(), [&](const Mesh& a) {
+          return std::any_of(second.begin(), second.end(), [&](const Mesh& b) { return do_touch(a, b); });
+        });
       },
       Released(), nb::arg("vertices_a"), nb::arg("faces_a"), nb::arg("vertices_b"), nb::arg("faces_b"),
-      "Whether two solids touch face to face, not just in an edge or a point.");
+      "Whether some solid of a list touches one of another face to face, not just in an edge or a point.");
 }
 
 }  // namespace rlacd

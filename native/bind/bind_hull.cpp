@@ -8,6 +8,7 @@
 #include "base/arrays.hpp"
 #include "base/mesh_measures.hpp"
 #include "base/parallel.hpp"
+#include "distance/filling.hpp"
 #include "hull/hull.hpp"
 #include "hull/inscribed_ball.hpp"
 #include "hull/outline.hpp"
@@ -89,7 +90,7 @@ void bind_hull(nb::module_& m) {
       "points lie on a line up to rounding.");
   m.def(
       "joint_hull_volumes",
-      [](const std::vector<PointsIn>& groups,
+      [](const std::vector<const HullCorners*>& groups,
          const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs, int threads) {
         const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
         for (const std::int32_t g : pair)
@@ -98,23 +99,23 @@ void bind_hull(nb::module_& m) {
         const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
         parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
           HullBuilder hull;
-          std::vector<Vec3> both = to_points(groups[pair[2 * i]]);
-          const std::vector<Vec3> other = to_points(groups[pair[2 * i + 1]]);
+          std::vector<Vec3> both = groups[pair[2 * i]]->all;
+          const std::vector<Vec3>& other = groups[pair[2 * i + 1]]->all;
           both.insert(both.end(), other.begin(), other.end());
           hull.add(both);
           volumes[i] = hull.volume();
         });
         return rows<double>(std::move(volumes));
       },
-      Released(), nb::arg("groups"), nb::arg("pairs"), nb::arg("threads") = 0,
-      "Volumes [P] of the joint hulls of pairs [P, 2] of point groups, a list of arrays [N, 3].");
+      Released(), nb::arg("hulls"), nb::arg("pairs"), nb::arg("threads") = 0,
+      "Volumes [P] of the joint hulls of pairs [P, 2] of hulls.");
   m.def(
       "mesh_volume",
       [](const PointsIn& v, const FacesIn& f) {
         const Mesh mesh = to_mesh(v, f);
         return mesh_volume(mesh.vertices, mesh.faces);
       },
-      Released(), nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
+      nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
   m.def(
       "principal_axes",
       [](const PointsIn& vertices, const FacesIn& faces) {
@@ -141,7 +142,7 @@ void bind_hull(nb::module_& m) {
         const Mesh mesh = to_mesh(v, f);
         return mesh_area(mesh.vertices, mesh.faces);
       },
-      Released(), nb::arg("vertices"), nb::arg("faces"), "Area of a triangle mesh.");
+      nb::arg("vertices"), nb::arg("faces"), "Area of a triangle mesh.");
 }
 
 }  // namespace rlacd

@@ -1,11 +1,13 @@
 // Python bindings of welding, of the topology of soups and of closed meshes.
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/vector.h>
 
 #include <cmath>
 #include <optional>
 
 #include "base/arrays.hpp"
 #include "base/stop.hpp"
+#include "distance/filling.hpp"
 #include "mesh/curve.hpp"
 #include "mesh/edges.hpp"
 #include "mesh/least_bent.hpp"
@@ -237,19 +239,31 @@ void bind_mesh(nb::module_& m) {
       "The same mesh with vertices [V, 3] and faces [F, 3] along a space-filling curve: neighbours in space are near "
       "in\n"
       "memory.");
-  m.def(
-      "near_pairs",
-      [](const nb::ndarray<const double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>& array, const MarksIn& fresh,
-         double reach, bool across) {
-        if (fresh.size() != array.shape(0)) throw std::invalid_argument("not as many marks as boxes");
-        std::vector<Box> boxes;
-        for (const double* row = array.data(); boxes.size() < array.shape(0); row += 6)
-          boxes.push_back({{row[0], row[1], row[2]}, {row[3], row[4], row[5]}});
-        return rows<std::int32_t>(near_pairs(boxes, {fresh.data(), fresh.data() + fresh.size()}, reach, across));
-      },
-      Released(), nb::arg("boxes"), nb::arg("is_new"), nb::arg("reach"), nb::arg("across"),
-      "Pairs [P, 2], ascending, of a new box and any other, of boxes [N, 6] given by their lower and upper corners:\n"
-      "those within reach of each other, or with `across` of a common third one.");
+  nb::class_<Boxes>(m, "Boxes", "The boxes of hulls under numbers.")
+      .def(
+          "__init__",
+          [](Boxes* self, const std::vector<const HullCorners*>& hulls, const std::vector<std::int32_t>& numbers) {
+            if (!numbers.empty() && numbers.size() != hulls.size()) throw std::invalid_argument("one number a hull");
+            new (self) Boxes();
+            for (std::size_t i = 0; i < hulls.size(); ++i)
+              self->add(numbers.empty() ? static_cast<std::int32_t>(i) : numbers[i], hulls[i]->box);
+          },
+          nb::arg("hulls"), nb::arg("numbers") = std::vector<std::int32_t>(),
+          "Without numbers, which have to ascend, hulls are numbered from 0.")
+      .def("__len__", &Boxes::size)
+      .def(
+          "add", [](Boxes& self, std::int32_t number, const HullCorners& hull) { self.add(number, hull.box); },
+          nb::arg("number"), nb::arg("hull"), "Add the box of a hull; its number is larger than all before.")
+      .def("without", &Boxes::without, nb::arg("gone"), "All boxes but those of some numbers.")
+      .def(
+          "pairs",
+          [](const Boxes& self, const std::vector<std::int32_t>& fresh, double reach, bool across) {
+            return rows<std::int32_t>(self.pairs(fresh, reach, across));
+          },
+          Released(), nb::arg("fresh"), nb::arg("reach"), nb::arg("across") = false,
+          "Pairs [P, 2] of numbers, ascending, of a fresh box and any other: those within reach of each other, or "
+          "with\n"
+          "`across` of a common third one.");
   m.def(
       "point_bodies",
       [](const PointsIn& vertices, const FacesIn& faces) {

@@ -5,8 +5,10 @@
 
 #include "base/arrays.hpp"
 #include "base/mesh_measures.hpp"
+#include "cut/halve.hpp"
 #include "cut/pieces.hpp"
 #include "cut/reunite.hpp"
+#include "distance/filling.hpp"
 
 namespace rlacd {
 
@@ -41,6 +43,20 @@ void bind_plane_cut(nb::module_& m) {
       nb::arg("least"),
       "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and\n"
       "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
+  m.def(
+      "halve",
+      [](const PointsIn& vertices, const FacesIn& faces, const HullCorners& corners,
+         const std::vector<const HullCorners*>& around, const std::vector<double>& volumes, double share,
+         double least) {
+        if (around.size() != volumes.size()) throw std::invalid_argument("one volume a hull");
+        std::vector<HullAround> hulls;
+        for (std::size_t i = 0; i < around.size(); ++i) hulls.push_back({&around[i]->all, volumes[i]});
+        return out(halve(to_finite_mesh(vertices, faces), corners.all, hulls, share, least));
+      },
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("corners"), nb::arg("around"), nb::arg("volumes"),
+      nb::arg("share"), nb::arg("least"),
+      "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the\n"
+      "other of the two hulls around whose volumes it would add the least to; None twice if there are no two.");
   m.def(
       "connected_pieces",
       [](const PointsIn& vertices, const FacesIn& faces, double least) {

@@ -131,6 +131,7 @@ Feasibility Filling::feasibility(const Mesh& hull, double threshold) const {
 }
 
 HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)) {
+  for (const Vec3 p : all) box.extend(p);
   if (all.size() <= kMaybe) {
     some = all;
     return;

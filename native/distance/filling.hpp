@@ -23,11 +23,12 @@ enum class Feasibility : std::int32_t {
   kNever = 2,  // nor for any hull that contains it
 };
 
-// The corners of a hull, and a few of them that span most of it.
+// The corners of a hull, a few of them that span most of it, and its box.
 struct HullCorners {
   explicit HullCorners(std::vector<Vec3> corners);
 
   std::vector<Vec3> all, some;
+  Box box;
 };
 
 struct ClippedSolid {

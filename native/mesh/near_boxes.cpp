@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 
+#include "base/invariant.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -59,25 +61,45 @@ class SortedBoxes {
 
 }  // namespace
 
-std::vector<std::array<std::int32_t, 2>> near_pairs(const std::vector<Box>& boxes, const std::vector<char>& is_new,
-                                                    double reach, bool across) {
-  const SortedBoxes sorted(boxes, reach);
+void Boxes::add(std::int32_t number, const Box& box) {
+  RLACD_ASSERT(numbers_.empty() || numbers_.back() < number, "numbers ascend");
+  numbers_.push_back(number);
+  boxes_.push_back(box);
+}
+
+Boxes Boxes::without(const std::vector<std::int32_t>& gone) const {
+  Boxes left;
+  for (std::size_t i = 0; i < boxes_.size(); ++i)
+    if (std::find(gone.begin(), gone.end(), numbers_[i]) == gone.end()) left.add(numbers_[i], boxes_[i]);
+  return left;
+}
+
+std::vector<std::array<std::int32_t, 2>> Boxes::pairs(const std::vector<std::int32_t>& fresh, double reach,
+                                                      bool across) const {
+  const SortedBoxes sorted(boxes_, reach);
+  std::vector<char> is_new(boxes_.size(), 0);
+  std::vector<std::int32_t> places;
+  for (const std::int32_t number : fresh) {
+    const auto found = std::lower_bound(numbers_.begin(), numbers_.end(), number);
+    if (found == numbers_.end() || *found != number) throw std::invalid_argument("there is no box of this number");
+    places.push_back(static_cast<std::int32_t>(found - numbers_.begin()));
+    is_new[places.back()] = 1;
+  }
   std::vector<std::array<std::int32_t, 2>> pairs;
-  for (std::int32_t own = 0; own < static_cast<std::int32_t>(boxes.size()); ++own) {
-    if (!is_new[own]) continue;
+  for (const std::int32_t own : places) {
     poll_stop();
-    std::vector<char> is_near(boxes.size(), 0);
+    std::vector<char> is_near(boxes_.size(), 0);
     std::vector<std::int32_t> near;
     const auto take = [&](std::int32_t other) {
       if (!is_near[other]) is_near[other] = 1, near.push_back(other);
     };
     sorted.each_near(own, take);
     if (across)
-      for (std::size_t i = 0, hops = near.size(); i < hops && near.size() < boxes.size(); ++i)
+      for (std::size_t i = 0, hops = near.size(); i < hops && near.size() < boxes_.size(); ++i)
         sorted.each_near(near[i], take);
     for (const std::int32_t other : near)  // two new boxes find each other twice
       if (other != own && !(is_new[other] && other < own))
-        pairs.push_back({std::min(own, other), std::max(own, other)});
+        pairs.push_back({numbers_[std::min(own, other)], numbers_[std::max(own, other)]});
   }
   std::sort(pairs.begin(), pairs.end());
   return pairs;

@@ -1,4 +1,4 @@
-// Pairs of boxes that are near each other.
+// Boxes under numbers, and pairs of them that are near each other.
 //
 // Input:  boxes, which of them are new, and a distance.
 // Output: pairs of a new box and any other, ascending: those within reach of each other, or of a common third box.
@@ -12,7 +12,18 @@
 
 namespace rlacd {
 
-std::vector<std::array<std::int32_t, 2>> near_pairs(const std::vector<Box>& boxes, const std::vector<char>& is_new,
-                                                    double reach, bool across);
+class Boxes {
+ public:
+  std::size_t size() const { return boxes_.size(); }
+  // Its number has to be larger than all before.
+  void add(std::int32_t number, const Box& box);
+  Boxes without(const std::vector<std::int32_t>& gone) const;
+  std::vector<std::array<std::int32_t, 2>> pairs(const std::vector<std::int32_t>& fresh, double reach,
+                                                 bool across) const;
+
+ private:
+  std::vector<std::int32_t> numbers_;
+  std::vector<Box> boxes_;
+};
 
 }  // namespace rlacd

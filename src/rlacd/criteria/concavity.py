@@ -13,13 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary, Feasibility, Screen
 from rlacd.errors import OptionError
 from rlacd.fit import told_apart
 from rlacd.options import Options
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
@@ -98,9 +100,10 @@ class ConcavityScreen(DistanceScreen):
         """``0.3 R_v``, a lower bound of the concavity."""
         return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
 
-    def excludes(self, volume: float, hull_volume: float) -> bool:
+    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
         """Whether ``0.3 R_v`` alone exceeds the threshold."""
-        return self.least_error(volume, hull_volume) > self.threshold
+        ball = 4 / 3 * math.pi * (self.threshold / VOLUME_WEIGHT) ** 3
+        return np.asarray(hull_volume - volume > ball)
 
 
 @dataclass(frozen=True)

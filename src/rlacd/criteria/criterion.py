@@ -13,7 +13,7 @@ import numpy as np
 from rlacd import _native
 from rlacd.options import Options
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
 from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.primitive import Balls
@@ -130,9 +130,9 @@ class Screen:
         """Lower bound of the criterion's error, from the volumes of a part and its hull alone."""
         return 0.0
 
-    def excludes(self, volume: float, hull_volume: float) -> bool:
-        """Whether the volumes alone show that a part cannot meet the criterion."""
-        return False
+    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
+        """Whether the volumes alone show that a part, or each of several, cannot meet the criterion."""
+        return np.zeros(np.shape(volume), dtype=bool)
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """Decide whether a solid clipped to a hull may meet the criterion."""

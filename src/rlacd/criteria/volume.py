@@ -11,11 +11,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rlacd._native import mesh_volume
 from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
 from rlacd.fit import told_apart
 from rlacd.options import Options
 from rlacd.run import Run
+from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
@@ -46,9 +49,11 @@ class VolumeScreen(Screen):
         """The error itself."""
         return self.criterion.share(volume, hull_volume)
 
-    def excludes(self, volume: float, hull_volume: float) -> bool:
+    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
         """Whether the hull adds too much."""
-        return self.least_error(volume, hull_volume) > self.criterion.tolerance
+        whole = self.criterion.whole
+        base = np.maximum(volume if whole is None else whole, self.criterion.least)
+        return np.asarray(hull_volume - volume > self.criterion.tolerance * base)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria import Criterion
-from rlacd.merge.boxes import Boxes
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import LOST_VOLUME, Component, Part
 from rlacd.solid.hull import TOLERANCE, Hull
@@ -97,7 +96,7 @@ def overlap_parts(
     """
     bodies = [_Body(part) for part in parts]
     tolerated = max((criterion.error(part) for part in parts if not criterion.is_met(part)), default=None)
-    boxes = Boxes(dict(enumerate(parts)))
+    boxes = _native.Boxes([part.hull.corners for part in parts])
     pairs = boxes.pairs(range(len(parts)), TOLERANCE).tolist()
     near: list[set[int]] = [set() for _ in parts]
     for first, second in pairs:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import Stopped
+from rlacd._native import Boxes, Stopped
 from rlacd.criteria.criterion import Criterion, Feasibility
-from rlacd.merge.boxes import Boxes
 from rlacd.run import Run, Work, work
-from rlacd.solid.arrays import IntArray
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
@@ -142,46 +143,52 @@ def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -
         refused[first].add(second)
         refused[second].add(first)
 
+    def begin(pair: _Pair) -> Future[_Verdict]:
+        return run.start(partial(pairing.unite, alive[pair.first], alive[pair.second]))
+
+    begun: dict[_Pair, Future[_Verdict]] = {}  # more than are needed, if an earlier one takes their parts away
     try:
-        boxes = Boxes(alive)
+        boxes = _boxes(alive)
         queue, never = pairing.pairs(alive, boxes, range(new))
         heapq.heapify(queue)
         for first, second in never:
             refuse(first, second)
-        verdicts: dict[_Pair, _Verdict] = {}  # for pairs put back into the queue
+        next_ones: list[_Pair] = []  # the cheapest, in their order
         count = newest = len(alive)
-        while queue and run.step(count - len(alive), None, len(alive)):
-            batch = _cheapest(queue, alive, run.threads)
-            fresh = [pair for pair in batch if pair not in verdicts]
-            verdicts.update(
-                zip(fresh, run.map(lambda p: pairing.unite(alive[p.first], alive[p.second]), fresh), strict=True)
-            )
-            for taken, pair in enumerate(batch, start=1):
-                union, price, for_good = verdicts.pop(pair)
-                # Pay in the order of the pairs: the batch size, which depends on the threads, must not matter.
-                if not run.work.pay(price):
-                    break
-                if union is None:
-                    if for_good:
-                        refuse(pair.first, pair.second)
-                    continue
-                origin[newest] = min(origin[pair.first], origin[pair.second])
-                del alive[pair.first], alive[pair.second]
-                alive[newest] = union
-                boxes.add(newest, union, [pair.first, pair.second])
-                refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
-                never_with = refused[newest] & alive.keys()
-                for i in never_with:
-                    refused[i].add(newest)
-                found, never = pairing.pairs(alive, boxes.without([*never_with]), [newest])
-                for first, second in never:
-                    refuse(first, second)
-                for other in [*batch[taken:], *found]:
-                    heapq.heappush(queue, other)
-                newest += 1
+        while run.step(count - len(alive), None, len(alive)):
+            next_ones += _cheapest(queue, alive, run.at_once - len(next_ones))
+            if not next_ones:
                 break
+            begun |= {pair: begin(pair) for pair in next_ones if pair not in begun}
+            pair = next_ones.pop(0)
+            union, price, for_good = run.result(begun.pop(pair))
+            # Pay in the order of the pairs: how many are begun, which depends on the threads, must not matter.
+            if not run.work.pay(price):
+                break
+            if union is None:
+                if for_good:
+                    refuse(pair.first, pair.second)
+                continue
+            origin[newest] = min(origin[pair.first], origin[pair.second])
+            del alive[pair.first], alive[pair.second]
+            alive[newest] = union
+            boxes = boxes.without([pair.first, pair.second])
+            boxes.add(newest, union.hull.corners)
+            refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
+            never_with = refused[newest] & alive.keys()
+            for i in never_with:
+                refused[i].add(newest)
+            found, never = pairing.pairs(alive, boxes.without([*never_with]), [newest])
+            for first, second in never:
+                refuse(first, second)
+            for other in [*next_ones, *found]:
+                heapq.heappush(queue, other)
+            next_ones = []
+            newest += 1
     except Stopped:  # raised between two unions
         run.note_stop()
+    finally:
+        run.drop(begun.values())
     return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
 
 
@@ -208,14 +215,12 @@ class _Adjoining:
         """Pairs that the volume bound allows."""
         screen = self.criterion.screen
         pairs = boxes.pairs(new, screen.reach)
-        if not self.run.work.pay(_sum_over(alive, pairs, work.joining)):
+        if not self.run.work.pay(_price(alive, pairs, work.joining)):
             return [], []
-        found = [
-            _Pair(hull_volume - (screen.filled(alive[first]) + screen.filled(alive[second])), first, second)
-            for first, second, volume, hull_volume in joint_volumes(alive, pairs, self.run.threads)
-            if not screen.excludes(volume, hull_volume)
-        ]
-        return found, []
+        volumes, hulls = joint_volumes(alive, pairs, self.run.threads)
+        kept = ~screen.excludes(volumes, hulls)
+        costs = hulls - _sums(alive, pairs, screen.filled)
+        return _queue(pairs[kept], costs[kept]), []
 
     def unite(self, first: Part, second: Part) -> _Verdict:
         """Glue the two parts."""
@@ -239,24 +244,19 @@ class _Bridged:
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
         screen = self.criterion.screen
-        reach = np.inf if len(boxes.ids) <= self.few else screen.reach
+        reach = np.inf if len(boxes) <= self.few else screen.reach
         pairs = boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
         for some in np.split(pairs, range(PAIRS_AT_ONCE, len(pairs), PAIRS_AT_ONCE)):
-            if not self.run.may_continue() or not self.run.work.pay(_sum_over(alive, some, work.screening)):
+            if not self.run.may_continue() or not self.run.work.pay(_price(alive, some, work.screening)):
                 break
             used, places = _places(some)
             hulls = [alive[i].hull for i in used]
-            volumes, feasibilities = screen.feasibilities(self.solid.filling, hulls, places, self.run.threads)
-            for (first, second), volume, feasibility in zip(
-                some.tolist(), volumes.tolist(), feasibilities.tolist(), strict=True
-            ):
-                if feasibility == Feasibility.MAYBE:
-                    free = screen.filled(alive[first]) + screen.filled(alive[second])
-                    found.append(_Pair(volume - free, first, second))
-                elif feasibility == Feasibility.NEVER:
-                    never.append((first, second))
+            volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, places, self.run.threads)
+            may = verdicts == Feasibility.MAYBE
+            found += _queue(some[may], volumes[may] - _sums(alive, some[may], screen.filled))
+            never += map(tuple, some[verdicts == Feasibility.NEVER].tolist())
         return found, never
 
     def unite(self, first: Part, second: Part) -> _Verdict:
@@ -301,24 +301,26 @@ class Uniter:
     account: Work
 
     def feasible(self, part: Part, others: Sequence[Part]) -> list[tuple[int, float]]:
-        """Find which of other parts may be united with a part, and the volumes of the joint hulls.
+        """Find which of other parts within reach may be united with a part, and the volumes of the joint hulls.
 
         Returns
         -------
         list of (int, float)
             Index and volume. Empty if too little work is left.
         """
-        hulls = [part.hull, *(other.hull for other in others)]
-        pairs = np.zeros((len(others), 2), dtype=np.int32)
-        pairs[:, 1] = range(1, len(hulls))
-        corners = [len(hull.vertices) for hull in hulls]
-        if not self.account.pay(sum(work.screening(corners[0] + corner) for corner in corners[1:])):
+        hulls, screen = [part.hull, *(other.hull for other in others)], self.criterion.screen
+        corners = [hull.corners for hull in hulls]
+        pairs = Boxes(corners).pairs([0], screen.reach)
+        near = pairs[:, 1].tolist()
+        own = len(part.hull.vertices)
+        if not self.account.pay(sum(work.screening(own + len(hulls[i].vertices)) for i in near)):
             return []
-        screen = self.criterion.screen
         if not screen.looks_inside:
-            return list(enumerate(_native.joint_hull_volumes([hull.vertices for hull in hulls], pairs, 1).tolist()))
+            volumes = _native.joint_hull_volumes(corners, pairs, 1)
+            return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True)]
         volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, pairs, 1)
-        return [(i, float(volumes[i])) for i in np.flatnonzero(verdicts == Feasibility.MAYBE).tolist()]
+        found = zip(near, volumes.tolist(), verdicts.tolist(), strict=True)
+        return [(i - 1, volume) for i, volume, verdict in found if verdict == Feasibility.MAYBE]
 
     def unite_feasible(self, first: Part, second: Part) -> Part | None:
         """Unite two parts that may be united; None if no union meets the criterion after all."""
@@ -360,20 +362,21 @@ def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid:
 
 def neighbours(
     alive: Mapping[int, Part], new: Sequence[int], reach: float, threads: int
-) -> list[tuple[int, int, float, float]]:
+) -> Iterator[tuple[int, int, float, float]]:
     """Pairs of a new part and any other with boxes within reach: (first, second, volume, joint hull's volume)."""
-    return joint_volumes(alive, Boxes(alive).pairs(new, reach), threads)
+    pairs = _boxes(alive).pairs(new, reach)
+    return zip(*pairs.T.tolist(), *(own.tolist() for own in joint_volumes(alive, pairs, threads)), strict=True)
 
 
-def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, threads: int) -> list[tuple[int, int, float, float]]:
-    """Volumes of pairs of parts [P, 2]: (first, second, volume of both, joint hull's volume)."""
+def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, threads: int) -> tuple[FloatArray, FloatArray]:
+    """The volume of both parts of each pair [P, 2], and that of their joint hull."""
     used, places = _places(pairs)
-    corners = [alive[i].hull.vertices for i in used]
-    hulls = _native.joint_hull_volumes(corners, places, threads)
-    return [
-        (i, j, alive[i].volume + alive[j].volume, hull)
-        for (i, j), hull in zip(pairs.tolist(), hulls.tolist(), strict=True)
-    ]
+    hulls = _native.joint_hull_volumes([alive[i].hull.corners for i in used], places, threads)
+    return _sums(alive, pairs, lambda part: part.volume), hulls
+
+
+def _boxes(alive: Mapping[int, Part]) -> Boxes:
+    return Boxes([part.hull.corners for part in alive.values()], list(alive))
 
 
 def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
@@ -382,10 +385,20 @@ def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
     return used.tolist(), np.searchsorted(used, pairs).astype(np.int32)
 
 
-def _sum_over(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
+def _sums(alive: Mapping[int, Part], pairs: IntArray, of: Callable[[Part], float]) -> FloatArray:
+    """Sums [P] of something over the two parts of each pair [P, 2]."""
+    used, places = _places(pairs)
+    first, second = np.array([of(alive[i]) for i in used], dtype=np.float64)[places.T]
+    return np.asarray(first + second)
+
+
+def _price(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
     """Total price of pairs [P, 2], each priced by the number of vertices of its two hulls."""
-    corners = {i: len(alive[i].hull.vertices) for i in np.unique(pairs).tolist()}
-    return sum(price(corners[i] + corners[j]) for i, j in pairs.tolist())
+    return sum(map(price, _sums(alive, pairs, lambda part: len(part.hull.vertices)).astype(int).tolist()))
+
+
+def _queue(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
+    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
 
 
 def united_in_turn(

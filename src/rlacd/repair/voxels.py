@@ -158,17 +158,15 @@ def _grown(cells: BoolArray, radius: float) -> BoolArray:
 def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:
     """Return corner coordinates ``[N, 3]`` (cell (0, 0, 0) spans 0 to 1), outward squares ``[Q, 4]`` of a cell set."""
     shape = tuple(np.array(solid.shape) + 1)
+    steps = shape[1] * shape[2], shape[2], 1
     squares = []
     for axis in range(3):
         ends = np.diff(solid.astype(np.int8), axis=axis, prepend=0, append=0)
         for outward in (-1, 1):  # what ends shows upwards, what begins downwards
-            loop = []
-            for du, dv in [(0, 0), (1, 0), (1, 1), (0, 1)][::-outward]:
-                corner = np.argwhere(ends == outward)
-                corner[:, (axis + 1) % 3] += du
-                corner[:, (axis + 2) % 3] += dv
-                loop.append(np.ravel_multi_index(tuple(corner.T), shape))
-            squares.append(np.stack(loop, axis=1))
+            at = np.unravel_index(np.flatnonzero(ends == outward), ends.shape)
+            corner, along = np.ravel_multi_index(at, shape), (steps[(axis + 1) % 3], steps[(axis + 2) % 3])
+            loop = np.array([(0, 0), (1, 0), (1, 1), (0, 1)][::-outward]) @ along
+            squares.append(corner[:, None] + loop)
     flat = np.concatenate(squares)
     used, index = np.unique(flat, return_inverse=True)
     corners = np.stack(np.unravel_index(used, shape), axis=1).astype(np.float64)

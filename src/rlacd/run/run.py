@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager
@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeVar
 from manifold3d import Manifold
 
 from rlacd._native import Stop, Stopped, poll_stop, use_stop
+from rlacd.run.trace import Trace
 from rlacd.run.work import Work
 
 
@@ -121,9 +122,13 @@ class Run:
         self._stopped_at = self._finish_by = math.inf
         self._outer: Run | None = None
         self._pool: ThreadPoolExecutor | None = None
+        self._trace = Trace()
 
     def __enter__(self) -> Run:
         _start_booleans(self.threads)
+        self._trace = Trace(os.environ.get("RLACD_TRACE", ""))
+        self._whole = self._trace.span("run", "run")
+        self._whole.__enter__()
         self._pool = ThreadPoolExecutor(self.threads, initializer=use_stop, initargs=(self.stop,))
         self._before = use_stop(self.stop)
         self.stop.begin(self._look)
@@ -135,6 +140,8 @@ class Run:
         use_stop(self._before)
         assert self._pool is not None
         self._pool.shutdown()
+        self._whole.__exit__(None, None, None)
+        self._trace.write()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -143,7 +150,8 @@ class Run:
         self._stage = outer if self._is_quiet else name
         self.step(0, None, self._parts)
         try:
-            yield
+            with self._trace.span("stage", name):
+                yield
         finally:
             self._stage = outer
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
@@ -157,6 +165,11 @@ class Run:
     def seconds_left(self) -> float:
         """Seconds left of the innermost time limit; infinite if there is none."""
         return self._end - time.perf_counter()
+
+    @property
+    def at_once(self) -> int:
+        """How many things to `start` so that no thread waits for the next."""
+        return self.threads if self.threads == 1 else self.threads + 1
 
     @property
     def is_over(self) -> bool:
@@ -264,6 +277,7 @@ class Run:
         items = list(items)
         results: list[Any] = [None] * len(items)
         numbers, end = count(), len(items)
+        function = self._trace.each(self._stage, function)
 
         def work() -> None:
             nonlocal end
@@ -279,8 +293,9 @@ class Run:
         try:
             if self._pool is not None and self.threads > 1:
                 others += (self._pool.submit(work) for _ in range(min(self.threads, len(items)) - 1))
-            work()
-            self._watch(others)
+            with self._trace.span("map", self._stage):
+                work()
+                self._watch(others)
             for other in others:
                 other.result()
         except BaseException as error:
@@ -292,6 +307,9 @@ class Run:
 
     def start(self, function: Callable[[], _R]) -> Future[_R]:
         """Begin some work on another thread, or do it at once where there is only this one."""
+        return self._trace.begin(self._stage, function, self._started)
+
+    def _started(self, function: Callable[[], _R]) -> Future[_R]:
         if self._pool is not None and self.threads > 1:
             return self._pool.submit(function)
         done: Future[_R] = Future()
@@ -300,11 +318,12 @@ class Run:
 
     def result(self, begun: Future[_R]) -> _R:
         """Wait for what was begun."""
-        self._watch([begun])
+        with self._trace.wait(self._stage, begun):
+            self._watch([begun])
         return begun.result()
 
     @staticmethod
-    def drop(begun: Sequence[Future[_R]]) -> None:
+    def drop(begun: Collection[Future[_R]]) -> None:
         """Leave undone what has not been begun in earnest, and wait for the rest."""
         for future in begun:
             future.cancel()

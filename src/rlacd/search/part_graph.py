@@ -62,7 +62,7 @@ class PartGraph:
         self.parts.update(zip(ids, new, strict=True))
         self._gaps.update((i, {}) for i in ids)
         filled = {i: self._screen.filled(part) for i, part in self.parts.items()}
-        near = neighbours(self.parts, ids, TOUCHING_FACES, 1)
+        near = list(neighbours(self.parts, ids, TOUCHING_FACES, 1))
         self._work += sum(
             work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))
             + work.gluing(self.parts[i].size + self.parts[j].size)

@@ -16,9 +16,7 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import Uniter
 from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
-from rlacd.solid.arrays import FloatArray, dots, heights
-from rlacd.solid.component import Component, Part, Plane, reunite
-from rlacd.solid.hull import Hull
+from rlacd.solid.component import Component, Part, reunite
 
 TAKERS = 6
 """Number of parts a piece is offered to, starting with those whose hulls would grow the least."""
@@ -69,7 +67,8 @@ def redistribute(
     def halves(piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
             may_cut = run.step(0, None, len(now)) and run.work.pay(work.cutting(piece.component.size))
-            halved = _halved(piece.component, now, random) if may_cut else []
+            where = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
+            halved = piece.component.halved([part.hull for part in now], where) if may_cut else []
             piece.halves = [_Piece(half) for half in halved]
         return piece.halves
 
@@ -120,35 +119,5 @@ class _Piece:
 
 def _takers(parts: Sequence[Part], piece: Part, uniter: Uniter) -> list[int]:
     """The parts that may take a piece, those first whose hulls would grow the least."""
-    boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
-    near = np.flatnonzero(_gaps(boxes, piece.box) <= uniter.criterion.screen.reach).tolist()
-    feasible = uniter.feasible(piece, [parts[i] for i in near])
-    by_growth = sorted(feasible, key=lambda found: found[1] - parts[near[found[0]]].hull.volume)
-    return [near[k] for k, _ in by_growth[:TAKERS]]
-
-
-def _gaps(boxes: FloatArray, box: FloatArray) -> FloatArray:
-    """Distances of boxes [N, 2, 3] from another [2, 3]."""
-    apart = np.maximum(np.maximum(box[0] - boxes[:, 1], boxes[:, 0] - box[1]), 0.0)
-    return np.sqrt(dots(apart, apart))
-
-
-def _halved(piece: Component, parts: Sequence[Part], random: np.random.Generator) -> list[Component]:
-    """Cut across the direction from one to the other of the two parts whose hulls would grow the least by a piece.
-
-    Around a round hole it follows the hole, which no axis does. The smaller half comes first.
-    """
-    growth = [Hull.around(part.hull, piece.hull).volume - part.hull.volume for part in parts]
-    if len(parts) < 2:
-        return []  # what one part cannot take, it cannot take in halves
-    first, second = (parts[i].hull.vertices.mean(axis=0) for i in np.argsort(growth, kind="stable")[:2])
-    length = float(np.sqrt(dots(second - first, second - first)))
-    if length == 0:
-        return []
-    x, y, z = direction = (second - first) / length
-    along = heights(piece.hull.vertices, direction[None])
-    share = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-    below, above = piece.cut(Plane((float(x), float(y), float(z)), float(along.min() + share * np.ptp(along))))
-    if below is None or above is None:
-        return []
-    return sorted([below, above], key=lambda half: half.volume)
+    by_growth = sorted(uniter.feasible(piece, parts), key=lambda found: found[1] - parts[found[0]].hull.volume)
+    return [i for i, _ in by_growth[:TAKERS]]

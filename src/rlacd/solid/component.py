@@ -260,6 +260,16 @@ class Component(Part):
         below, above = _native.cut(self.vertices, self.faces, *plane.normal, plane.offset, least)
         return below and Component.of(below, self), above and Component.of(above, self)
 
+    def halved(self, hulls: Sequence[Hull], share: float) -> list[Component]:
+        """Cut at a share of its length from one to the other of the two hulls that would grow the least by it.
+
+        The smaller side comes first; an empty list if one would be empty.
+        """
+        corners, volumes = [hull.corners for hull in hulls], [hull.volume for hull in hulls]
+        sides = _native.halve(self.vertices, self.faces, self.hull.corners, corners, volumes, share, NEGLIGIBLE_VOLUME)
+        halves = [Component.of(side, self) for side in sides if side is not None]
+        return sorted(halves, key=lambda half: half.volume) if len(halves) == 2 else []
+
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
         vertices, faces, volume, tree = self.filling.clipped(hull.vertices, hull.faces)
@@ -319,10 +329,12 @@ def _joined_again(components: Sequence[Component]) -> list[Component]:
 
 def touch(first: Part, second: Part) -> bool:
     """Tell whether two parts, or members of them, touch face to face."""
-    return any(
-        _native.do_touch(a.vertices, a.faces, b.vertices, b.faces)
-        for a in _disjoint_pieces(first)
-        for b in _disjoint_pieces(second)
+    ours, theirs = _disjoint_pieces(first), _disjoint_pieces(second)
+    return _native.do_touch(
+        [one.vertices for one in ours],
+        [one.faces for one in ours],
+        [one.vertices for one in theirs],
+        [one.faces for one in theirs],
     )
 
 

@@ -37,7 +37,7 @@ class Hull:
     @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
-        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+        return self.corners.box
 
     @cached_property
     def corners(self) -> _native.HullCorners:

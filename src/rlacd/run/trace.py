@@ -1,0 +1,73 @@
+"""What each thread of a run did, when and for how long, in the trace format that Chrome and Perfetto show.
+
+`python -m benchmarks replay` tells from it what other numbers of cores would take.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from rlacd._native import kernel_times, time_kernels
+
+_R = TypeVar("_R")
+
+Kind = Literal["run", "stage", "map", "item", "begin", "begun", "wait"]
+"""Items belong to the map of that time; what is begun has the number with which it is waited for."""
+
+
+class Trace:
+    """Spans of work, kept if there is a file for them."""
+
+    def __init__(self, path: str = "") -> None:
+        self._path = path
+        self._spans: list[dict[str, Any]] = []
+        self._numbers: dict[Future[Any], int] = {}
+        if path:
+            time_kernels(True)
+
+    @contextmanager
+    def span(self, kind: Kind, name: str, number: int | None = None) -> Iterator[None]:
+        """Record what is done inside: wall and CPU time, and what `kernel_times` counts at both ends."""
+        if not self._path:
+            yield
+            return
+        start, used, kernels = time.perf_counter(), time.thread_time(), kernel_times()
+        try:
+            yield
+        finally:
+            times = {"ts": start, "dur": time.perf_counter() - start, "tts": used, "tdur": time.thread_time() - used}
+            where = {"pid": os.getpid(), "tid": threading.get_ident(), "name": name, "cat": kind, "ph": "X"}
+            microseconds = {key: round(1e6 * seconds, 1) for key, seconds in times.items()}
+            args = {"number": number, "begin": kernels, "end": kernel_times()}
+            self._spans.append(where | microseconds | {"args": args})
+
+    def each(self, name: str, function: Callable[..., _R]) -> Callable[..., _R]:
+        """The function, with a span for each item it is called for."""
+        return self.span("item", name)(function) if self._path else function
+
+    def begin(self, name: str, work: Callable[[], _R], start: Callable[[Callable[[], _R]], Future[_R]]) -> Future[_R]:
+        """Start some work."""
+        if not self._path:
+            return start(work)
+        number = len(self._numbers)
+        with self.span("begin", name, number):
+            begun = start(self.span("begun", name, number)(work))
+        self._numbers[begun] = number
+        return begun
+
+    def wait(self, name: str, begun: Future[Any]) -> AbstractContextManager[None]:
+        """The span of waiting for something."""
+        return self.span("wait", name, self._numbers.get(begun))
+
+    def write(self) -> None:
+        """Write the spans to the file."""
+        if self._path:
+            Path(self._path).write_text(json.dumps({"traceEvents": self._spans}))
