@@ -58,6 +58,8 @@ def decompose(
     primitives: bool | Sequence[PrimitiveKind] = (),
     overlap: float = 0.0,
     overlap_abs: float | None = None,
+    keep_open: float | None = None,
+    keep_open_abs: float | None = None,
     merge: bool = True,
     policy: str | Policy = "greedy",
     resolution: int = 100,
@@ -120,6 +122,12 @@ def decompose(
         overlap.
     overlap_abs : float, optional
         The same in the input's unit; replaces `overlap`.
+    keep_open : float, optional
+        Passages stay open: in a hole, slot or mouth that holds a ball of at least `threshold` in radius, a ball of this
+        share of its radius still fits between the hulls, at the same place. Passages are found from points spread over
+        the surface, so one with a tiny share of it can be missed; ``report["warnings"]`` names those not kept.
+    keep_open_abs : float, optional
+        Instead of a share, the radius of a ball in the input's unit that still passes wherever one 1 % larger does.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy

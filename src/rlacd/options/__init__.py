@@ -155,6 +155,11 @@ class Options:
         a length (2mm).
     overlap_abs
         The same as a length in the mesh's own unit.
+    keep_open
+        Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in radius, one of this
+        share of its radius (0.9) still fits between the hulls; also the radius of a ball that has to pass (2mm).
+    keep_open_abs
+        The radius of that ball as a length in the mesh's own unit.
     merge
         Join hulls where one is tight enough, also across what lies between them.
     policy
@@ -218,6 +223,10 @@ class Options:
     )
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
     overlap_abs: float | None = option(None, LIMITS, LENGTH)
+    keep_open: float | None = option(
+        None, LIMITS, number(0.1, 0.99, typed=str), metavar="NUMBER", usual="passages may close"
+    )
+    keep_open_abs: float | None = option(None, LIMITS, LENGTH)
     merge: bool = option(True, METHOD, usual="merge")
     policy: str | Policy = option("greedy", METHOD, _POLICY, metavar="NAME")
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
@@ -258,6 +267,8 @@ class Options:
                     yield name, f"left out: the criterion {self.criterion_name} has {instead} instead"
         if self.per_node and self.criterion_name == "navigable":
             yield "per_node", "left out: navigable space is that of the whole scene"
+        if self.keep_open is not None and self.keep_open_abs is not None:
+            yield "keep_open", "left out with keep_open_abs, a radius instead of a share"
         for name in ("budget", "search_steps"):
             if self.quality == FAST and getattr(self, name) is not None:
                 yield name, "left out with quality='fast', which does not search"

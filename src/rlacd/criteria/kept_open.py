@@ -1,0 +1,87 @@
+"""A criterion together with passages that hulls have to keep open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from rlacd import _native
+from rlacd.criteria.criterion import Criterion, Joined
+from rlacd.criteria.intrusions import TOUCH, Intrusions
+from rlacd.options import Options
+from rlacd.run import Run
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Part
+from rlacd.solid.passages import passage_balls
+from rlacd.solid.primitive import Balls
+from rlacd.solid.solid import Solid
+
+POINTS = 5000
+"""From which balls start. Of 24 holes with a radius of 1 % of the longest side, each gets several."""
+
+PLAY = 1.01
+"""Passages that are narrower than so many times a ball need not let it through: hulls around them cannot be exact."""
+
+
+@dataclass(frozen=True)
+class KeptOpen(Joined):
+    """A criterion whose hulls also stay out of balls, each a share of the largest that fits where it is.
+
+    Attributes
+    ----------
+    criterion : Criterion
+    free : Balls
+        The largest that fit in the passages of the solid.
+    radii : float64 [B]
+        How large they have to stay.
+    """
+
+    free: Balls
+    radii: FloatArray
+
+    @classmethod
+    def around(cls, criterion: Criterion, options: Options, solid: Solid, run: Run) -> KeptOpen:
+        """Find the passages of a solid that hulls which meet a criterion could narrow too much."""
+        share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * solid.frame.scale
+        radii = PLAY * ball or options.threshold, (ball + criterion.overhang) / (1 - share)
+        with run.stage("space"):
+            surface = _native.Surface(*solid.mesh, run.threads)
+            radii = radii[0], min(radii[1], 2.0)
+            free = passage_balls(solid.mesh, surface, radii, POINTS, run.threads)
+        return cls(criterion, free, kept_radii(options, free.radii, solid.frame.scale))
+
+    @cached_property
+    def _intrusions(self) -> Intrusions:
+        return Intrusions(Balls(self.free.centres, self.radii))
+
+    def is_met(self, part: Part) -> bool:
+        """Whether the hull stays out of the balls, and the criterion is met."""
+        return not self._intrusions.any_beyond(part, TOUCH) and self.criterion.is_met(part)
+
+    def scaled(self, factor: float) -> KeptOpen:
+        """Coarser: hulls may take more of each ball, by the same factor."""
+        radii = np.maximum(self.free.radii - factor * (self.free.radii - self.radii), 0.0)
+        return replace(self, criterion=self.criterion.scaled(factor), radii=radii)
+
+    def settled(self, parts: Sequence[Part]) -> KeptOpen:
+        """Balls become as small as the hulls of parts that cannot be cut leave them; the report measures those."""
+        radii = np.maximum(self._intrusions.radii_left(parts), 0.0)
+        changed = {} if (radii == self.radii).all() else {"radii": radii}
+        return replace(self, criterion=self.criterion.settled(parts), **changed)
+
+
+def kept_radii(options: Options, free: FloatArray, scale: float) -> FloatArray:
+    """How large balls with these radii in the frame have to stay by the options; `scale` is its units per the input's.
+
+    Without such an option, as large as can be lost without a warning.
+    """
+    if options.keep_open_abs is not None:
+        return np.minimum(options.keep_open_abs * scale, free)
+    return (MOSTLY if options.keep_open is None else options.keep_open) * free
+
+
+MOSTLY = 2 / 3
+"""Share of its radius below which the report warns of a passage."""
