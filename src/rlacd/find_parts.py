@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
+from rlacd.criteria.limited import BOX, FEWEST
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import best_within, drop_slivers
+from rlacd.merge import best_within, drop_slivers, merge_parts
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -74,6 +75,8 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     parts, goal, found = decomposer.decompose(goal)
     if not decomposer.keeps_limit(parts):
         parts = decomposer.at_most(parts, goal)
+    elif options.hull_limits.allow(*BOX) and not options.hull_limits.allow(*FEWEST):
+        parts = decomposer.cut_to_limits(parts, goal)
     return Reached(solid, options, goal, parts, found, root)
 
 
@@ -147,6 +150,27 @@ class _Decomposer:
         most, limited = self.options.max_hulls, LimitedCriterion(goal, self.options.hull_limits)
         assert most is not None
         return best_within(most, self.model.solid, decompose, unite, limited, self.run)
+
+    def cut_to_limits(self, parts: list[Part], goal: Criterion) -> list[Part]:
+        """Cut parts that limits too low for the criterion make break it, the worst first, while hulls are left."""
+        limited, most = LimitedCriterion(goal, self.options.hull_limits), self.options.max_hulls or math.inf
+        solid, policy = self.model.solid, make_policy(self.options.policy, SweepCache(), _scale(goal))
+        try:
+            with self.run.stage("limit"):
+                met = self.run.map(limited.is_met, parts)
+                broken = [part for part, is_met in zip(parts, met, strict=True) if not is_met]
+                broken.sort(key=limited.error, reverse=True)
+                parts = [part for part, is_met in zip(parts, met, strict=True) if is_met]
+                for n, part in enumerate(broken):
+                    inside = solid.inside(part.hull)
+                    tree = CutTree(Component((inside.vertices, inside.faces)), policy, self.run)
+                    new = cut_and_merge(tree, limited, self.run, merge=self.options.merge).parts if inside.size else []
+                    fits = len(parts) + len(new) + len(broken) - n - 1 <= most
+                    parts += new if new and fits else [part]
+                parts = merge_parts(parts, limited, self.run, solid=solid)
+        except Stopped:
+            self.run.note_stop()
+        return parts
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion | None

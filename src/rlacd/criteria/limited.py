@@ -26,9 +26,11 @@ CRITERIA: dict[str, type[Criterion]] = {
 """By the name that options give them."""
 
 FEWEST = (24, 44)
-"""Vertices and triangles. Lower limits apply only at the end, with a warning if a hull then exceeds the threshold: to
-meet them, round parts would have to be cut very small (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12
-for 32)."""
+"""Vertices and triangles. Under lower limits, parts are found without them, and only those that then break the criterion
+are cut on: cut for 8 vertices from the start, a cup is 40 hulls instead of 25."""
+
+BOX = (8, 12)
+"""Under limits lower than those of a box no part is cut on: next to no solid can be cut into such hulls."""
 
 
 @dataclass(frozen=True)

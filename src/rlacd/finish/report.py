@@ -12,6 +12,7 @@ import trimesh
 from rlacd import _native
 from rlacd._version import __version__
 from rlacd.find_parts import Reached
+from rlacd.finish.narrowed import Passage, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
 from rlacd.fit import Fit
 from rlacd.merge.slivers import is_sliver
@@ -74,6 +75,12 @@ def make_report(
     apart: _Distances | None = None
     if has_surface:
         apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None)
+    passages: list[Passage] | None = None
+    if apart is not None:
+        over = apart.over
+        passages = run.if_in_time(
+            lambda: narrowed(reached, [part.hull for part in parts], over, run.threads), lambda: None
+        )
     with run.shielded():  # nothing below takes long
         stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
@@ -83,6 +90,7 @@ def make_report(
             warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
         exceeds = len(summary.warnings) > 0
         warnings += [*summary.warnings, *_shortcomings([part.hull for part in parts], apart, reached, exceeds)]
+        warnings += too_narrow(passages or [], reached)
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return {
@@ -97,6 +105,7 @@ def make_report(
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
             "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
+            "passages": None if passages is None else [passage.as_plain(solid.frame) for passage in passages],
             "scale": solid.frame.scale,
             "mass": _mass(mass_of(*concatenated(stands_for_mass), solid.frame)),
             "repair": [{**vars(body)} for body in solid.bodies],
@@ -187,6 +196,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
             for (name, report, _), begin in begins
             for hole in report["holes"]
         ],
+        "passages": [{**passage, "node": name} for name, report in reports for passage in report["passages"] or ()],
         "nodes": [{"node": name, "parts": report["parts"], "scale": report["scale"]} for name, report in reports],
         "search": None,
         "at_least": _sum_known([report["at_least"] for _, report in reports]),

@@ -15,13 +15,13 @@ from rlacd import _native
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
 from rlacd.solid.primitive import Balls
 
-LARGEST_DRIFT = 0.5
-"""Share of its way by which a held ball may drift: the walls that hold it open by up to 60 degrees."""
+LARGEST_DRIFT = 0.25
+"""Share of its way by which a held ball may drift: the walls that hold it open by up to 30 degrees."""
 
 PUSHES = 8
 """To and fro, with steps of each of these shares of the radius."""
 
-STEPS = (1 / 8, 1 / 32, 1 / 128, 1 / 128)
+STEPS = (1 / 8, 1 / 32, 1 / 128)
 
 MOST_SHRINKS = 12
 """Nearly all balls need fewer than six."""
@@ -61,8 +61,8 @@ def passage_balls(
     balls = _shrunk(points, normals, surface, (least, most), threads)
     if wanted is not None:
         balls = _some(balls, wanted(balls))
-    balls, drift = _pushed(spread(balls), surface, threads)
-    balls = _some(balls, (balls.radii >= least) & (balls.radii <= most) & (drift <= LARGEST_DRIFT))
+    balls = _pushed(spread(balls), surface, threads)
+    balls = _some(balls, (balls.radii >= least) & (balls.radii <= most))
     return spread(_some(balls, surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5))
 
 
@@ -103,21 +103,21 @@ def _shrunk(
     return Balls(points[is_held] + radius[is_held, None] * normals[is_held], radius[is_held])
 
 
-def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> tuple[Balls, FloatArray]:
-    """The balls in the best place near theirs, and the share of the way of the last pushes by which they drifted."""
-    centres, radii, drift = balls.centres.copy(), np.zeros(len(balls)), np.zeros(len(balls))
+def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
+    """The balls that are held, in the best place near theirs; twice the drift is still within the first steps."""
     for step in STEPS:
-        at, start = centres.copy(), centres.copy()
+        at, size = balls.centres, step * balls.radii
+        best, radii = at.copy(), np.zeros(len(at))
         for _ in range(PUSHES):
             touched, _ = surface.closest(at, threads)
             away = at - touched
             distance = np.sqrt(dots(away, away))
             better = distance > radii
-            centres[better], radii[better] = at[better], distance[better]
-            at = at + (step * balls.radii / np.where(distance > 0, distance, 1.0))[:, None] * away
-        way = at - start
-        drift = np.sqrt(dots(way, way)) / (PUSHES * step * balls.radii)
-    return Balls(centres, radii), drift
+            best[better], radii[better] = at[better], distance[better]
+            at = at + (size / np.where(distance > 0, distance, 1.0))[:, None] * away
+        way, most = at - balls.centres, LARGEST_DRIFT * (1 if step == STEPS[-1] else 2)
+        balls = _some(Balls(best, radii), np.sqrt(dots(way, way)) <= most * PUSHES * size)
+    return balls
 
 
 def spread(balls: Balls) -> Balls:
