@@ -14,7 +14,7 @@ from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.criteria.limited import BOX, FEWEST
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import best_within, drop_slivers, merge_parts
+from rlacd.merge import COARSER, best_within, drop_slivers, merge_parts
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -154,23 +154,36 @@ class _Decomposer:
     def cut_to_limits(self, parts: list[Part], goal: Criterion) -> list[Part]:
         """Cut parts that limits too low for the criterion make break it, the worst first, while hulls are left."""
         limited, most = LimitedCriterion(goal, self.options.hull_limits), self.options.max_hulls or math.inf
-        solid, policy = self.model.solid, make_policy(self.options.policy, SweepCache(), _scale(goal))
+        done = parts
         try:
             with self.run.stage("limit"):
                 met = self.run.map(limited.is_met, parts)
+                done = [part for part, is_met in zip(parts, met, strict=True) if is_met]
                 broken = [part for part, is_met in zip(parts, met, strict=True) if not is_met]
                 broken.sort(key=limited.error, reverse=True)
-                parts = [part for part, is_met in zip(parts, met, strict=True) if is_met]
-                for n, part in enumerate(broken):
-                    inside = solid.inside(part.hull)
-                    tree = CutTree(Component((inside.vertices, inside.faces)), policy, self.run)
-                    new = cut_and_merge(tree, limited, self.run, merge=self.options.merge).parts if inside.size else []
-                    fits = len(parts) + len(new) + len(broken) - n - 1 <= most
-                    parts += new if new and fits else [part]
-                parts = merge_parts(parts, limited, self.run, solid=solid)
+                while broken and (room := most - len(done) - len(broken) + 1) > 1:
+                    done += self._cut_on(broken[0], limited, room)
+                    del broken[0]
+                done += broken
+                if len(done) > len(parts) and self.options.merge:
+                    done = merge_parts(done, limited, self.run, solid=self.model.solid)
         except Stopped:
             self.run.note_stop()
-        return parts
+            return parts
+        return done
+
+    def _cut_on(self, part: Part, limited: Criterion, most: float) -> list[Part]:
+        """Get at most so many pieces of a part that meet the criterion, scaled where it takes more."""
+        inside = self.model.solid.inside(part.hull)
+        if not inside.size:
+            return [part]
+        policy = make_policy(self.options.policy, SweepCache(), _scale(limited))
+        tree, factor = CutTree(Component((inside.vertices, inside.faces)), policy, self.run), 1.0
+        new = cut_and_merge(tree, limited, self.run, merge=self.options.merge).parts
+        while len(new) > most and self.run.stopped_by is None:
+            factor *= COARSER
+            new = cut_and_merge(tree, limited.scaled(factor), self.run, merge=self.options.merge).parts
+        return new if 1 < len(new) <= most else [part]
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion | None

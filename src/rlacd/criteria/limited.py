@@ -26,8 +26,8 @@ CRITERIA: dict[str, type[Criterion]] = {
 """By the name that options give them."""
 
 FEWEST = (24, 44)
-"""Vertices and triangles. Under lower limits, parts are found without them, and only those that then break the criterion
-are cut on: cut for 8 vertices from the start, a cup is 40 hulls instead of 25."""
+"""Vertices and triangles. Under lower limits, parts are found without them; those that then break the criterion are cut
+on. Cut for 8 vertices from the start, a cup is 40 hulls instead of 25."""
 
 BOX = (8, 12)
 """Under limits lower than those of a box no part is cut on: next to no solid can be cut into such hulls."""

@@ -41,6 +41,7 @@ ACCURACY = 0.02
 """Share of its radius to within which it is found what is left of a ball."""
 
 _AROUND = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
+_INSIDE = np.array(list(itertools.product(np.linspace(-0.75, 0.75, 7), repeat=3)))
 _ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]
 _NEIGHBOURS = 8
 
@@ -103,15 +104,17 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[n
 
 def _left(union: _native.HullUnion, centre: FloatArray, radius: float) -> float:
     """Radius of the largest ball that fits inside a ball and outside the hulls, to within `ACCURACY`."""
-    at, left, step = centre, 0.0, radius / 2
+    at, left, step, around = centre, 0.0, radius, _INSIDE
     while step > ACCURACY * radius:
-        there = at + step * _AROUND
+        there = at + step * around
         aside = there - centre
         fits = np.minimum(union.distance(there, 1), radius - np.sqrt(dots(aside, aside)))
         best = int(fits.argmax())
-        if fits[best] > left:
+        if is_better := fits[best] > left:
             at, left = there[best], float(fits[best])
-        else:
+        if around is _INSIDE:
+            step, around = radius / 4, _AROUND
+        elif not is_better:
             step /= 2
     return left
 
@@ -133,7 +136,8 @@ def too_narrow(found: Sequence[Passage], reached: Reached) -> list[str]:
         for count, one, many in ((closed, "closes", "close"), (len(lost) - closed, f"loses {what}", f"lose {what}"))
         if count
     ]
+    there, between = worst.radius / frame.scale, worst.left / frame.scale
     return [
-        f"{' and '.join(said)}: near {frame.place(worst.at)}, a ball of radius {worst.radius / frame.scale:.4g} fits in "
-        f"the input, of {worst.left / frame.scale:.4g} between the hulls (see `passages`); {cure}."
+        f"{' and '.join(said)}: near {frame.place(worst.at)}, a ball of radius {there:.4g} fits in the input, of "
+        f"{between:.4g} between the hulls (see `passages`); {cure}."
     ]
