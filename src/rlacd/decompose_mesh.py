@@ -105,8 +105,8 @@ def decompose(
         much it exceeds the threshold. A larger limit never leads to a larger concavity.
     max_vertices, max_faces : int, optional
         Limits on the vertices and triangles of each hull. A limited hull still contains its part, and the threshold
-        holds for it too, unless the limit is below 24 vertices or 44 triangles: if the threshold is then exceeded, a
-        warning says by how much.
+        holds for it too: below 24 vertices or 44 triangles, parts that exceed it are cut on while `max_hulls` allows
+        it. Below 8 vertices or 12 triangles they are not, and a warning says by how much the threshold is exceeded.
     detail : "simple" or "full"
         ``simple``: hulls leave out corners that add little, so that they have few, as far as the part still meets the
         criterion. ``full``: the exact hulls of the parts.

@@ -105,7 +105,7 @@ def test_each_hole_that_narrows_is_listed_with_its_place_and_what_is_left_of_it(
         fits = np.minimum(clearance(result.hulls, at + radius * some), radius * (1 - np.linalg.norm(some, axis=1)))
         assert fits.max() - 0.08 * radius <= passage["left_abs"] <= fits.max() + 0.08 * radius
     (warning,) = (said for said in result.report["warnings"] if "passages" in said)
-    assert f"{sum(share < 2 / 3 - 0.02 for share in shares)} passages " in warning
+    assert f"{sum(share < 2 / 3 for share in shares)} passages " in warning
 
 
 @pytest.mark.promise("passages")
@@ -153,7 +153,7 @@ def test_a_ball_of_a_given_radius_still_passes_and_narrower_holes_may_close() ->
 def test_where_a_limit_forbids_it_a_warning_says_so() -> None:
     mesh = mesh_of(plate(bore(0.3, 0, 0)))
     report = rlacd.decompose(mesh, keep_open=0.95, max_hulls=2, quality="fast", threads=1).report
-    assert any("1 passage" in said and "limits on the hulls" in said for said in report["warnings"])
+    assert any("passage" in said and "limits on the hulls" in said for said in report["warnings"])
 
 
 @pytest.mark.slow

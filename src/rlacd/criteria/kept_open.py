@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -45,13 +46,13 @@ class KeptOpen(Joined):
     @classmethod
     def around(cls, criterion: Criterion, options: Options, solid: Solid, run: Run) -> KeptOpen:
         """Find the passages of a solid that hulls which meet a criterion could narrow too much."""
-        share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * solid.frame.scale
-        radii = PLAY * ball or options.threshold, (ball + criterion.overhang) / (1 - share)
+        scale = solid.frame.scale
+        share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
+        most = min((ball + criterion.overhang) / (1 - share), 2.0)
         with run.stage("space"):
             surface = _native.Surface(*solid.mesh, run.threads)
-            radii = radii[0], min(radii[1], 2.0)
-            free = passage_balls(solid.mesh, surface, radii, POINTS, run.threads)
-        return cls(criterion, free, kept_radii(options, free.radii, solid.frame.scale))
+            free = passage_balls(solid.mesh, surface, (least_kept(options, scale), most), POINTS, run.threads)
+        return cls(criterion, free, np.minimum(share * free.radii + ball, free.radii))
 
     @cached_property
     def _intrusions(self) -> Intrusions:
@@ -73,15 +74,8 @@ class KeptOpen(Joined):
         return replace(self, criterion=self.criterion.settled(parts), **changed)
 
 
-def kept_radii(options: Options, free: FloatArray, scale: float) -> FloatArray:
-    """How large balls with these radii in the frame have to stay by the options; `scale` is its units per the input's.
-
-    Without such an option, as large as can be lost without a warning.
-    """
+def least_kept(options: Options, scale: float) -> float:
+    """The radius in the frame from which passages have to stay open; `scale` is its units per unit of the input."""
     if options.keep_open_abs is not None:
-        return np.minimum(options.keep_open_abs * scale, free)
-    return (MOSTLY if options.keep_open is None else options.keep_open) * free
-
-
-MOSTLY = 2 / 3
-"""Share of its radius below which the report warns of a passage."""
+        return PLAY * options.keep_open_abs * scale
+    return math.inf if options.keep_open is None else options.threshold

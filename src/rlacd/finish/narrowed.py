@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd.criteria.kept_open import kept_radii
+from rlacd.criteria.kept_open import least_kept
 from rlacd.find_parts import Reached
 from rlacd.solid.arrays import BoolArray, FloatArray, dots
 from rlacd.solid.distance import hull_union
@@ -24,6 +24,9 @@ LEAST_RADIUS = 0.008
 
 LEAST_LOSS = 0.1
 """Share of its radius that a passage has to lose to be listed."""
+
+MOSTLY = 2 / 3
+"""Share of its radius below which there is a warning."""
 
 LEAST_EXTENT = 0.1
 """Of a passage along an axis; smaller ones are nicks. At a threshold of 0.05, 16 of 27 real meshes lose a passage of
@@ -120,24 +123,30 @@ def _left(union: _native.HullUnion, centre: FloatArray, radius: float) -> float:
 
 
 def too_narrow(found: Sequence[Passage], reached: Reached) -> list[str]:
-    """Warn of passages that keep less than asked for, or less than two thirds of their radius."""
-    options, frame = reached.options, reached.solid.frame
-    required = kept_radii(options, np.array([one.radius for one in found]), frame.scale)
-    lost = [one for one, least in zip(found, required, strict=True) if one.left < least - ACCURACY * one.radius]
+    """Warn of passages that keep less than asked for, and of others that lose over a third of their radius."""
+    options, scale = reached.options, reached.solid.frame.scale
+    asked = [one for one in found if one.radius >= least_kept(options, scale)]
+    others = [one for one in found if one.radius < least_kept(options, scale) and one.left < MOSTLY * one.radius]
+    share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
+    broken = [one for one in asked if one.left < share * one.radius + ball - ACCURACY * one.radius]
+    return [
+        *_said(broken, "more than keep_open allows", "limits on the hulls leave no other way", reached),
+        *_said(others, "over a third of the radius", "--keep-open or a smaller threshold may keep such open", reached),
+    ]
+
+
+def _said(lost: Sequence[Passage], what: str, cure: str, reached: Reached) -> list[str]:
     if not lost:
         return []
-    asked = options.keep_open is not None or options.keep_open_abs is not None
-    what = "more than keep_open allows" if asked else "more than a third of the radius"
-    cure = "limits on the hulls leave no other way" if asked else "--keep-open or a smaller threshold keeps such open"
-    closed = sum(one.left <= ACCURACY * one.radius for one in lost)
+    frame, closed = reached.solid.frame, sum(one.left <= ACCURACY * one.radius for one in lost)
     worst = max(lost, key=lambda one: one.radius - one.left)
-    said = [
+    counted = [
         f"{count} passage{'' if count == 1 else 's'} {one if count == 1 else many}"
         for count, one, many in ((closed, "closes", "close"), (len(lost) - closed, f"loses {what}", f"lose {what}"))
         if count
     ]
     there, between = worst.radius / frame.scale, worst.left / frame.scale
     return [
-        f"{' and '.join(said)}: near {frame.place(worst.at)}, a ball of radius {there:.4g} fits in the input, of "
+        f"{' and '.join(counted)}: near {frame.place(worst.at)}, a ball of radius {there:.4g} fits in the input, of "
         f"{between:.4g} between the hulls (see `passages`); {cure}."
     ]
