@@ -29,6 +29,10 @@ from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
 
 
+COARSEST = 8
+"""Power of `COARSER` from which parts over a limit are cut where few hulls are left: 25 times the threshold."""
+
+
 class Reached(NamedTuple):
     """The decomposition reached: complete, or the state when it was stopped.
 
@@ -173,17 +177,19 @@ class _Decomposer:
         return done
 
     def _cut_on(self, part: Part, limited: Criterion, most: float) -> list[Part]:
-        """Get at most so many pieces of a part that meet the criterion, scaled where it takes more."""
+        """Get at most so many pieces of a part that meet the criterion, scaled where that takes more."""
         inside = self.model.solid.inside(part.hull)
         if not inside.size:
             return [part]
         policy = make_policy(self.options.policy, SweepCache(), _scale(limited))
-        tree, factor = CutTree(Component((inside.vertices, inside.faces)), policy, self.run), 1.0
-        new = cut_and_merge(tree, limited, self.run, merge=self.options.merge).parts
-        while len(new) > most and self.run.stopped_by is None:
-            factor *= COARSER
-            new = cut_and_merge(tree, limited.scaled(factor), self.run, merge=self.options.merge).parts
-        return new if 1 < len(new) <= most else [part]
+        tree, best = CutTree(Component((inside.vertices, inside.faces)), policy, self.run), [part]
+        for power in range(0 if most == math.inf else COARSEST, -1, -1):  # the finest that fits, by way of cheap ones
+            criterion = limited.scaled(COARSER**power)
+            new = cut_and_merge(tree, criterion, self.run, merge=self.options.merge).parts
+            if len(new) > most:
+                break
+            best = new if len(new) > 1 else best
+        return best
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion | None
