@@ -28,7 +28,6 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
 
-
 COARSEST = 8
 """Power of `COARSER` from which parts over a limit are cut where few hulls are left: 25 times the threshold."""
 
@@ -188,7 +187,7 @@ class _Decomposer:
             new = cut_and_merge(tree, criterion, self.run, merge=self.options.merge).parts
             if len(new) > most:
                 break
-            best = new if len(new) > 1 else best
+            best = new
         return best
 
     def _searched(
