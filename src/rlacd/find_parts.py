@@ -28,7 +28,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
 
-COARSEST = 8
+FIRST_POWER = 8
 """Power of `COARSER` from which parts over a limit are cut where few hulls are left: 25 times the threshold."""
 
 
@@ -79,7 +79,11 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     if not decomposer.keeps_limit(parts):
         parts = decomposer.at_most(parts, goal)
     elif options.hull_limits.allow(*BOX) and not options.hull_limits.allow(*FEWEST):
-        parts = decomposer.cut_to_limits(parts, goal)
+        try:
+            with run.stage("limit"):
+                parts = decomposer.cut_to_limits(parts, goal)
+        except Stopped:
+            run.note_stop()
     return Reached(solid, options, goal, parts, found, root)
 
 
@@ -157,23 +161,15 @@ class _Decomposer:
     def cut_to_limits(self, parts: list[Part], goal: Criterion) -> list[Part]:
         """Cut parts that limits too low for the criterion make break it, the worst first, while hulls are left."""
         limited, most = LimitedCriterion(goal, self.options.hull_limits), self.options.max_hulls or math.inf
-        done = parts
-        try:
-            with self.run.stage("limit"):
-                met = self.run.map(limited.is_met, parts)
-                done = [part for part, is_met in zip(parts, met, strict=True) if is_met]
-                broken = [part for part, is_met in zip(parts, met, strict=True) if not is_met]
-                broken.sort(key=limited.error, reverse=True)
-                while broken and (room := most - len(done) - len(broken) + 1) > 1:
-                    done += self._cut_on(broken[0], limited, room)
-                    del broken[0]
-                done += broken
-                if len(done) > len(parts) and self.options.merge:
-                    done = merge_parts(done, limited, self.run, solid=self.model.solid)
-        except Stopped:
-            self.run.note_stop()
-            return parts
-        return done
+        met = self.run.map(limited.is_met, parts)
+        done = [part for part, is_met in zip(parts, met, strict=True) if is_met]
+        broken = sorted((part for part, is_met in zip(parts, met, strict=True) if not is_met), key=limited.error)
+        while broken and (room := most - len(done) - len(broken) + 1) > 1:
+            done += self._cut_on(broken.pop(), limited, room)
+        done += broken
+        if len(done) == len(parts) or not self.options.merge:
+            return done
+        return merge_parts(done, limited, self.run, solid=self.model.solid)
 
     def _cut_on(self, part: Part, limited: Criterion, most: float) -> list[Part]:
         """Get at most so many pieces of a part that meet the criterion, scaled where that takes more."""
@@ -182,7 +178,9 @@ class _Decomposer:
             return [part]
         policy = make_policy(self.options.policy, SweepCache(), _scale(limited))
         tree, best = CutTree(Component((inside.vertices, inside.faces)), policy, self.run), [part]
-        for power in range(0 if most == math.inf else COARSEST, -1, -1):  # the finest that fits, by way of cheap ones
+        for power in range(
+            0 if most == math.inf else FIRST_POWER, -1, -1
+        ):  # the finest that fits, by way of cheap ones
             criterion = limited.scaled(COARSER**power)
             new = cut_and_merge(tree, criterion, self.run, merge=self.options.merge).parts
             if len(new) > most:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, Joined
-from rlacd.criteria.intrusions import TOUCH, Intrusions
+from rlacd.criteria.navigable import TOUCH, Intrusions
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
@@ -20,7 +20,7 @@ from rlacd.solid.passages import passage_balls
 from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
-POINTS = 5000
+STARTS_FOR_ALL = 5000
 """From which balls start. Of 24 holes with a radius of 1 % of the longest side, each gets several."""
 
 PLAY = 1.01
@@ -51,7 +51,7 @@ class KeptOpen(Joined):
         most = min((ball + criterion.overhang) / (1 - share), 2.0)
         with run.stage("space"):
             surface = _native.Surface(*solid.mesh, run.threads)
-            free = passage_balls(solid.mesh, surface, (least_kept(options, scale), most), POINTS, run.threads)
+            free = passage_balls(solid.mesh, surface, (least_kept(options, scale), most), STARTS_FOR_ALL, run.threads)
         return cls(criterion, free, np.minimum(share * free.radii + ball, free.radii))
 
     @cached_property
@@ -70,8 +70,7 @@ class KeptOpen(Joined):
     def settled(self, parts: Sequence[Part]) -> KeptOpen:
         """Balls become as small as the hulls of parts that cannot be cut leave them; the report measures those."""
         radii = np.maximum(self._intrusions.radii_left(parts), 0.0)
-        changed = {} if (radii == self.radii).all() else {"radii": radii}
-        return replace(self, criterion=self.criterion.settled(parts), **changed)
+        return replace(self, criterion=self.criterion.settled(parts), radii=radii)
 
 
 def least_kept(options: Options, scale: float) -> float:

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd.criteria.kept_open import least_kept
 from rlacd.find_parts import Reached
-from rlacd.solid.arrays import BoolArray, FloatArray, dots
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
 from rlacd.solid.distance import hull_union
-from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.passages import passage_balls
 from rlacd.solid.primitive import Balls
 
-LEAST_RADIUS = 0.008
-"""Narrower passages (the longest side is 2) are not looked for: folds of scans and gaps between sheets are such."""
+NARROWEST = 0.008
+"""Radius of the narrowest passages looked for (the longest side is 2): folds of scans and gaps of sheets are such."""
 
 LEAST_LOSS = 0.1
 """Share of its radius that a passage has to lose to be listed."""
@@ -32,8 +30,8 @@ LEAST_EXTENT = 0.1
 """Of a passage along an axis; smaller ones are nicks. At a threshold of 0.05, 16 of 27 real meshes lose a passage of
 any extent, 11 one of this."""
 
-POINTS = 600
-"""From which balls start, and as many triangles."""
+STARTS = 600
+"""Points of the surface from which balls start, and as many triangles."""
 
 MOST_BALLS = 500
 """Of more, those that lose most are looked at."""
@@ -43,55 +41,41 @@ MOST_LISTED = 50
 ACCURACY = 0.02
 """Share of its radius to within which it is found what is left of a ball."""
 
-_AROUND = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
-_INSIDE = np.array(list(itertools.product(np.linspace(-0.75, 0.75, 7), repeat=3)))
-_ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]
 _NEIGHBOURS = 8
+_ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]
+_INSIDE = np.array(list(itertools.product(np.linspace(-0.75, 0.75, 7), repeat=3)))
+_AROUND = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
+_SEARCH = [(1.0, _INSIDE), *((2.0**-i, _AROUND) for i in (2, 3, 4, 5, 6) for _ in range(3))]
 
 
-class Passage(NamedTuple):
-    """Where a ball of a radius fits in the input, and between the hulls one of the radius `left`; in the frame."""
-
-    at: FloatArray
-    radius: float
-    left: float
-
-    def as_plain(self, frame: Frame) -> dict[str, Any]:
-        """For the report, in the input's unit."""
-        at = frame.to_input(self.at[None])[0].tolist()
-        return {"at_abs": at, "radius_abs": self.radius / frame.scale, "left_abs": self.left / frame.scale}
-
-
-def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, threads: int) -> list[Passage]:
+def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, threads: int) -> list[dict[str, Any]]:
     """Find the passages that hulls narrow by more than a tenth, one entry each, the most narrowed first.
 
-    `over` is how far the hulls reach out: they cannot narrow a passage by more.
+    A ball of ``radius_abs`` around ``at_abs`` fits in the input, and in it one of ``left_abs`` between the hulls, which
+    reach out by at most `over` in the frame: they cannot narrow a passage by more.
     """
     most = min(over / LEAST_LOSS, 2.0)
-    if reached.root is None or most <= LEAST_RADIUS:
+    if reached.root is None or most <= NARROWEST:
         return []
-    surface, union = reached.root.filling.surface, hull_union(hulls, threads)
+    surface, union, frame = reached.root.filling.surface, hull_union(hulls, threads), reached.solid.frame
 
     def lose(balls: Balls) -> BoolArray:
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
 
-    balls = passage_balls(reached.solid.mesh, surface, (LEAST_RADIUS, most), POINTS, threads, lose)
-    shares = union.distance(balls.centres, threads) / balls.radii
-    order = np.argsort(shares, kind="stable")[:MOST_BALLS]
-    balls = Balls(balls.centres[order], balls.radii[order])
-    passage = _passages(balls, surface, threads)
-    _, firsts = np.unique(passage, return_index=True)
-    found = []
-    for i in np.sort(firsts)[:MOST_LISTED]:
-        own, at, radius = passage == passage[i], balls.centres[i], float(balls.radii[i])
-        ends = balls.centres[own] + balls.radii[own, None], balls.centres[own] - balls.radii[own, None]
-        if (ends[0].max(axis=0) - ends[1].min(axis=0)).max() >= LEAST_EXTENT:
-            found.append(Passage(at, radius, _left(union, at, radius)))
-    found = [one for one in found if one.left < (1 - LEAST_LOSS) * one.radius]
-    return sorted(found, key=lambda one: one.left / one.radius)
+    balls = passage_balls(reached.solid.mesh, surface, (NARROWEST, most), STARTS, threads, lose)
+    balls = balls.some(np.argsort(union.distance(balls.centres, threads) / balls.radii, kind="stable")[:MOST_BALLS])
+    passage, found = _passages(balls, surface, threads), []
+    for i in np.sort(np.unique(passage, return_index=True)[1])[:MOST_LISTED]:
+        own, radius = balls.some(passage == passage[i]), float(balls.radii[i])
+        ends = np.concatenate([own.centres - own.radii[:, None], own.centres + own.radii[:, None]])
+        left = _left(union, balls.centres[i], radius) if np.ptp(ends, axis=0).max() >= LEAST_EXTENT else radius
+        if left < (1 - LEAST_LOSS) * radius:
+            at = frame.to_input(balls.centres[i])
+            found.append({"at_abs": at.tolist(), "radius_abs": radius / frame.scale, "left_abs": left / frame.scale})
+    return sorted(found, key=lambda one: one["left_abs"] / one["radius_abs"])
 
 
-def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[np.int64]:
+def _passages(balls: Balls, surface: _native.Surface, threads: int) -> IntArray:
     """The number of the passage in which each ball stands: between near ones, half of the larger can go straight."""
     away = balls.centres[:, None] - balls.centres
     squares = dots(away, away)
@@ -102,51 +86,37 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[n
     start, end = balls.centres[first, None], balls.centres[second, None]
     ways = np.ascontiguousarray((start + _ON_THE_WAY * (end - start)).reshape(-1, 3))
     is_free = surface.distance(ways, threads).reshape(-1, len(_ON_THE_WAY)).min(axis=1) > needed
-    return _native.components(len(balls), first[is_free], second[is_free])[1]
+    return _native.components(len(balls), first[is_free], second[is_free])[1].astype(np.int32)
 
 
 def _left(union: _native.HullUnion, centre: FloatArray, radius: float) -> float:
     """Radius of the largest ball that fits inside a ball and outside the hulls, to within `ACCURACY`."""
-    at, left, step, around = centre, 0.0, radius, _INSIDE
-    while step > ACCURACY * radius:
-        there = at + step * around
+    at, left = centre, 0.0
+    for step, around in _SEARCH:
+        there = at + step * radius * around
         aside = there - centre
         fits = np.minimum(union.distance(there, 1), radius - np.sqrt(dots(aside, aside)))
-        best = int(fits.argmax())
-        if is_better := fits[best] > left:
-            at, left = there[best], float(fits[best])
-        if around is _INSIDE:
-            step, around = radius / 4, _AROUND
-        elif not is_better:
-            step /= 2
+        if fits.max() > left:
+            at, left = there[fits.argmax()], float(fits.max())
     return left
 
 
-def too_narrow(found: Sequence[Passage], reached: Reached) -> list[str]:
+def too_narrow(found: Sequence[dict[str, Any]], reached: Reached) -> list[str]:
     """Warn of passages that keep less than asked for, and of others that lose over a third of their radius."""
-    options, scale = reached.options, reached.solid.frame.scale
-    asked = [one for one in found if one.radius >= least_kept(options, scale)]
-    others = [one for one in found if one.radius < least_kept(options, scale) and one.left < MOSTLY * one.radius]
-    share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
-    broken = [one for one in asked if one.left < share * one.radius + ball - ACCURACY * one.radius]
+    options, scale, asked, others = reached.options, reached.solid.frame.scale, [], []
+    for at, radius, left in (one.values() for one in found):
+        least = (options.keep_open or 0.0) * radius + (options.keep_open_abs or 0.0)
+        if radius * scale >= least_kept(options, scale):
+            asked += [(radius - left, at, radius, left)] if left < least - ACCURACY * radius else []
+        elif left < MOSTLY * radius:
+            others.append((radius - left, at, radius, left))
     return [
-        *_said(broken, "more than keep_open allows", "limits on the hulls leave no other way", reached),
-        *_said(others, "over a third of the radius", "--keep-open or a smaller threshold may keep such open", reached),
-    ]
-
-
-def _said(lost: Sequence[Passage], what: str, cure: str, reached: Reached) -> list[str]:
-    if not lost:
-        return []
-    frame, closed = reached.solid.frame, sum(one.left <= ACCURACY * one.radius for one in lost)
-    worst = max(lost, key=lambda one: one.radius - one.left)
-    counted = [
-        f"{count} passage{'' if count == 1 else 's'} {one if count == 1 else many}"
-        for count, one, many in ((closed, "closes", "close"), (len(lost) - closed, f"loses {what}", f"lose {what}"))
-        if count
-    ]
-    there, between = worst.radius / frame.scale, worst.left / frame.scale
-    return [
-        f"{' and '.join(counted)}: near {frame.place(worst.at)}, a ball of radius {there:.4g} fits in the input, of "
-        f"{between:.4g} between the hulls (see `passages`); {cure}."
+        f"Passages that {what}: {len(lost)}, of which {sum(left <= ACCURACY * r for *_, r, left in lost)} close; near "
+        f"({', '.join(f'{x:.4g}' for x in max(lost)[1])}), a ball of radius {max(lost)[2]:.4g} fits in the input, of "
+        f"{max(lost)[3]:.4g} between the hulls (see `passages`); {cure}."
+        for lost, what, cure in (
+            (asked, "lose more than keep_open allows", "limits on the hulls leave no other way"),
+            (others, "lose over a third of their radius", "--keep-open or a smaller threshold may keep such open"),
+        )
+        if lost
     ]

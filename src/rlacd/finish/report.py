@@ -12,7 +12,7 @@ import trimesh
 from rlacd import _native
 from rlacd._version import __version__
 from rlacd.find_parts import Reached
-from rlacd.finish.narrowed import Passage, narrowed, too_narrow
+from rlacd.finish.narrowed import narrowed, too_narrow
 from rlacd.finish.overlap import Seams
 from rlacd.fit import Fit
 from rlacd.merge.slivers import is_sliver
@@ -42,12 +42,14 @@ MOST_HOLES = 1000
 
 
 class _Distances(NamedTuple):
-    """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body."""
+    """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body; and
+    the passages that they narrow."""
 
     over: float
     under: float
     over_at: str
     under_at: str
+    passages: list[dict[str, Any]]
 
 
 def make_report(
@@ -75,12 +77,6 @@ def make_report(
     apart: _Distances | None = None
     if has_surface:
         apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None)
-    passages: list[Passage] | None = None
-    if apart is not None:
-        over = apart.over
-        passages = run.if_in_time(
-            lambda: narrowed(reached, [part.hull for part in parts], over, run.threads), lambda: None
-        )
     with run.shielded():  # nothing below takes long
         stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
@@ -90,7 +86,7 @@ def make_report(
             warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
         exceeds = len(summary.warnings) > 0
         warnings += [*summary.warnings, *_shortcomings([part.hull for part in parts], apart, reached, exceeds)]
-        warnings += too_narrow(passages or [], reached)
+        warnings += too_narrow(apart.passages if apart else [], reached)
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return {
@@ -105,7 +101,7 @@ def make_report(
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
             "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
-            "passages": None if passages is None else [passage.as_plain(solid.frame) for passage in passages],
+            "passages": apart and apart.passages,
             "scale": solid.frame.scale,
             "mass": _mass(mass_of(*concatenated(stands_for_mass), solid.frame)),
             "repair": [{**vars(body)} for body in solid.bodies],
@@ -271,7 +267,8 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
         _, (face,) = surface.closest(np.array([point]))
         return solid.frame.place(point, int(solid.body_of[face]))
 
-    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at))
+    passages = narrowed(reached, hulls, found.over[1], run.threads)
+    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at), passages)
 
 
 def _is_undecided(interval: Interval, limit: float) -> bool:

@@ -60,10 +60,10 @@ def passage_balls(
     points, normals = _starts(*solid, count)
     balls = _shrunk(points, normals, surface, (least, most), threads)
     if wanted is not None:
-        balls = _some(balls, wanted(balls))
+        balls = balls.some(wanted(balls))
     balls = _pushed(spread(balls), surface, threads)
-    balls = _some(balls, (balls.radii >= least) & (balls.radii <= most))
-    return spread(_some(balls, surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5))
+    balls = balls.some((balls.radii >= least) & (balls.radii <= most))
+    return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5))
 
 
 def _starts(vertices: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
@@ -116,20 +116,16 @@ def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
             best[better], radii[better] = at[better], distance[better]
             at = at + (size / np.where(distance > 0, distance, 1.0))[:, None] * away
         way, most = at - balls.centres, LARGEST_DRIFT * (1 if step == STEPS[-1] else 2)
-        balls = _some(Balls(best, radii), np.sqrt(dots(way, way)) <= most * PUSHES * size)
+        balls = Balls(best, radii).some(np.sqrt(dots(way, way)) <= most * PUSHES * size)
     return balls
 
 
 def spread(balls: Balls) -> Balls:
     """Leave out balls that stand beside a larger one (see `SPACING`); the largest come first."""
-    balls = _some(balls, np.argsort(-balls.radii, kind="stable"))
+    balls = balls.some(np.argsort(-balls.radii, kind="stable"))
     left = np.ones(len(balls), dtype=bool)
     for i in range(len(balls)):
         if left[i]:
             away = balls.centres[i + 1 :] - balls.centres[i]
             left[i + 1 :] &= dots(away, away) >= (SPACING * balls.radii[i + 1 :]) ** 2
-    return _some(balls, left)
-
-
-def _some(balls: Balls, which: BoolArray | IntArray) -> Balls:
-    return Balls(balls.centres[which], balls.radii[which])
+    return balls.some(left)
