@@ -21,7 +21,7 @@ from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 STARTS_FOR_ALL = 5000
-"""From which balls start. Of 24 holes with a radius of 1 % of the longest side, each gets several."""
+"""Points from which balls start, one for each 0.02 % of the surface, and as many triangles."""
 
 PLAY = 1.01
 """Passages that are narrower than so many times a ball need not let it through: hulls around them cannot be exact."""

@@ -62,6 +62,9 @@ LENGTHS = {"threshold": (0.001, 2.0), "overlap": (0.0, 0.25)}
 """Bounds of options that may also be given in the input's unit, under their name and ``_abs``. A hull farther from its
 part than the largest threshold does not fit into the frame; hulls that overlap by more are hardly parts."""
 
+RADII = (0.002, 1.0)
+"""Shares of the longest side that the radius of a ball that has to pass may be: narrower passages are not found."""
+
 TIGHT, LIMITS, METHOD, RUN = "How tight", "Limits", "Method", "Running"
 """Headings of the command's help."""
 
@@ -312,8 +315,10 @@ class Options:
         Raises
         ------
         OptionError
-            `threshold_abs` or `overlap_abs` is too small or too large for the object.
+            `threshold_abs`, `overlap_abs` or `keep_open_abs` is too small or too large for the object.
         """
+        if self.keep_open_abs is not None:
+            relative("keep_open", self.keep_open_abs, scale, RADII)
         given = {name: getattr(self, f"{name}_abs") for name in LENGTHS}
         lengths: dict[str, Any] = {
             n: relative(n, length, scale, LENGTHS[n]) for n, length in given.items() if length is not None
