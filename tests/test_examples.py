@@ -176,6 +176,8 @@ def test_the_guide_to_tight_fits_shows_the_numbers_that_its_script_prints(
 ) -> None:
     script("tight_fits").main(tmp_path / "hulls.webp")
     page = (ROOT / "docs/guides/tight_fits.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^(\S+ mm): (\d+) chords, (\d+) hulls, at least (\d+)$", capsys.readouterr().out, re.MULTILINE)
-    assert len(rows) == 3
+    printed = capsys.readouterr().out.replace("=None", "=–")
+    rows = re.findall(r"^(\S+ mm): (\d+) chords, (\d+) hulls, at least (\d+)$", printed, re.MULTILINE)
+    rows += re.findall(r"keep_open=(\S+): (\d+) hulls, clear radius (\S+ mm)$", printed, re.MULTILINE)
+    assert len(rows) == 7
     assert all(f"| {' | '.join(row)} |" in page.replace("| 1 mm", "| 1.0 mm") for row in rows)

@@ -58,6 +58,8 @@ def decompose(
     primitives: bool | Sequence[PrimitiveKind] = (),
     overlap: float = 0.0,
     overlap_abs: float | None = None,
+    keep_open: float | None = None,
+    keep_open_abs: float | None = None,
     merge: bool = True,
     policy: str | Policy | None = None,
     resolution: int = 100,
@@ -103,8 +105,8 @@ def decompose(
         much it exceeds the threshold. A larger limit never leads to a larger concavity.
     max_vertices, max_faces : int, optional
         Limits on the vertices and triangles of each hull. A limited hull still contains its part, and the threshold
-        holds for it too, unless the limit is below 24 vertices or 44 triangles: if the threshold is then exceeded, a
-        warning says by how much.
+        holds for it too: below 24 vertices or 44 triangles, parts that exceed it are cut on while `max_hulls` allows
+        it. Below 8 vertices or 12 triangles they are not, and a warning says by how much the threshold is exceeded.
     detail : "simple" or "full"
         ``simple``: hulls leave out corners that add little, so that they have few, as far as the part still meets the
         criterion. ``full``: the exact hulls of the parts.
@@ -120,6 +122,12 @@ def decompose(
         overlap.
     overlap_abs : float, optional
         The same in the input's unit; replaces `overlap`.
+    keep_open : float, optional
+        Passages stay open: in a hole, slot or mouth that holds a ball of at least `threshold` in radius, a ball of this
+        share of its radius still fits between the hulls, at the same place. Passages are found from points spread over
+        the surface, so one with a tiny share of it can be missed; ``report["warnings"]`` names those not kept.
+    keep_open_abs : float, optional
+        Instead of a share, the radius of a ball in the input's unit that still passes wherever one 1 % larger does.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy, optional

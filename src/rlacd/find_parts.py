@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
+from rlacd.criteria.limited import BOX, FEWEST
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import best_within, drop_slivers
+from rlacd.merge import COARSER, best_within, drop_slivers, merge_parts
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -26,6 +27,9 @@ from rlacd.solid.cover import cover
 from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
+
+FIRST_POWER = 8
+"""Power of `COARSER` from which parts over a limit are cut where few hulls are left: 25 times the threshold."""
 
 
 class Reached(NamedTuple):
@@ -74,6 +78,12 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     parts, goal, found = decomposer.decompose(goal)
     if not decomposer.keeps_limit(parts):
         parts = decomposer.at_most(parts, goal)
+    elif options.hull_limits.allow(*BOX) and not options.hull_limits.allow(*FEWEST):
+        try:
+            with run.stage("limit"):
+                parts = decomposer.cut_to_limits(parts, goal)
+        except Stopped:
+            run.note_stop()
     return Reached(solid, options, goal, parts, found, root)
 
 
@@ -147,6 +157,36 @@ class _Decomposer:
         most, limited = self.options.max_hulls, LimitedCriterion(goal, self.options.hull_limits)
         assert most is not None
         return best_within(most, self.model.solid, decompose, unite, limited, self.run)
+
+    def cut_to_limits(self, parts: list[Part], goal: Criterion) -> list[Part]:
+        """Cut parts that limits too low for the criterion make break it, the worst first, while hulls are left."""
+        limited, most = LimitedCriterion(goal, self.options.hull_limits), self.options.max_hulls or math.inf
+        met = self.run.map(limited.is_met, parts)
+        done = [part for part, is_met in zip(parts, met, strict=True) if is_met]
+        broken = sorted((part for part, is_met in zip(parts, met, strict=True) if not is_met), key=limited.error)
+        while broken and (room := most - len(done) - len(broken) + 1) > 1:
+            done += self._cut_on(broken.pop(), limited, room)
+        done += broken
+        if len(done) == len(parts) or not self.options.merge:
+            return done
+        return merge_parts(done, limited, self.run, solid=self.model.solid)
+
+    def _cut_on(self, part: Part, limited: Criterion, most: float) -> list[Part]:
+        """Get at most so many pieces of a part that meet the criterion, scaled where that takes more."""
+        inside = self.model.solid.inside(part.hull)
+        if not inside.size:
+            return [part]
+        policy = make_policy(self.options.policy, SweepCache(), _scale(limited))
+        tree, best = CutTree(Component((inside.vertices, inside.faces)), policy, self.run), [part]
+        for power in range(
+            0 if most == math.inf else FIRST_POWER, -1, -1
+        ):  # the finest that fits, by way of cheap ones
+            criterion = limited.scaled(COARSER**power)
+            new = cut_and_merge(tree, criterion, self.run, merge=self.options.merge).parts
+            if len(new) > most:
+                break
+            best = new
+        return best
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion | None

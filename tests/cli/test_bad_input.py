@@ -211,6 +211,8 @@ WRONG_OPTIONS = {
     "max_faces": [3, 0, 12.0, "x"],
     "overlap": [-0.01, NAN, 0.6, "a", None, True],
     "overlap_abs": [0, -1, NAN, INFINITE, "a", 1e9],
+    "keep_open": [0, 0.05, 1, NAN, "0.9", True],
+    "keep_open_abs": [0, -1, NAN, INFINITE, "a", 1e9, 1e-9],
     "merge": [None, "no", 0, 2],
     "policy": ["", None, 3, "GREEDY", "greedy-", ["greedy"]],
     "gap": [0, 0.004, 0.16, NAN, "3", None, True],

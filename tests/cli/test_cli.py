@@ -134,6 +134,8 @@ def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -
         "threshold_abs": 0.2,
         "overlap": 0.01,
         "overlap_abs": 0.02,
+        "keep_open": 0.9,
+        "keep_open_abs": 0.03,
         "max_hulls": 5,
         "max_vertices": 32,
         "max_faces": 60,

@@ -93,6 +93,46 @@ class Criterion(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Joined(Criterion):
+    """A criterion with one more condition; all else is as it says.
+
+    Attributes
+    ----------
+    criterion : Criterion
+    """
+
+    criterion: Criterion
+
+    @property
+    def eliminates(self) -> bool:
+        """As the underlying criterion."""
+        return self.criterion.eliminates
+
+    @property
+    def screen(self) -> Screen:
+        """That of the underlying criterion: what it rejects fails here too."""
+        return self.criterion.screen
+
+    def error(self, part: Part) -> float:
+        """That of the underlying criterion."""
+        return self.criterion.error(part)
+
+    @property
+    def overhang(self) -> float:
+        """That of the underlying criterion."""
+        return self.criterion.overhang
+
+    @property
+    def obstacles(self) -> Balls | None:
+        """Those of the underlying criterion."""
+        return self.criterion.obstacles
+
+    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
+        """That of the underlying criterion."""
+        return self.criterion.summary(errors)
+
+
 class Feasibility(IntEnum):
     """Whether a solid clipped to a hull may meet a criterion (see native/distance/filling.hpp)."""
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd.criteria.concavity import Concavity, Distance
-from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
+from rlacd.criteria.criterion import Criterion, Joined
+from rlacd.criteria.kept_open import KeptOpen
 from rlacd.criteria.navigable import Navigable
 from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
@@ -14,7 +15,6 @@ from rlacd.options.presets import HullLimits
 from rlacd.run import Run
 from rlacd.solid.component import Part
 from rlacd.solid.hull import keeps, limit_hull
-from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 CRITERIA: dict[str, type[Criterion]] = {
@@ -26,13 +26,15 @@ CRITERIA: dict[str, type[Criterion]] = {
 """By the name that options give them."""
 
 FEWEST = (24, 44)
-"""Vertices and triangles. Lower limits apply only at the end, with a warning if a hull then exceeds the threshold: to
-meet them, round parts would have to be cut very small (a ball into 75 pieces for 16 vertices at threshold 0.05, into 12
-for 32)."""
+"""Vertices and triangles. Under lower limits, parts are found without them; those that then break the criterion are cut
+on. Cut for 8 vertices from the start, a cup is 40 hulls instead of 25."""
+
+BOX = (8, 12)
+"""Under limits lower than those of a box no part is cut on: next to no solid can be cut into such hulls."""
 
 
 @dataclass(frozen=True)
-class LimitedCriterion(Criterion):
+class LimitedCriterion(Joined):
     """A criterion that must hold for the limited hull too.
 
     Attributes
@@ -41,25 +43,16 @@ class LimitedCriterion(Criterion):
     limits : HullLimits
     """
 
-    criterion: Criterion
     limits: HullLimits
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
-        """The criterion that the options name, within their limits if none is too low for cutting to meet."""
+        """The criterion that the options name, with their passages, within their limits if cutting can meet those."""
         criterion = CRITERIA[options.criterion_name].prepare(options, solid, run)
+        if run is not None and (options.keep_open is not None or options.keep_open_abs is not None):
+            criterion = KeptOpen.around(criterion, options, solid, run)
         limits = options.hull_limits
         return cls(criterion, limits) if any(limits) and limits.allow(*FEWEST) else criterion
-
-    @property
-    def eliminates(self) -> bool:
-        """As the underlying criterion."""
-        return self.criterion.eliminates
-
-    @property
-    def screen(self) -> Screen:
-        """That of the underlying criterion: limiting a hull only makes it larger."""
-        return self.criterion.screen
 
     def is_met(self, part: Part) -> bool:
         """Decide for the exact hull first, then for the limited one."""
@@ -74,20 +67,6 @@ class LimitedCriterion(Criterion):
     def settled(self, parts: Sequence[Part]) -> LimitedCriterion:
         """Settle the underlying criterion with the limited hulls."""
         return LimitedCriterion(self.criterion.settled([self._limited(part) for part in parts]), self.limits)
-
-    @property
-    def overhang(self) -> float:
-        """That of the underlying criterion."""
-        return self.criterion.overhang
-
-    @property
-    def obstacles(self) -> Balls | None:
-        """Those of the underlying criterion."""
-        return self.criterion.obstacles
-
-    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
-        """That of the underlying criterion."""
-        return self.criterion.summary(errors)
 
     def scaled(self, factor: float) -> LimitedCriterion:
         """Get the same limits with a larger threshold."""

@@ -101,7 +101,7 @@ class Navigable(Criterion):
         self.warnings = warnings
         self.conflicts = conflicts or Conflicts()
         self.hull = hull
-        self._intrusions = _Intrusions(balls)
+        self._intrusions = Intrusions(balls)
 
     def __repr__(self) -> str:
         return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
@@ -251,10 +251,7 @@ class Navigable(Criterion):
 
         Balls that would shrink below a tenth of the radius are dropped. `conflicts` of the result counts the changes.
         """
-        radii = self.balls.radii.copy()
-        for part in parts:
-            touched, depth = self._intrusions.of(part)
-            radii[touched] = np.minimum(radii[touched], self.balls.radii[touched] - depth)
+        radii = self._intrusions.radii_left(parts)
         kept = radii >= LEAST_RADIUS * self.radius
         loss = np.where(kept, self.balls.radii - radii, self.balls.radii)
         conflicts = Conflicts(
@@ -293,13 +290,14 @@ class Navigable(Criterion):
         return float(depth[self.balls.radii[touched] > least_radius].max(initial=0.0))
 
 
-class _Intrusions:
+class Intrusions:
     """Which balls each part touches and how deep, cached as long as the part lives.
 
     A part's hull lies within that of the part it was cut from, so it can only touch balls that the latter touches.
     """
 
     def __init__(self, balls: Balls) -> None:
+        self._radii = balls.radii
         self._balls = _native.BallSet(balls.centres, balls.radii)
         self._known: WeakKeyDictionary[Part, tuple[IntArray, FloatArray]] = WeakKeyDictionary()
         self._lock = threading.Lock()
@@ -322,6 +320,14 @@ class _Intrusions:
             return len(first) > 0
         _, depths = self.of(part)
         return bool((depths > depth).any())
+
+    def radii_left(self, parts: Sequence[Part]) -> FloatArray:
+        """How large each ball can be without touching any of the parts' hulls [B], 0 or less where it cannot be."""
+        radii = self._radii.copy()
+        for part in parts:
+            touched, depth = self.of(part)
+            radii[touched] = np.minimum(radii[touched], self._radii[touched] - depth)
+        return radii
 
     def _recall(self, part: Part) -> tuple[IntArray, FloatArray] | None:
         with self._lock:

@@ -12,6 +12,7 @@ import trimesh
 from rlacd import _native
 from rlacd._version import __version__
 from rlacd.find_parts import Reached
+from rlacd.finish.narrowed import narrowed, too_narrow
 from rlacd.finish.overlap import Seams
 from rlacd.fit import Fit
 from rlacd.merge.slivers import is_sliver
@@ -41,12 +42,14 @@ MOST_HOLES = 1000
 
 
 class _Distances(NamedTuple):
-    """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body."""
+    """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body; and
+    the passages that they narrow."""
 
     over: float
     under: float
     over_at: str
     under_at: str
+    passages: list[dict[str, Any]]
 
 
 def make_report(
@@ -83,6 +86,7 @@ def make_report(
             warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
         exceeds = len(summary.warnings) > 0
         warnings += [*summary.warnings, *_shortcomings([part.hull for part in parts], apart, reached, exceeds)]
+        warnings += too_narrow(apart.passages if apart else [], reached)
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return {
@@ -97,6 +101,7 @@ def make_report(
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
             "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
+            "passages": apart and apart.passages,
             "scale": solid.frame.scale,
             "mass": mass_of(*concatenated(stands_for_mass), solid.frame).as_plain(),
             "repair": [{**vars(body)} for body in solid.bodies],
@@ -187,6 +192,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
             for (name, report, _), begin in begins
             for hole in report["holes"]
         ],
+        "passages": [{**passage, "node": name} for name, report in reports for passage in report["passages"] or ()],
         "nodes": [{"node": name, "parts": report["parts"], "scale": report["scale"]} for name, report in reports],
         "search": None,
         "at_least": _sum_known([report["at_least"] for _, report in reports]),
@@ -251,7 +257,8 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
         _, (face,) = surface.closest(np.array([point]))
         return solid.frame.place(point, int(solid.body_of[face]))
 
-    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at))
+    passages = narrowed(reached, hulls, found.over[1], run.threads)
+    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at), passages)
 
 
 def _is_undecided(interval: Interval, limit: float) -> bool:

@@ -2,6 +2,6 @@
 
 from rlacd.merge.merge import merge_lifted, merge_parts
 from rlacd.merge.slivers import drop_slivers
-from rlacd.merge.to_count import best_within
+from rlacd.merge.to_count import COARSER, best_within
 
-__all__ = ["best_within", "drop_slivers", "merge_lifted", "merge_parts"]
+__all__ = ["COARSER", "best_within", "drop_slivers", "merge_lifted", "merge_parts"]

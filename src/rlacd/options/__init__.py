@@ -62,6 +62,9 @@ LENGTHS = {"threshold": (0.001, 2.0), "overlap": (0.0, 0.25)}
 """Bounds of options that may also be given in the input's unit, under their name and ``_abs``. A hull farther from its
 part than the largest threshold does not fit into the frame; hulls that overlap by more are hardly parts."""
 
+RADII = (0.002, 1.0)
+"""Shares of the longest side that the radius of a ball that has to pass may be: narrower passages are not found."""
+
 TIGHT, LIMITS, METHOD, RUN = "How tight", "Limits", "Method", "Running"
 """Headings of the command's help."""
 
@@ -142,9 +145,10 @@ class Options:
     max_hulls
         At most this many hulls, even if the threshold must be exceeded; the report says by how much.
     max_vertices
-        At most this many vertices per hull, such as 64 for PhysX on a GPU; below 24 the threshold may be exceeded.
+        At most this many vertices per hull, such as 64 for PhysX on a GPU; below 24 that takes more hulls;
+        below 8 the threshold may be exceeded.
     max_faces
-        At most this many triangles per hull; below 44 the threshold may be exceeded.
+        At most this many triangles per hull; below 44 that takes more hulls; below 12 the threshold may be exceeded.
     detail
         simple leaves out corners of hulls that add little, within the threshold; full keeps the exact hulls.
     primitives
@@ -155,6 +159,11 @@ class Options:
         a length (2mm).
     overlap_abs
         The same as a length in the mesh's own unit.
+    keep_open
+        Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in radius, one of this
+        share of its radius (0.9) still fits between the hulls; also the radius of a ball that has to pass (2mm).
+    keep_open_abs
+        The radius of that ball as a length in the mesh's own unit.
     merge
         Join hulls where one is tight enough, also across what lies between them.
     policy
@@ -218,6 +227,10 @@ class Options:
     )
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
     overlap_abs: float | None = option(None, LIMITS, LENGTH)
+    keep_open: float | None = option(
+        None, LIMITS, number(0.1, 0.99, typed=str), metavar="NUMBER", usual="passages may close"
+    )
+    keep_open_abs: float | None = option(None, LIMITS, LENGTH)
     merge: bool = option(True, METHOD, usual="merge")
     policy: str | Policy | None = option(None, METHOD, _POLICY, metavar="NAME", usual="greedy; learned with --no-merge")
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
@@ -260,6 +273,8 @@ class Options:
                     yield name, f"left out: the criterion {self.criterion_name} has {instead} instead"
         if self.per_node and self.criterion_name == "navigable":
             yield "per_node", "left out: navigable space is that of the whole scene"
+        if self.keep_open is not None and self.keep_open_abs is not None:
+            yield "keep_open", "left out with keep_open_abs, a radius instead of a share"
         for name in ("budget", "search_steps"):
             if self.quality == FAST and getattr(self, name) is not None:
                 yield name, "left out with quality='fast', which does not search"
@@ -312,8 +327,10 @@ class Options:
         Raises
         ------
         OptionError
-            `threshold_abs` or `overlap_abs` is too small or too large for the object.
+            `threshold_abs`, `overlap_abs` or `keep_open_abs` is too small or too large for the object.
         """
+        if self.keep_open_abs is not None:
+            relative("keep_open", self.keep_open_abs, scale, RADII)
         given = {name: getattr(self, f"{name}_abs") for name in LENGTHS}
         lengths: dict[str, Any] = {
             n: relative(n, length, scale, LENGTHS[n]) for n, length in given.items() if length is not None

@@ -377,7 +377,7 @@ def refuse_unknown(known: Any, given: Mapping[str, Any], command: str) -> None:
         raise OptionError(f"there is no option {unknown!r}; see `rlacd {command} --help`.")
 
 
-LONGEST_SIDE = {"threshold": 2.0, "overlap": 1.0, "gap": 1.0, "radius": 1.0, "tolerance": 1.0}
+LONGEST_SIDE = {"threshold": 2.0, "overlap": 1.0, "gap": 1.0, "radius": 1.0, "tolerance": 1.0, "keep_open": 1.0}
 """What the longest side measures where each is given as a bare number."""
 
 LENGTH = number(above=0, rule="a positive length in the input's unit")

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from rlacd.options.names import PrimitiveKind
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.frame import Frame
 
 PRIMITIVE = "primitive"
@@ -162,6 +163,10 @@ class Balls:
 
     def __len__(self) -> int:
         return len(self.radii)
+
+    def some(self, which: BoolArray | NDArray[np.intp]) -> Balls:
+        """Those of a mask, or with these numbers."""
+        return Balls(self.centres[which], self.radii[which])
 
     def in_input(self, frame: Frame) -> Balls:
         """Map balls from the normalised frame to the input's frame and unit."""

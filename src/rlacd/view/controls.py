@@ -36,6 +36,7 @@ class ViewerControls:
     quality: str = _DEFAULTS.quality or FAST
     primitives: bool | Sequence[PrimitiveKind] = False
     overlap: float = _DEFAULTS.overlap
+    keep_open: float | None = None
     open: str = _DEFAULTS.open
     max_hulls: int | None = None
     max_vertices: int | None = None

@@ -143,6 +143,20 @@ export class Controls {
       this.changed,
       { orNone: true },
     );
+    this.passages = choice(
+      "Passages",
+      "passages",
+      [
+        ["close", "May close", "The criterion alone decides what becomes of holes and slots."],
+        ["open", "Stay open", "Of a ball that fits in a hole, slot or mouth and is no smaller than the threshold, nine tenths still fit between the hulls."],
+      ],
+      given.keep_open ? "open" : "close",
+      (value) => {
+        this.options.keep_open = value === "open" ? given.keep_open ?? 0.9 : null;
+        this.changed();
+      },
+      "What becomes of holes, slots and mouths.",
+    );
     this.open = choice(
       "Open bodies",
       "openings",
@@ -171,6 +185,7 @@ export class Controls {
       this.quality,
       this.shapes,
       this.overlap.element,
+      this.passages,
       this.open,
       make("div", { class: "limits" }, this.hulls.element, this.corners.element),
     );
@@ -186,7 +201,7 @@ export class Controls {
         ? { volume_tolerance: this.volume.value }
         : { threshold: this.threshold.value };
     const limits = { max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
-    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, open: this.options.open, ...limits };
+    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, keep_open: this.options.keep_open ?? null, open: this.options.open, ...limits };
   }
 
   /** Take another engine's limits. */

@@ -1,0 +1,122 @@
+"""Passages of the solid that its hulls narrow or close: where, how wide they were, and what is left."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rlacd import _native
+from rlacd.criteria.kept_open import least_kept
+from rlacd.find_parts import Reached
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
+from rlacd.solid.distance import hull_union
+from rlacd.solid.hull import Hull
+from rlacd.solid.passages import passage_balls
+from rlacd.solid.primitive import Balls
+
+NARROWEST = 0.008
+"""Radius of the narrowest passages looked for (the longest side is 2): folds of scans and gaps of sheets are such."""
+
+LEAST_LOSS = 0.1
+"""Share of its radius that a passage has to lose to be listed."""
+
+MOSTLY = 2 / 3
+"""Share of its radius below which there is a warning."""
+
+LEAST_EXTENT = 0.1
+"""Of a passage along an axis; smaller ones are nicks. At a threshold of 0.05, 16 of 27 real meshes lose a passage of
+any extent, 11 one of this."""
+
+STARTS = 600
+"""Points of the surface from which balls start, and as many triangles."""
+
+MOST_BALLS = 500
+"""Of more, those that lose most are looked at."""
+
+MOST_LISTED = 50
+
+ACCURACY = 0.02
+"""Share of its radius to within which it is found what is left of a ball."""
+
+_NEIGHBOURS = 8
+_ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]
+_INSIDE = np.array(list(itertools.product(np.linspace(-0.75, 0.75, 7), repeat=3)))
+_AROUND = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
+_SEARCH = [(1.0, _INSIDE), *((2.0**-i, _AROUND) for i in (2, 3, 4, 5, 6) for _ in range(3))]
+
+
+def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, threads: int) -> list[dict[str, Any]]:
+    """Find the passages that hulls narrow by more than a tenth, one entry each, the most narrowed first.
+
+    A ball of ``radius_abs`` around ``at_abs`` fits in the input, and in it one of ``left_abs`` between the hulls, which
+    reach out by at most `over` in the frame: they cannot narrow a passage by more.
+    """
+    most = min(over / LEAST_LOSS, 2.0)
+    if reached.root is None or most <= NARROWEST:
+        return []
+    surface, union, frame = reached.root.filling.surface, hull_union(hulls, threads), reached.solid.frame
+
+    def lose(balls: Balls) -> BoolArray:
+        return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
+
+    balls = passage_balls(reached.solid.mesh, surface, (NARROWEST, most), STARTS, threads, lose)
+    balls = balls.some(np.argsort(union.distance(balls.centres, threads) / balls.radii, kind="stable")[:MOST_BALLS])
+    passage, found = _passages(balls, surface, threads), []
+    for i in np.sort(np.unique(passage, return_index=True)[1])[:MOST_LISTED]:
+        own, radius = balls.some(passage == passage[i]), float(balls.radii[i])
+        ends = np.concatenate([own.centres - own.radii[:, None], own.centres + own.radii[:, None]])
+        left = _left(union, balls.centres[i], radius) if np.ptp(ends, axis=0).max() >= LEAST_EXTENT else radius
+        if left < (1 - LEAST_LOSS) * radius:
+            at = frame.to_input(balls.centres[i])
+            found.append({"at_abs": at.tolist(), "radius_abs": radius / frame.scale, "left_abs": left / frame.scale})
+    return sorted(found, key=lambda one: one["left_abs"] / one["radius_abs"])
+
+
+def _passages(balls: Balls, surface: _native.Surface, threads: int) -> IntArray:
+    """The number of the passage in which each ball stands: between near ones, half of the larger can go straight."""
+    away = balls.centres[:, None] - balls.centres
+    squares = dots(away, away)
+    near = np.argsort(squares, axis=1, kind="stable")[:, 1 : 1 + _NEIGHBOURS]
+    first, second = np.repeat(np.arange(len(balls)), near.shape[1]), near.ravel()
+    # At so much room in every eighth of the way, nothing stands in it between them either.
+    needed = np.maximum(np.maximum(balls.radii[first], balls.radii[second]) / 2, np.sqrt(squares[first, second]) / 16)
+    start, end = balls.centres[first, None], balls.centres[second, None]
+    ways = np.ascontiguousarray((start + _ON_THE_WAY * (end - start)).reshape(-1, 3))
+    is_free = surface.distance(ways, threads).reshape(-1, len(_ON_THE_WAY)).min(axis=1) > needed
+    return _native.components(len(balls), first[is_free], second[is_free])[1].astype(np.int32)
+
+
+def _left(union: _native.HullUnion, centre: FloatArray, radius: float) -> float:
+    """Radius of the largest ball that fits inside a ball and outside the hulls, to within `ACCURACY`."""
+    at, left = centre, 0.0
+    for step, around in _SEARCH:
+        there = at + step * radius * around
+        aside = there - centre
+        fits = np.minimum(union.distance(there, 1), radius - np.sqrt(dots(aside, aside)))
+        if fits.max() > left:
+            at, left = there[fits.argmax()], float(fits.max())
+    return left
+
+
+def too_narrow(found: Sequence[dict[str, Any]], reached: Reached) -> list[str]:
+    """Warn of passages that keep less than asked for, and of others that lose over a third of their radius."""
+    options, scale, asked, others = reached.options, reached.solid.frame.scale, [], []
+    for at, radius, left in (one.values() for one in found):
+        least = (options.keep_open or 0.0) * radius + (options.keep_open_abs or 0.0)
+        if radius * scale >= least_kept(options, scale):
+            asked += [(radius - left, at, radius, left)] if left < least - ACCURACY * radius else []
+        elif left < MOSTLY * radius:
+            others.append((radius - left, at, radius, left))
+    return [
+        f"Passages that {what}: {len(lost)}, of which {sum(left <= ACCURACY * r for *_, r, left in lost)} close; near "
+        f"({', '.join(f'{x:.4g}' for x in max(lost)[1])}), a ball of radius {max(lost)[2]:.4g} fits in the input, of "
+        f"{max(lost)[3]:.4g} between the hulls (see `passages`); {cure}."
+        for lost, what, cure in (
+            (asked, "lose more than keep_open allows", "limits on the hulls leave no other way"),
+            (others, "lose over a third of their radius", "--keep-open or a smaller threshold may keep such open"),
+        )
+        if lost
+    ]

@@ -1,0 +1,131 @@
+"""Passages and pockets: places outside a solid that its walls hold between them, such as holes, slots and mouths.
+
+A ball with the normal of a wall through its centre shrinks until it touches another wall (Ma, Bae and Choi, "3D medial
+axis point approximation using nearest neighbors and the normal field", 2012). Then it is pushed away from whatever is
+nearest. Between walls it goes to and fro; where they leave it a way out it drifts, and is none of a passage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rlacd import _native
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
+from rlacd.solid.primitive import Balls
+
+LARGEST_DRIFT = 0.25
+"""Share of its way by which a held ball may drift: the walls that hold it open by up to 30 degrees."""
+
+PUSHES = 8
+"""To and fro, with steps of each of these shares of the radius."""
+
+STEPS = (1 / 8, 1 / 32, 1 / 128)
+
+MOST_SHRINKS = 12
+"""Nearly all balls need fewer than six."""
+
+SPACING = 0.25
+"""A ball is left out if the centre of a larger one is within this share of its radius: an edge that comes between both
+reaches 1 % of the radius deeper than into either."""
+
+
+def passage_balls(
+    solid: tuple[FloatArray, IntArray],
+    surface: _native.Surface,
+    radii: tuple[float, float],
+    count: int,
+    threads: int,
+    wanted: Callable[[Balls], BoolArray] | None = None,
+) -> Balls:
+    """Find the largest balls that fit in passages, each exactly as large as the surface leaves it.
+
+    Parameters
+    ----------
+    solid : vertices float64 [V, 3] and faces int32 [F, 3]
+        Closed, oriented outwards.
+    surface : _native.Surface
+        That of the solid.
+    radii : (float, float)
+        The least and the largest radius.
+    count : int
+        Number of points of the surface from which balls start, and of triangles.
+    threads : int
+        The result does not depend on it.
+    wanted : callable, optional
+        Tells which of some balls, not quite in their place yet, matter.
+    """
+    least, most = radii
+    points, normals = _starts(*solid, count)
+    balls = _shrunk(points, normals, surface, (least, most), threads)
+    if wanted is not None:
+        balls = balls.some(wanted(balls))
+    balls = _pushed(spread(balls), surface, threads)
+    balls = balls.some((balls.radii >= least) & (balls.radii <= most))
+    return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5))
+
+
+def _starts(vertices: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Points spread over the surface and in the middle of triangles, of which small holes have many; their normals."""
+    points, of = _native.sample_surface(vertices, faces, count, 0)
+    some = np.arange(0, len(faces), 1 + len(faces) // count)
+    points = np.concatenate([points, vertices[faces[some]].mean(axis=1)])
+    a, b, c = vertices[faces[np.concatenate([of, some])]].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    areas = np.sqrt(dots(normals, normals))
+    sound = areas > 0
+    return np.ascontiguousarray(points[sound]), normals[sound] / areas[sound, None]
+
+
+def _shrunk(
+    points: FloatArray, normals: FloatArray, surface: _native.Surface, radii: tuple[float, float], threads: int
+) -> Balls:
+    """Balls that touch the surface at a point and, seen from their centre, at least 60 degrees away from it.
+
+    A wall that goes on at less of an angle stops them, so that the sides of a round hole do not count as creases.
+    """
+    least, most = radii
+    radius, is_held = np.full(len(points), most), np.zeros(len(points), dtype=bool)
+    active = np.arange(len(points))
+    for _ in range(MOST_SHRINKS):
+        centres = points[active] + radius[active, None] * normals[active]
+        touched, _ = surface.closest(centres, threads)
+        chord, gap = touched - points[active], touched - centres
+        square, rise = dots(chord, chord), dots(chord, normals[active])
+        shrinks = (dots(gap, gap) < (0.999 * radius[active]) ** 2) & (rise > 0)
+        smaller = square / np.where(shrinks, 2 * rise, 1.0)
+        across = shrinks & (square >= smaller * smaller)
+        is_held[active[across]] = smaller[across] >= least
+        going = across & (smaller >= least)
+        active = active[going]
+        radius[active] = smaller[going]
+    return Balls(points[is_held] + radius[is_held, None] * normals[is_held], radius[is_held])
+
+
+def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
+    """The balls that are held, in the best place near theirs; twice the drift is still within the first steps."""
+    for step in STEPS:
+        at, size = balls.centres, step * balls.radii
+        best, radii = at.copy(), np.zeros(len(at))
+        for _ in range(PUSHES):
+            touched, _ = surface.closest(at, threads)
+            away = at - touched
+            distance = np.sqrt(dots(away, away))
+            better = distance > radii
+            best[better], radii[better] = at[better], distance[better]
+            at = at + (size / np.where(distance > 0, distance, 1.0))[:, None] * away
+        way, most = at - balls.centres, LARGEST_DRIFT * (1 if step == STEPS[-1] else 2)
+        balls = Balls(best, radii).some(np.sqrt(dots(way, way)) <= most * PUSHES * size)
+    return balls
+
+
+def spread(balls: Balls) -> Balls:
+    """Leave out balls that stand beside a larger one (see `SPACING`); the largest come first."""
+    balls = balls.some(np.argsort(-balls.radii, kind="stable"))
+    left = np.ones(len(balls), dtype=bool)
+    for i in range(len(balls)):
+        if left[i]:
+            away = balls.centres[i + 1 :] - balls.centres[i]
+            left[i + 1 :] &= dots(away, away) >= (SPACING * balls.radii[i + 1 :]) ** 2
+    return balls.some(left)

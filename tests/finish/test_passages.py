@@ -1,0 +1,206 @@
+"""Passages: those that hulls narrow are told, and `keep_open` keeps them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+import rlacd
+from rlacd import _native
+from rlacd.cli.options import decompose_options
+from rlacd.errors import OptionError
+from rlacd.solid.passages import passage_balls
+from tests.shapes import Closed, Floats, box, from_manifold, point_to_triangles
+
+
+def bore(radius: float, x: float, y: float, sides: int = 64) -> Manifold:
+    return Manifold.cylinder(4, radius, radius, sides, True).translate((x, y, 0))
+
+
+def plate(*bores: Manifold) -> Manifold:
+    """2 wide: its frame is its own."""
+    solid = box((-1, -0.6, -0.1), (1, 0.6, 0.1))
+    for one in bores:
+        solid -= one
+    return solid
+
+
+def mesh_of(solid: Manifold, scale: float = 1.0) -> trimesh.Trimesh:
+    closed = from_manifold(solid)
+    return trimesh.Trimesh(scale * closed.vertices, closed.faces, process=False)
+
+
+def clearance(hulls: list[trimesh.Trimesh], points: Floats) -> Floats:
+    """Distance of each point from the nearest hull, 0 inside, by all its triangles and planes."""
+    least = np.full(len(points), np.inf)
+    for hull in hulls:
+        away = point_to_triangles(points, np.asarray(hull.vertices), np.asarray(hull.faces))
+        a, b, c = (np.asarray(hull.vertices)[hull.faces[:, i]] for i in range(3))
+        outside = (np.einsum("pfi,fi->pf", points[:, None] - a, np.cross(b - a, c - a)) > 0).any(axis=1)
+        least = np.minimum(least, np.where(outside, away, 0.0))
+    return least
+
+
+def axis(x: float, y: float) -> Floats:
+    return np.column_stack([np.full(9, x), np.full(9, y), np.linspace(-0.09, 0.09, 9)])
+
+
+HOLES = [(0.3, -0.5, 0.0), (0.12, 0.3, 0.3), (0.06, 0.7, -0.3)]
+"""Radius and place."""
+
+
+def found_in(solid: Manifold, least: float = 0.01) -> tuple[Closed, Floats, Floats]:
+    closed = from_manifold(solid)
+    surface = _native.Surface(closed.vertices, closed.faces)
+    balls = passage_balls((closed.vertices, closed.faces), surface, (least, 1.0), 2000, 1)
+    return closed, balls.centres, balls.radii
+
+
+def test_the_balls_of_a_passage_are_free_and_as_large_as_its_walls_allow() -> None:
+    closed, centres, radii = found_in(plate(*(bore(*hole) for hole in HOLES)))
+    assert point_to_triangles(centres, closed.vertices, closed.faces) == pytest.approx(radii, abs=1e-12)
+    for radius, x, y in HOLES:
+        own = np.hypot(centres[:, 0] - x, centres[:, 1] - y) < radius
+        apothem = radius * np.cos(np.pi / 64)
+        assert own.any()
+        assert 0.98 * apothem <= radii[own].min() <= radii[own].max() <= apothem + 1e-9
+        assert np.abs(centres[own, 2]).max() < 0.12
+    assert sum(np.hypot(centres[:, 0] - x, centres[:, 1] - y) < r for r, x, y in HOLES).all(), "no other passages"
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        box((-1, -1, -1), (1, 1, 1)),
+        Manifold.sphere(1, 64),
+        box((-1, -1, -1), (1, 1, 0)) + box((-1, -1, -1), (0, 1, 1)),  # a step
+        box((-1, -1, -0.5), (1, 1, 0.5)) - Manifold.sphere(2, 128).translate((0, 0, 2.2)),  # a shallow bowl
+    ],
+)
+def test_what_walls_do_not_hold_between_them_is_no_passage(solid: Manifold) -> None:
+    assert len(found_in(solid)[2]) == 0
+
+
+@pytest.mark.promise("passages")
+def test_each_hole_that_narrows_is_listed_with_its_place_and_what_is_left_of_it() -> None:
+    places = [(x, y) for x in (-0.75, -0.25, 0.25, 0.75) for y in (-0.3, 0.3)]
+    scale = 50.0
+    mesh = mesh_of(plate(*(bore(0.1, x, y) for x, y in places)), scale)
+    result = rlacd.decompose(mesh, threshold=0.2, quality="fast", threads=1)
+    listed = result.report["passages"]
+    seen = {min(range(8), key=lambda i: np.hypot(*(np.array(p["at_abs"][:2]) / scale - places[i]))) for p in listed}
+    assert len(listed) == len(seen) > 4
+    shares = [passage["left_abs"] / passage["radius_abs"] for passage in listed]
+    assert shares == sorted(shares)
+    for passage in listed:
+        assert 0.97 * 5 <= passage["radius_abs"] <= 5
+        # The reference: the best of many places in the ball.
+        at, radius = np.array(passage["at_abs"]), passage["radius_abs"]
+        some = np.random.default_rng(0).normal(size=(4000, 3))
+        some *= np.random.default_rng(1).random((4000, 1)) / np.linalg.norm(some, axis=1, keepdims=True)
+        fits = np.minimum(clearance(result.hulls, at + radius * some), radius * (1 - np.linalg.norm(some, axis=1)))
+        assert fits.max() - 0.08 * radius <= passage["left_abs"] <= fits.max() + 0.08 * radius
+    (warning,) = (said for said in result.report["warnings"] if "passages" in said)
+    assert f"third of their radius: {sum(share < 2 / 3 for share in shares)}, of which" in warning
+
+
+@pytest.mark.promise("passages")
+def test_a_slot_that_closes_is_one_passage_and_named() -> None:
+    block = box((0, 0, 0), (100, 40, 30)) - box((5, 19.5, 10), (95, 20.5, 40))
+    report = rlacd.decompose(mesh_of(block), quality="fast", threads=1).report
+    (slot,) = report["passages"]
+    assert (slot["radius_abs"], slot["left_abs"]) == pytest.approx((0.5, 0.0), abs=0.01)
+    assert any(": 1, of which 1 close; near" in said and "of radius 0.5 fits" in said for said in report["warnings"])
+    assert rlacd.decompose(mesh_of(block), threshold_abs=0.3, quality="fast", threads=1).report["passages"] == []
+
+
+CRITERIA: list[dict[str, Any]] = [
+    {},
+    {"criterion": "distance"},
+    {"criterion": "volume", "volume_tolerance": 0.1},
+    {"criterion": rlacd.NavigableSpace(0.05, 0.08)},
+    {"max_vertices": 32},
+    {"overlap": 0.02},
+    {"primitives": True},
+]
+
+
+@pytest.mark.promise("keep-open")
+@pytest.mark.parametrize("given", CRITERIA, ids=str)
+def test_a_share_of_every_wide_hole_stays_open_whatever_decides_the_hulls(given: dict[str, Any]) -> None:
+    mesh, wide = mesh_of(plate(*(bore(*hole) for hole in HOLES))), [hole for hole in HOLES if hole[0] > 0.05]
+    result = rlacd.decompose(mesh, keep_open=0.9, quality="fast", threads=1, **given)
+    for radius, x, y in wide:
+        assert clearance(result.hulls, axis(x, y)).min() >= 0.985 * 0.9 * radius * np.cos(np.pi / 64)
+    assert not any("Passage" in said for said in result.report["warnings"])
+
+
+@pytest.mark.promise("keep-open")
+def test_a_ball_of_a_given_radius_still_passes_and_narrower_holes_may_close() -> None:
+    mesh = mesh_of(plate(*(bore(*hole) for hole in HOLES)), 50.0)
+    given: dict[str, Any] = {"threshold": 0.3, "quality": "fast", "threads": 1}
+    free, kept = rlacd.decompose(mesh, **given), rlacd.decompose(mesh, keep_open_abs=5.8, **given)
+    at = [50 * axis(x, y) for _, x, y in HOLES]
+    assert clearance(free.hulls, at[1]).min() < 5.8 <= clearance(kept.hulls, at[1]).min()
+    assert clearance(kept.hulls, at[0]).min() >= 5.8
+    assert clearance(kept.hulls, at[2]).min() < 2.9
+
+
+def test_where_a_limit_forbids_it_a_warning_says_so() -> None:
+    mesh = mesh_of(plate(bore(0.3, 0, 0)))
+    report = rlacd.decompose(mesh, keep_open=0.95, max_hulls=2, quality="fast", threads=1).report
+    assert any("keep_open allows: 1" in said and "limits on the hulls" in said for said in report["warnings"])
+
+
+@pytest.mark.slow
+@pytest.mark.promise("keep-open")
+@pytest.mark.parametrize("shape", ["peg_hole", "plate_hole", "carrier"])
+def test_a_peg_falls_through_its_hole_in_mujoco_and_jams_without(shape: str) -> None:
+    """As wide as 0.95 of the hole; it falls freely and starts 1 mm above."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    holes: dict[str, tuple[Manifold, float, list[tuple[float, float]]]] = {
+        "peg_hole": (Manifold.cube((60, 60, 30), True) - bore(10, 0, 0, 128).scale((1, 1, 10)), 10, [(0, 0)]),
+        "plate_hole": (Manifold.cube((100, 60, 10), True) - bore(10, 0, 0).scale((1, 1, 10)), 10, [(0, 0)]),
+        "carrier": (Manifold.cube((120, 80, 40), True), 12, [(x, y) for x in (-30, 30) for y in (-18, 18)]),
+    }
+    solid, radius, places = holes[shape]
+    if shape == "carrier":
+        for x, y in places:
+            solid -= bore(12, x, y).scale((1, 1, 20))
+    mesh = mesh_of(solid, 1e-3)
+
+    def fallen(result: rlacd.Decomposition) -> list[bool]:
+        top = mesh.bounds[1, 2]
+        size, start = 0.95e-3 * radius, top + 1e-3
+        geoms = "".join(f'<geom type="mesh" mesh="h{i}" friction="0.1"/>' for i in range(len(result.hulls)))
+        assets = "".join(
+            f'<mesh name="h{i}" vertex="{" ".join(f"{v:.9g}" for v in np.asarray(hull.vertices).ravel())}"/>'
+            for i, hull in enumerate(result.hulls)
+        )
+        pegs = "".join(
+            f'<body pos="{x * 1e-3} {y * 1e-3} {start + 1.1 * size}"><freejoint/>'
+            f'<geom type="cylinder" size="{size} {1.0 * size}" friction="0.1" mass="0.1"/></body>'
+            for x, y in places
+        )
+        model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><option timestep="0.0005"/><asset>{assets}</asset><worldbody>{geoms}{pegs}</worldbody></mujoco>'
+        )
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 1000)
+        return [bool(data.qpos[7 * i + 2] < mesh.bounds[0, 2] - size) for i in range(len(places))]
+
+    assert not any(fallen(rlacd.decompose(mesh, quality="fast", threads=1)))
+    assert all(fallen(rlacd.decompose(mesh, keep_open=0.97, quality="fast", threads=1)))
+
+
+def test_a_share_and_a_radius_are_told_apart() -> None:
+    assert decompose_options({"keep_open": "0.9"}) == decompose_options({"keep_open": "90%"}) == {"keep_open": 0.9}
+    assert decompose_options({"keep_open": "2mm"}, metres=True) == {"keep_open_abs": 0.002}
+    with pytest.raises(OptionError, match=r"keep_open_abs is 0\.001; .* between 0\.002 and 1"):
+        rlacd.decompose(trimesh.creation.box(), keep_open_abs=0.001)
+    with pytest.raises(OptionError, match="keep_open_abs, a radius"):
+        rlacd.decompose(trimesh.creation.box(), keep_open=0.9, keep_open_abs=0.1)
