@@ -23,7 +23,7 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from itertools import chain, count
 from pathlib import Path
@@ -34,6 +34,7 @@ from unittest import mock
 import numpy as np
 import trimesh
 
+from fuzz.fbx import PIVOTED, Model, fbx
 from fuzz.files import read_hulls
 from fuzz.geometry import why_not_convex
 from fuzz.mutations import Seed, damaged, repacked
@@ -124,9 +125,12 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
 
 
 def written_by_extras(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
-    """Write a mesh in the formats that need an extra which is installed: Draco, and USD as text, binary and packed."""
+    """Write a mesh in the formats of the extras that are installed: Draco, FBX, and USD as text, binary and packed."""
     if find_spec("DracoPy"):
         yield "glb", Seed(trimesh.Scene(mesh).export(file_type="glb", extension_draco=True))
+    if find_spec("ufbx"):
+        model = Model("mesh", mesh.vertices, mesh.faces.tolist(), (1.0, 0.0, 0.0), properties=PIVOTED)
+        yield from (("fbx", Seed(fbx([model, replace(model, below=0)], text=text))) for text in (False, True))
     if not find_spec("pxr"):
         return
     from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt

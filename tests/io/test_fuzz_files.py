@@ -19,8 +19,10 @@ from tests.bounded import bounded
 
 INPUTS = 60
 
-APART = {"draco": "glb", "usda": "usda", "usdc": "usdc", "usdz": "usdz"}
+APART = {"draco": "glb", "fbx": "fbx", "usda": "usda", "usdc": "usdc", "usdz": "usdz"}
 """What is read in a process of its own, and how its files end."""
+
+MODULES = {"draco": "DracoPy", "fbx": "ufbx"}
 
 
 def shape() -> trimesh.Trimesh:
@@ -66,7 +68,7 @@ def test_a_damaged_file_is_read_or_refused(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize(("kind", "module"), [(kind, "DracoPy" if kind == "draco" else "pxr") for kind in APART])
+@pytest.mark.parametrize(("kind", "module"), [(kind, MODULES.get(kind, "pxr")) for kind in APART])
 def test_a_damaged_file_that_is_read_apart_is_read_or_refused(kind: str, module: str, tmp_path: Path) -> None:
     pytest.importorskip(module)
     assert untyped(kind, tmp_path) == {}

@@ -432,8 +432,6 @@ def zipped(name):
     ("name", "content", "advice"),
     [
         ("chair.blend", b"BLENDER-v400", "export it from Blender"),
-        ("chair.fbx", b"Kaydara FBX Binary  \x00", "import it into Blender"),
-        ("chair.step", b"ISO-10303-21;", "FreeCAD"),
         ("chair.STP", b"ISO-10303-21;", "FreeCAD"),
         ("chair.obj.gz", b"\x1f\x8b\x08", "unpack it"),
         ("chair.zip", zipped("chair.obj"), "unpack it"),

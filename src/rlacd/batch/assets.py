@@ -20,7 +20,22 @@ from rlacd.io.read.beside import mesh_files
 from rlacd.io.write.encode import GENERATOR
 from rlacd.io.write.folder import listed_hulls
 
-ENDINGS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".vrm", ".dae", ".3mf", ".usd", ".usda", ".usdc", ".usdz")
+ENDINGS = (
+    ".obj",
+    ".stl",
+    ".ply",
+    ".off",
+    ".glb",
+    ".gltf",
+    ".vrm",
+    ".dae",
+    ".3mf",
+    ".fbx",
+    ".usd",
+    ".usda",
+    ".usdc",
+    ".usdz",
+)
 """File endings that count as meshes, in upper or lower case."""
 
 ROBOTS = (".urdf", ".xml")

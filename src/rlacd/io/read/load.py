@@ -36,8 +36,9 @@ _READERS = {
     **dict.fromkeys(("glb", "gltf", "vrm"), "read.gltf:read_gltf"),
     **dict.fromkeys(("dae", "zae"), "read.collada:read_collada"),
     "3mf": "read.threemf:read_3mf",
+    "fbx": "read.fbx:read_fbx",
     "xyz": "read.simple_formats:read_xyz",
-    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "read.usd:read_usd"),
+    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "read.usd_stage:read_usd"),
 }
 """By extension, the function that reads it."""
 
@@ -51,7 +52,7 @@ def load_mesh(source: Source) -> InputMesh:
     Parameters
     ----------
     source
-        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or
+        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, fbx, usd), a mesh or scene of trimesh, or
         vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry
         is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a
         scene that are hulls for an engine, by their names, are left out with a warning if there are others.
@@ -70,7 +71,7 @@ def load_mesh(source: Source) -> InputMesh:
     EmptyMeshError
         There are no points at all.
     MissingExtraError
-        A USD file or one that Draco compressed, and the extra ``usd`` or ``draco`` is not installed.
+        An FBX or USD file, or one that Draco compressed, and the extra ``fbx``, ``usd`` or ``draco`` is not installed.
     """
     if isinstance(source, os.PathLike):
         source = os.fspath(source)  # bytes are refused below

@@ -1,4 +1,4 @@
-"""The meshes and primitives of a USD stage that are rendered, where they stand; runs in a process of its own.
+"""The meshes and primitives of a USD stage that are rendered, where they stand, in a process of its own.
 
 A stage may name other files. They are read only from the folder of the file or below it, and named if they are missing.
 """
@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from rlacd.errors import MeshFileError, MissingExtraError
-from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES
+from rlacd.io.read.apart import read_apart
+from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES, Contents
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Shared, Values
@@ -30,6 +31,22 @@ _TO_AXIS = {"X": (0, 1, 0, np.pi / 2), "Y": (1, 0, 0, -np.pi / 2), "Z": (1, 0, 0
 
 _LOOK = {"diffuseColor": 3, "emissiveColor": 3, "opacity": 1, "metallic": 1, "roughness": 1}
 """The inputs of a UsdPreviewSurface that are read where they are no pictures, and their numbers."""
+
+
+def read_usd(path: Path, _: bytes) -> Contents:
+    """Read a stage: a node for each mesh.
+
+    Invisible prims and those for other purposes than to be rendered (guides, proxies) are left out. Subdivision
+    surfaces are read as their cages. A mesh has the colours and the surface of its material, without pictures.
+
+    Raises
+    ------
+    MeshFileError
+        It is damaged, refers to a file outside its folder or to none, or holds too much.
+    MissingExtraError
+        The extra ``usd`` is not installed.
+    """
+    return read_apart(SERVER, path, "USD", {})
 
 
 class StageReader:
