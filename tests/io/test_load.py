@@ -432,7 +432,6 @@ def zipped(name):
     ("name", "content", "advice"),
     [
         ("chair.blend", b"BLENDER-v400", "export it from Blender"),
-        ("chair.STP", b"ISO-10303-21;", "FreeCAD"),
         ("chair.obj.gz", b"\x1f\x8b\x08", "unpack it"),
         ("chair.zip", zipped("chair.obj"), "unpack it"),
         ("chair.7z", b"7z\xbc\xaf\x27\x1c", "unpack it"),

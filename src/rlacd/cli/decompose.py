@@ -23,7 +23,7 @@ IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm")
 """File formats that define the metre as their unit."""
 
 MESH = (
-    "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd, fbx. It need not be closed or clean. "
+    "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd, fbx, step, iges. It need not be closed or clean. "
     "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced."
 )
 
