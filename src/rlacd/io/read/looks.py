@@ -7,6 +7,7 @@ Pictures are decoded here, by Pillow where it is installed; those that are missi
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -80,12 +81,19 @@ def painted(arrays: Mapping[str, tuple[FloatArray, IntArray]], material: Any) ->
 
 
 def opened_picture(beside: FolderFiles, name: str) -> Any:
-    """A picture in the folder of a mesh; None if it is missing, no picture, or Pillow is not installed."""
+    """A picture in the folder of a mesh; None, with a warning, if it cannot be decoded here."""
     try:
         from PIL import Image
 
-        return Image.open(io.BytesIO(beside.get(name)))
-    except Exception:  # decoders may raise anything
+        picture = Image.open(io.BytesIO(beside.get(name)))
+        if picture.width * picture.height > MOST_PIXELS:
+            raise ValueError
+        picture.load()  # now, when one that cannot be decoded may still be left out
+        return picture
+    except Exception as error:  # decoders may raise anything
+        reasons = {ImportError: "run  pip install 'rlacd[view]'", FileNotFoundError: "it is not in the folder"}
+        why = next((said for kind, said in reasons.items() if isinstance(error, kind)), "it is damaged or too large")
+        warnings.warn(f"the picture {name!r:.100} was left out: {why}", UserWarning, stacklevel=2)
         return None
 
 
