@@ -5,6 +5,7 @@ All lines of a kind are read at once, as an array of characters: files of a mill
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -201,6 +202,8 @@ def _paints(beside: FolderFiles, libraries: Sequence[str]) -> dict[str, Any]:
         try:
             named = parse_mtl(MAP.sub(rb"picture \1", beside.get(library)))
         except FileNotFoundError:
+            missing = f"the materials {library!r:.100} were left out: they are not in the folder"
+            warnings.warn(missing, UserWarning, stacklevel=2)
             continue
         for name, said in named.items():
             picture = opened_picture(beside, " ".join(said["picture"])) if "picture" in said else None

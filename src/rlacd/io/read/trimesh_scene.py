@@ -1,8 +1,7 @@
-"""Scenes and meshes of trimesh, from memory or parsed by it, as contents."""
+"""Scenes and meshes of trimesh, from memory or from what another process read, as contents."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,24 +10,11 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import MeshDataError
-from rlacd.io.read.beside import DATA, FolderFiles
 from rlacd.io.read.contents import Contents, Triangles, require_few
 from rlacd.pool import Answer
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
-
-
-def parsed(path: Path, content: bytes, extension: str, endings: frozenset[str] = DATA, **options: Any) -> trimesh.Scene:
-    """Parse a file by trimesh; only files beside it with these endings are opened, and nothing is fetched."""
-    return trimesh.load_scene(
-        io.BytesIO(content),
-        file_type=extension,
-        resolver=FolderFiles(path.parent, endings),
-        allow_remote=False,
-        process=False,
-        **options,
-    )
 
 
 def geometry_of(source: Any, name: str) -> list[tuple[SourceNode, Triangles]]:
