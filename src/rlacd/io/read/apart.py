@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import Contents
+from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES, Contents, Triangles
 from rlacd.memory import memory_left
 from rlacd.pool import Answer, Blobs, ProcessLimits, Request, Values, WorkerDiedError
 from rlacd.pool.local import Worker
+from rlacd.solid.arrays import FloatArray
 
 LIMITS = ProcessLimits(seconds=600.0, memory=8 * 2**30)
 """Of one file."""
@@ -63,8 +65,30 @@ def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) 
         worker.close()
 
 
+class ToldNodes:
+    """The nodes of a file as a server tells them: what `values` say of each, and ``INDEX.points``, ``INDEX.faces``."""
+
+    def __init__(self, path: Path) -> None:
+        self.values: list[Values] = []
+        self.blobs: dict[str, bytes] = {}
+        self._path, self._names, self._count = path, set[str](), 0
+
+    def add(self, names: Sequence[str], to_world: FloatArray, look: Values | None, shape: Triangles) -> None:
+        """Add a node by the first of its names that no other has; raises MeshFileError if there are too many."""
+        self._count += len(shape.faces)
+        if self._count > MOST_TRIANGLES:
+            raise MeshFileError(f"{self._path} places more than {MOST_TRIANGLES} triangles: simplify it first")
+        if len(self.values) >= MOST_PLACES:
+            raise MeshFileError(f"{self._path} places more than {MOST_PLACES} meshes: join them first")
+        index = len(self.values)
+        name = next((name for name in names if name and name not in self._names), f"{names[-1]}:{index}")
+        self._names.add(name)
+        self.values.append({"name": name, "transform": to_world.ravel().tolist(), "look": look})
+        self.blobs |= {f"{index}.points": shape.vertices.tobytes(), f"{index}.faces": shape.faces.tobytes()}
+
+
 def read_apart(server: str, path: Path, kind: str, blobs: Blobs) -> Contents:
-    """Ask a server that answers as `rlacd.io.read.trimesh_scene.contents_of` describes."""
+    """Ask a server that answers with `ToldNodes`, ``up``, ``metres`` and maybe ``warnings``."""
     contents_of = function_of("read.trimesh_scene:contents_of")  # trimesh, which the servers do without
     contents: Contents = contents_of(answer_of(server, path, kind, {"path": str(path)}, blobs), path)
     return contents

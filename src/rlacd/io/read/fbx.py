@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.apart import read_apart
-from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES, Contents
+from rlacd.io.read.apart import ToldNodes, read_apart
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Shared, Values
 
@@ -83,21 +83,12 @@ def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
     said |= dict.fromkeys(f"{path.name}: {one.description}" for one in scene.metadata.warnings)
     nodes, left_out = _shown(path, scene)
     said |= {f"{what} of {path.name} were left out: {count}": None for what, count in left_out.items() if count}
-    arrays: dict[str, bytes] = {}
-    described, count, names = [], 0, set[str]()
+    told = ToldNodes(path)
     for index, (node, mesh) in enumerate(nodes):
-        points, faces = _arrays(mesh)
-        count += len(faces)
-        if count > MOST_TRIANGLES:
-            raise MeshFileError(f"{path} places more than {MOST_TRIANGLES} triangles: simplify it first")
-        arrays |= {f"{index}.points": points.tobytes(), f"{index}.faces": faces.tobytes()}
-        name = node.name or mesh.name or "node"
-        name = name if name not in names else f"{name}.{index}"
-        names.add(name)
         to_world = np.vstack([np.array(node.geometry_to_world).T, (0, 0, 0, 1)])
-        described.append({"name": name, "transform": to_world.ravel().tolist(), "look": _look(node)})
+        told.add((node.name, mesh.name, f"{node.name or 'node'}.{index}"), to_world, _look(node), _triangles(mesh))
     up, metres = "xyz"[axes[1] // 2], float(scene.settings.unit_meters)
-    return {"nodes": described, "up": up, "metres": metres, "warnings": list(said)}, arrays
+    return {"nodes": told.values, "up": up, "metres": metres, "warnings": list(said)}, told.blobs
 
 
 def _is_plain(axes: np.ndarray[Any, Any]) -> bool:
@@ -132,12 +123,12 @@ def _shown(path: Path, scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int
     return found, {what: list(gone.values()).count(what) for what in gone.values()}
 
 
-def _arrays(mesh: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+def _triangles(mesh: Any) -> Triangles:
     """The points and triangles of a mesh; subdivision surfaces are read as their cages."""
     points = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     corners = np.fromiter(mesh.vertex_indices, np.int64, len(mesh.vertex_indices))
     counts = np.array(mesh.faces, dtype=np.int64).reshape(-1, 2)[:, 1]
-    return points, np.ascontiguousarray(triangles_of(points, counts, corners), dtype=np.int64)
+    return Triangles(points, triangles_of(points, counts, corners))
 
 
 def _look(node: Any) -> dict[str, list[float]] | None:

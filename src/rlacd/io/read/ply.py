@@ -7,6 +7,7 @@ import re
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -192,7 +193,7 @@ def scene_of_ply(path: Path, content: bytes) -> trimesh.Scene:
     beside = FolderFiles(path.parent, PICTURES)
     scene = trimesh.load_scene(io.BytesIO(content), "ply", resolver=beside, allow_remote=False, process=False)
     for shape in scene.geometry.values():
-        material = getattr(shape.visual, "material", None)
+        material: Any = getattr(shape.visual, "material", None)
         if getattr(material, "image", None) is not None:
             material.image = decoded(material.image)
     return scene

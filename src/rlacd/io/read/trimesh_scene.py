@@ -70,10 +70,7 @@ def arrays_of(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
 
 
 def contents_of(answer: Answer, path: Path) -> Contents:
-    """What a reader in a process of its own tells of a file: ``INDEX.points`` and ``INDEX.faces`` of the nodes.
-
-    A node that says how it looks has that material, without pictures.
-    """
+    """What a reader in a process of its own tells of a file (`rlacd.io.read.apart.ToldNodes`)."""
     scene = trimesh.Scene()
     for index, node in enumerate(answer.values["nodes"]):
         points = np.frombuffer(answer.blobs[f"{index}.points"]).reshape(-1, 3).copy()
