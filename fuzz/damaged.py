@@ -23,7 +23,7 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from itertools import chain, count
 from pathlib import Path
@@ -34,6 +34,7 @@ from unittest import mock
 import numpy as np
 import trimesh
 
+from fuzz.fbx import PIVOTED, Model, fbx
 from fuzz.files import read_hulls
 from fuzz.geometry import why_not_convex
 from fuzz.mutations import Seed, damaged, repacked
@@ -54,6 +55,8 @@ LARGEST_SEED = 60_000
 SMALL_MESHES = 12
 
 BOX = trimesh.creation.box()
+
+CASES = Path(__file__).parents[1] / "tests" / "cases"
 
 URDF = (
     '<?xml version="1.0"?>\n<robot name="r">\n<link name="a">\n<collision name="c">\n<origin xyz="0 0 1"/>\n'
@@ -124,9 +127,15 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
 
 
 def written_by_extras(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
-    """Write a mesh in the formats that need an extra which is installed: Draco, and USD as text, binary and packed."""
+    """Write a mesh in the formats of the extras that are installed: Draco, FBX, USD; STEP and IGES files are others."""
     if find_spec("DracoPy"):
         yield "glb", Seed(trimesh.Scene(mesh).export(file_type="glb", extension_draco=True))
+    if find_spec("ufbx"):
+        model = Model("mesh", mesh.vertices, mesh.faces.tolist(), (1.0, 0.0, 0.0), properties=PIVOTED)
+        yield from (("fbx", Seed(fbx([model, replace(model, below=0)], text=text))) for text in (False, True))
+    if find_spec("cascadio"):
+        yield "step", Seed((CASES / "stand.step").read_bytes())
+        yield "igs", Seed((CASES / "ball_inch.igs").read_bytes())
     if not find_spec("pxr"):
         return
     from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt

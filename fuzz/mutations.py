@@ -18,7 +18,7 @@ Rng = np.random.Generator
 
 Mutation = Callable[[bytes, bytes, Rng], bytes]
 
-TEXT = {"obj", "off", "xyz", "dae", "gltf", "urdf", "xml"}
+TEXT = {"obj", "off", "xyz", "dae", "gltf", "urdf", "xml", "step", "igs"}
 
 NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import signal
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner, Result
@@ -210,7 +212,9 @@ def test_a_concavity_above_the_threshold_is_reported(mesh: Path, stand_in: Stand
     [
         (["-o", "{dir}/out.fbx"], 2, ".glb, .obj, .ply, .stl"),
         (["-o", "{dir}/ell.stl/out.glb"], 3, "is a file, not a folder"),
-        (["-o", "-"], 2, "stdout"),
+        (["-o", "-", "--format", "urdf"], 2, "give -o a file name"),
+        (["-o", "-", "--report", "-"], 2, "--report - would overwrite what -o writes"),
+        (["--from", "obj"], 2, "give - as IN"),
         (["-o", "{dir}/ell.stl"], 2, "overwrite the input"),
         (["--report", "{dir}/ell.stl/r.json"], 3, "is a file, not a folder"),
         (["--report", "{dir}"], 3, "it is a folder"),
@@ -373,6 +377,35 @@ def test_a_report_that_cannot_be_printed_is_an_error_of_one_sentence(mesh: Path,
     assert (run.returncode, len(run.stderr.splitlines())) == (3, 1), run.stderr
     assert "cannot write to stdout" in run.stderr
     assert says in run.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "ending"), [(["--from", "stl"], "obj"), (["-o", "-", "--format", "glb"], "glb")])
+def test_a_mesh_from_stdin_becomes_hulls_on_stdout(mesh: Path, words: list[str], ending: str) -> None:
+    command = [sys.executable, "-m", "rlacd", "decompose", "-", *words, "--quality", "fast"]
+    run = subprocess.run(command, input=mesh.read_bytes(), capture_output=True, timeout=120, check=False)
+    assert run.returncode == 0, run.stderr
+    read = trimesh.load_scene(io.BytesIO(run.stdout), file_type=ending)
+    assert np.allclose(read.bounds, trimesh.load(mesh).bounds, atol=1e-6)
+    assert run.stderr.startswith(b"stdout: ")
+    assert [path.name for path in mesh.parent.iterdir()] == ["ell.stl"]
+
+
+@pytest.mark.parametrize(
+    ("words", "given", "says"),
+    [
+        ([], b"no mesh at all", "add --from obj"),
+        (["--from", "obj"], b"", "stdin is empty"),
+        (["--from", "obj"], b"v 0 0 0\nf 1 2 9\n", "stdin cannot be read as obj"),
+        (["--from", "abc"], b"abc", "stdin is in a format that rlacd does not read"),
+        (["--from", "urdf", "-o", "out.urdf"], b"<robot/>", "files beside it"),
+    ],
+)
+def test_what_stdin_cannot_be_read_as_is_said(words: list[str], given: bytes, says: str) -> None:
+    run = CliRunner().invoke(app, ["decompose", "-", *words], input=given)
+    assert run.exit_code == 2
+    assert says in run.stderr
+    assert len(run.stderr.splitlines()) == 1
 
 
 @pytest.mark.slow

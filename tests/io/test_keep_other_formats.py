@@ -106,9 +106,27 @@ def test_a_picture_that_cannot_be_read_is_left_out(
         monkeypatch.setattr(looks, "MOST_PIXELS", 3)
     else:
         (tmp_path / "crate.mtl").unlink()
-    header, _, _ = kept(path, tmp_path / "out.glb")
+    with pytest.warns(UserWarning, match="left out"):
+        header, _, _ = kept(path, tmp_path / "out.glb")
     assert "images" not in header
     assert [node["name"] for node in header["nodes"]] == ["crate", "UCX_crate_00"]
+
+
+@pytest.mark.parametrize(
+    "named", [r"map_Kd in\wood.png", "map_Kd -s 2 2 1 -clamp on in/wood.png", "map_Kd  in/wood.png"]
+)
+def test_pictures_and_opacities_of_materials_are_read_as_exporters_write_them(tmp_path: Path, named: str) -> None:
+    path = painted_obj(tmp_path)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "wood.png").rename(tmp_path / "in" / "wood.png")
+    (tmp_path / "crate.mtl").write_text(f"newmtl wood\n{named}\nnewmtl red\nKd 1 0 0\nTr 0.5\n")
+    assert len(mesh_files(path)) == 3
+    header, binary, _ = kept(path, tmp_path / "out.glb")
+    wood, red = header["materials"][:2]
+    assert (pixels(view_of(header, binary, header["images"][0]["bufferView"])) == pixels(png())).all()
+    assert wood["pbrMetallicRoughness"].get("baseColorFactor", [1.0] * 4) == [1.0] * 4
+    assert red["alphaMode"] == "BLEND"
+    assert red["pbrMetallicRoughness"]["baseColorFactor"] == pytest.approx([1, 0, 0, 0.5], abs=0.01)
 
 
 def test_a_picture_outside_the_folder_is_not_read(tmp_path: Path) -> None:

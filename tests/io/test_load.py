@@ -432,9 +432,6 @@ def zipped(name):
     ("name", "content", "advice"),
     [
         ("chair.blend", b"BLENDER-v400", "export it from Blender"),
-        ("chair.fbx", b"Kaydara FBX Binary  \x00", "import it into Blender"),
-        ("chair.step", b"ISO-10303-21;", "FreeCAD"),
-        ("chair.STP", b"ISO-10303-21;", "FreeCAD"),
         ("chair.obj.gz", b"\x1f\x8b\x08", "unpack it"),
         ("chair.zip", zipped("chair.obj"), "unpack it"),
         ("chair.7z", b"7z\xbc\xaf\x27\x1c", "unpack it"),
@@ -482,11 +479,14 @@ def test_an_obj_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path, cont
 
 
 def test_what_an_obj_holds_beside_faces_is_told(tmp_path):
-    (tmp_path / "box.obj").write_text(OBJ + "l 1 2\np 1\ncstype bezier\ncurv 0 1 1 2\nsurf 0 1 0 1 1 2\nend\n")
+    (tmp_path / "box.obj").write_text(
+        OBJ + "l 1 2\np 1\ncstype bezier\ncurv 0 1 1 2\nsurf 0 1 0 1 1 2\nend\ncall lid.obj\n"
+    )
     mesh = load_mesh(tmp_path / "box.obj")
     assert len(mesh.faces) == 12
     assert mesh.warnings == tuple(
-        f"{what} of box.obj were left out" for what in ("points and lines", "free-form curves and surfaces")
+        f"{what} of box.obj were left out"
+        for what in ("points and lines", "free-form curves and surfaces", "other files that it calls")
     )
 
 

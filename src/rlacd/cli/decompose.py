@@ -10,22 +10,24 @@ from typing import Any
 
 import click
 
-from rlacd.cli.commands import Argument, Command, chosen, options_of, taken
+from rlacd.cli.commands import Argument, Command, Option, chosen, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import import_trimesh
 from rlacd.cli.options import decompose_options, how, unit_given
+from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.options.output import OutputOptions
 
-STDOUT = "-"
 ROBOTS = (".urdf", ".xml")
 IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm")
 """File formats that define the metre as their unit."""
 
 MESH = (
-    "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd. It need not be closed or clean. "
-    "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced."
+    "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd, fbx, step, iges. It need not be closed or clean. "
+    "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced. - reads stdin."
 )
+
+FROM = "What stdin holds, if IN is -: obj, stl, ...  [default: told from its content]"
 
 FIRST = (
     *("output", "threshold", "quality", "max_hulls", "max_vertices"),
@@ -34,7 +36,7 @@ FIRST = (
 """What people use first, and ``--help`` shows."""
 
 
-def _decompose(mesh: Path, **how: Any) -> None:
+def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
     """Turn a mesh into convex hulls for collision.
 
     \b
@@ -45,14 +47,25 @@ def _decompose(mesh: Path, **how: Any) -> None:
       rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
       rlacd decompose chair.glb -o chair.xml --preset mujoco
       rlacd decompose robot.urdf -o robot_acd.urdf
+      cat chair.obj | rlacd decompose - --from obj -o - --format stl > hulls.stl
       rlacd decompose house.glb --criterion navigable --radius-abs 0.3 --tolerance-abs 0.05
 
     Ctrl-C once stops and writes the result so far; twice quits at once.
     """
     asked = OutputOptions(**taken(how, OutputOptions))
+    if asked.output is None and str(mesh) == STDIO:
+        asked = dataclasses.replace(asked, output=STDIO)
+    with stdin_as_file(mesh, source) as file:
+        complete = _run(file, asked, how)
+    if not complete:
+        raise SystemExit(ExitCode.STOPPED_EARLY)
+
+
+def _run(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> bool:
+    """Check everything, then do it; returns whether it is complete."""
     _check_input(mesh)
     import_trimesh(mesh)
-    if asked.report == STDOUT:
+    if STDIO in (asked.report, asked.output):
         give("")  # before any work
     wanted = _named(mesh, asked, how.get("preset"))
     robot = mesh.suffix.lower() in ROBOTS or _is_stage(mesh, wanted)
@@ -62,8 +75,7 @@ def _decompose(mesh: Path, **how: Any) -> None:
         raise OptionError("--balls needs --criterion navigable.")
     options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
     run = _rewrite if robot else _write
-    if not run(mesh, wanted, options, unit_given(how)):
-        raise SystemExit(ExitCode.STOPPED_EARLY)
+    return run(mesh, wanted, options, unit_given(how))
 
 
 def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
@@ -80,9 +92,10 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
     written = chosen({name: getattr(wanted, name) for name in names})
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", ImplausibleBodyWarning)
-        result.save(place, up=up, **written)
+        with file_for(place, wanted.file_format) as file:
+            result.save(file, up=up, **written)
     if not quiet:
-        say(summary(result, place, unit))
+        say(summary(result, "stdout" if place == STDIO else place, unit))
     for doubt in doubts:
         say(f"  warning: {doubt.message}")
     if wanted.report is not None and is_html(wanted.report):
@@ -104,7 +117,7 @@ def _write_report(wanted: OutputOptions, text: str) -> None:
     from rlacd.cli.terminal import writing
     from rlacd.io.write import write_file
 
-    if wanted.report == STDOUT:
+    if wanted.report == STDIO:
         give(text)
     elif wanted.report is not None:
         with writing("report", wanted.report, quiet=bool(wanted.quiet)):
@@ -147,8 +160,6 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
     from rlacd.options.presets import find_preset
 
     output, file_format = asked.output, asked.file_format
-    if output == STDOUT:
-        raise OptionError("hulls cannot be written to stdout; give -o a file name, and use - with --report only.")
     engine = None if preset is None else find_preset(preset)
     if output is None:
         ending = ".glb" if engine is None else engine.ending
@@ -171,13 +182,13 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     from rlacd.io.write.target import check_file
 
     flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
-    target = hull_target(str(wanted.output), wanted.file_format, **flags)
+    target = hull_target(stdout_name(str(wanted.output), wanted.file_format), wanted.file_format, **flags)
     if target.is_folder:
         stem = file_stem(mesh.stem)
         check_names(target.path, stem, [f"{stem}_000.{target.file_format}"])  # the one that every result has
     if wanted.package_dirs:
         raise OptionError("--package-dir is for robots, a .urdf or .xml file as input.")
-    if wanted.report not in (None, STDOUT):
+    if wanted.report not in (None, STDIO):
         check_file(Path(wanted.report))
     if wanted.picture is not None:
         from rlacd.view.picture import check_picture
@@ -191,13 +202,15 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes, and check that the report can be written."""
     from rlacd.io.write.target import check_file
 
+    if wanted.output == STDIO:
+        raise OptionError("a robot is several files, which do not fit into stdout: give -o a file name.")
     if wanted.report is not None and is_html(wanted.report):
         raise OptionError("--report as a page is for a single mesh; for a robot give a .json file.")
     for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "keep_input", "scene"):
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")
             raise OptionError(f"--{spelled} is for a single mesh; leave it out for a robot.")
-    if wanted.report not in (None, STDOUT):
+    if wanted.report not in (None, STDIO):
         check_file(Path(wanted.report))
 
 
@@ -212,8 +225,6 @@ def _check_input(mesh: Path) -> None:
     try:
         mesh.stat()
     except FileNotFoundError as error:
-        if str(mesh) == STDOUT:
-            raise MeshFileError("stdin is not read: give the name of a mesh file.") from error
         raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder") from error
     except (OSError, ValueError):
         return
@@ -226,11 +237,12 @@ def _check_output(mesh: Path, wanted: OutputOptions) -> None:
     seen = {_same(mesh): "the input"}
     for name, flag in (("output", "-o"), ("report", "--report"), ("picture", "--picture"), ("balls", "--balls")):
         path = getattr(wanted, name)
-        if path is None or path == STDOUT:
+        if path is None:
             continue
-        if _same(path) in seen:
-            raise OptionError(f"{flag} {path} would overwrite {seen[_same(path)]}; choose another name.")
-        seen[_same(path)] = f"what {flag} writes"
+        place = path if path == STDIO else _same(path)
+        if place in seen:
+            raise OptionError(f"{flag} {path} would overwrite {seen[place]}; choose another name.")
+        seen[place] = f"what {flag} writes"
 
 
 def _same(path: str | Path) -> str:
@@ -240,7 +252,12 @@ def _same(path: str | Path) -> str:
 COMMAND = Command(
     "decompose",
     _decompose,
-    [Argument("mesh", "IN", MESH), *options_of(OutputOptions), *how()],
+    [
+        Argument("mesh", "IN", MESH),
+        Option("source", "--from", metavar="EXT", panel="Input", help=FROM),
+        *options_of(OutputOptions),
+        *how(),
+    ],
     first=FIRST,
     context_settings={"allow_extra_args": True},
 )

@@ -58,7 +58,7 @@ def exit_codes() -> Iterator[None]:
         _fail(message + "run again with RLACD_DEBUG=1 for the traceback, and please report it.", ExitCode.BUG)
 
 
-def give(text: str) -> None:
+def give(content: str | bytes) -> None:
     """Print what was asked for to stdout.
 
     Raises
@@ -69,7 +69,10 @@ def give(text: str) -> None:
     if sys.stdout is None:
         raise OutputError("cannot write to stdout: it is closed.")
     try:
-        sys.stdout.write(text)
+        if isinstance(content, bytes):
+            sys.stdout.buffer.write(content)
+        else:
+            sys.stdout.write(content)
         sys.stdout.flush()
     except BrokenPipeError:
         raise

@@ -8,8 +8,6 @@ from tests.io.hostile.registry import refused
 for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "binvox", "dxf"):
     refused(f"another format.{ending}", "convert it")(lambda: b"anything")
 refused("another format.zip", "unpack it")(lambda: b"anything")
-for ending in ("step", "stp"):
-    refused(f"another format.{ending}", "export it from a CAD program")(lambda: b"anything")
 
 
 @refused("a node below one whose mesh there is not.gltf", "no index")

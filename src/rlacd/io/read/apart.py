@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
-from rlacd.errors import MeshFileError
+from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.io.read import function_of
+from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES, Contents, Triangles
 from rlacd.memory import memory_left
 from rlacd.pool import Answer, Blobs, ProcessLimits, Request, Values, WorkerDiedError
 from rlacd.pool.local import Worker
+from rlacd.solid.arrays import FloatArray
 
 LIMITS = ProcessLimits(seconds=600.0, memory=8 * 2**30)
 """Of one file."""
+
+EXTRAS = {
+    "rlacd.io.read.cad:CadReader": ("cascadio", "cad"),
+    "rlacd.io.read.draco:DracoDecoder": ("DracoPy", "draco"),
+    "rlacd.io.read.fbx:FbxReader": ("ufbx", "fbx"),
+    "rlacd.io.read.usd_stage:StageReader": ("pxr", "usd"),
+}
+"""The servers: the package that each needs, and the extra that installs it."""
 
 
 def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) -> Answer:
@@ -32,9 +45,14 @@ def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) 
     ------
     MeshFileError
         The process died, or took more than `LIMITS`.
+    MissingExtraError
+        The package that the server needs is not installed.
     RlacdError
         Raised by the server.
     """
+    package, extra = EXTRAS.get(server, ("", ""))
+    if package and find_spec(package) is None:
+        raise MissingExtraError(f"{path} needs an extra: run  pip install 'rlacd[{extra}]'  and try again.")
     worker = Worker()
     limits = replace(LIMITS, memory=max(min(LIMITS.memory or 0, memory_left()), 1))
     try:
@@ -45,3 +63,32 @@ def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) 
         ) from error
     finally:
         worker.close()
+
+
+class ToldNodes:
+    """The nodes of a file as a server tells them: what `values` say of each, and ``INDEX.points``, ``INDEX.faces``."""
+
+    def __init__(self, path: Path) -> None:
+        self.values: list[Values] = []
+        self.blobs: dict[str, bytes] = {}
+        self._path, self._names, self._count = path, set[str](), 0
+
+    def add(self, names: Sequence[str], to_world: FloatArray, look: Values | None, shape: Triangles) -> None:
+        """Add a node by the first of its names that no other has; raises MeshFileError if there are too many."""
+        self._count += len(shape.faces)
+        if self._count > MOST_TRIANGLES:
+            raise MeshFileError(f"{self._path} places more than {MOST_TRIANGLES} triangles: simplify it first")
+        if len(self.values) >= MOST_PLACES:
+            raise MeshFileError(f"{self._path} places more than {MOST_PLACES} meshes: join them first")
+        index = len(self.values)
+        name = next((name for name in names if name and name not in self._names), f"{names[-1]}:{index}")
+        self._names.add(name)
+        self.values.append({"name": name, "transform": to_world.ravel().tolist(), "look": look})
+        self.blobs |= {f"{index}.points": shape.vertices.tobytes(), f"{index}.faces": shape.faces.tobytes()}
+
+
+def read_apart(server: str, path: Path, kind: str, blobs: Blobs) -> Contents:
+    """Ask a server that answers with `ToldNodes`, ``up``, ``metres`` and maybe ``warnings``."""
+    contents_of = function_of("read.trimesh_scene:contents_of")  # trimesh, which the servers do without
+    contents: Contents = contents_of(answer_of(server, path, kind, {"path": str(path)}, blobs), path)
+    return contents

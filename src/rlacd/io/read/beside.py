@@ -40,14 +40,14 @@ class FolderFiles(Resolver):  # type: ignore[misc]
     def get(self, name: str, unquoted: bool = True) -> bytes:
         """Return the content of a file in the folder, cached, since a file may be named any number of times.
 
-        The name may be written like that of an address, if it is to be `unquoted`.
+        The name may be written like that of an address, if it is to be `unquoted`, or as in Windows.
 
         Raises
         ------
         FileNotFoundError
             There is no such file, or it may not be read.
         """
-        for spelled in dict.fromkeys((name, unquote(name) if unquoted else name)):
+        for spelled in dict.fromkeys((name, unquote(name) if unquoted else name, name.replace("\\", "/"))):
             try:
                 path = (self._folder / spelled.strip()).resolve()
                 if path.suffix.lower() not in self._endings or not path.is_relative_to(self._folder):
@@ -112,7 +112,7 @@ def _beside(path: Path, content: bytes) -> dict[str, bytes]:
             return _found(path, _of_gltf(content), DATA | IMAGES)
         case ".obj":
             materials = _found(path, _values(_MTLLIB, content), PICTURES)
-            pictures = [name for data in materials.values() for name in _values(_MAP, data)]
+            pictures = [name for data in materials.values() for name in _values(MAP, data)]
             return {**materials, **_found(path, pictures, PICTURES)}
         case ".dae":
             return _found(path, _values(_INIT_FROM, content), PICTURES)
@@ -121,7 +121,11 @@ def _beside(path: Path, content: bytes) -> dict[str, bytes]:
 
 
 _MTLLIB = re.compile(rb"^mtllib[ \t]+(.+)$", re.MULTILINE)
-_MAP = re.compile(rb"^[ \t]*map_Kd[ \t]+(.+)$", re.MULTILINE | re.IGNORECASE)
+MAP = re.compile(
+    rb"^[ \t]*map_Kd[ \t]+(?:-\w+[ \t]+(?:(?:[-+.\d]+|on|off|\w)[ \t]+)*)*(.+)$", re.MULTILINE | re.IGNORECASE
+)
+"""The picture of a material in an MTL file, behind options."""
+
 _INIT_FROM = re.compile(rb"<init_from>([^<]{1,1000})</init_from>")
 
 

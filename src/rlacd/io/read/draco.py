@@ -6,12 +6,11 @@ Draco is decoded by DracoPy (extra ``draco``) in a process of its own: a damaged
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import answer_of
 from rlacd.io.read.contents import MOST_TRIANGLES
 from rlacd.io.read.gltf_arrays import ITEMS, Arrays, Json, as_floats
@@ -67,8 +66,6 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
         users.append((primitive, names))
     if not streams:
         return False
-    if find_spec("DracoPy") is None:
-        raise MissingExtraError(f"{path} is compressed with Draco: run  pip install 'rlacd[draco]'  and try again.")
     blobs = answer_of(DECODER, path, "glTF", {"path": str(path), "asked": asked}, streams).blobs
     added: dict[str, int] = {}
     for name in streams:

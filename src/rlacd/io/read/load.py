@@ -36,6 +36,8 @@ _READERS = {
     **dict.fromkeys(("glb", "gltf", "vrm"), "read.gltf:read_gltf"),
     **dict.fromkeys(("dae", "zae"), "read.collada:read_collada"),
     "3mf": "read.threemf:read_3mf",
+    "fbx": "read.fbx:read_fbx",
+    **dict.fromkeys(("step", "stp", "iges", "igs"), "read.cad:read_cad"),
     "xyz": "read.simple_formats:read_xyz",
     **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "read.usd:read_usd"),
 }
@@ -51,10 +53,10 @@ def load_mesh(source: Source) -> InputMesh:
     Parameters
     ----------
     source
-        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, usd), a mesh or scene of trimesh, or
-        vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry
-        is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a
-        scene that are hulls for an engine, by their names, are left out with a warning if there are others.
+        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, fbx, step, iges, usd), a mesh or scene of
+        trimesh, or vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of
+        a geometry is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces.
+        Nodes of a scene that are hulls for an engine, by their names, are left out with a warning if there are others.
 
     Returns
     -------
@@ -70,7 +72,7 @@ def load_mesh(source: Source) -> InputMesh:
     EmptyMeshError
         There are no points at all.
     MissingExtraError
-        A USD file or one that Draco compressed, and the extra ``usd`` or ``draco`` is not installed.
+        The extra that reads the file is not installed: ``fbx``, ``usd``, ``cad`` for STEP and IGES, ``draco``.
     """
     if isinstance(source, os.PathLike):
         source = os.fspath(source)  # bytes are refused below
@@ -95,7 +97,9 @@ def _read(path: Path) -> Contents:
     holds = format_of(content)
     if extension == "usdz" and holds == "3mf":  # both are archives
         holds = extension
-    renamed = f"rename it to .{holds}" if holds and holds != {"vrm": "glb"}.get(extension, extension) else None
+    renamed = (
+        f"rename it to .{holds}" if holds and holds != {"vrm": "glb", "stp": "step"}.get(extension, extension) else None
+    )
     if extension not in _READERS:
         hint = CONVERTERS.get(extension) or (f"{renamed}, which it seems to hold" if renamed else "")
         raise MeshFileError(

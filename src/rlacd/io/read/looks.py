@@ -7,6 +7,7 @@ Pictures are decoded here, by Pillow where it is installed; those that are missi
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -48,8 +49,6 @@ def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None
     """
     try:
         scene: trimesh.Scene = function_of(_READERS[extension])(path, content)
-        for geometry in scene.geometry.values():
-            _drop_bad_pictures(getattr(geometry.visual, "material", None))
     except Exception:  # parsers may raise anything on damaged files; the triangles have been read without looks
         return None
     return scene
@@ -73,6 +72,7 @@ def painted(arrays: Mapping[str, tuple[FloatArray, IntArray]], material: Any) ->
     mesh = trimesh.Trimesh(of["POSITION"][:, :3], faces.reshape(-1, 3), vertex_normals=of.get("NORMAL"), process=False)
     uv = of["TEXCOORD"][:, :2] if "TEXCOORD" in of else None
     if material is not None or (uv is not None and "COLOR" not in of):
+        material = material or trimesh.visual.material.SimpleMaterial()  # or trimesh makes up a picture
         mesh.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
     elif "COLOR" in of:
         mesh.visual.vertex_colors = of["COLOR"]
@@ -80,24 +80,25 @@ def painted(arrays: Mapping[str, tuple[FloatArray, IntArray]], material: Any) ->
 
 
 def opened_picture(beside: FolderFiles, name: str) -> Any:
-    """A picture in the folder of a mesh; None if it is missing, no picture, or Pillow is not installed."""
+    """A picture in the folder of a mesh; None, with a warning, if it cannot be decoded here."""
     try:
         from PIL import Image
 
-        return Image.open(io.BytesIO(beside.get(name)))
-    except Exception:  # decoders may raise anything
+        return decoded(Image.open(io.BytesIO(beside.get(name))), name)
+    except Exception as error:  # decoders may raise anything
+        reasons = {ImportError: "run  pip install 'rlacd[view]'", FileNotFoundError: "it is not in the folder"}
+        why = next((said for kind, said in reasons.items() if isinstance(error, kind)), "it is damaged")
+        warnings.warn(f"the picture {name!r:.100} was left out: {why}", UserWarning, stacklevel=2)
         return None
 
 
-def _drop_bad_pictures(material: Any) -> None:
-    """Decode pictures now, when one that cannot be decoded may still be left out."""
-    for name in ("image", "baseColorTexture", "emissiveTexture", "normalTexture"):
-        picture = getattr(material, name, None)
-        if picture is None:
-            continue
-        try:
-            if picture.format is None or picture.width * picture.height > MOST_PIXELS:
-                raise ValueError("the picture is made up by the parser, or too large")
-            picture.load()
-        except Exception:
-            setattr(material, name, None)
+def decoded(picture: Any, name: str = "of the vertices") -> Any:
+    """Decode a picture now, when one that cannot be decoded may still be left out; None, with a warning, for such."""
+    try:
+        if picture.width * picture.height > MOST_PIXELS:
+            raise ValueError
+        picture.load()
+    except Exception:  # decoders may raise anything
+        warnings.warn(f"the picture {name!r:.100} was left out: it is damaged or too large", UserWarning, stacklevel=3)
+        return None
+    return picture

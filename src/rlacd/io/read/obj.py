@@ -5,7 +5,8 @@ All lines of a kind are read at once, as an array of characters: files of a mill
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,9 +15,9 @@ import numpy.typing as npt
 import trimesh
 from trimesh.exchange.obj import parse_mtl
 
-from rlacd.io.read.beside import PICTURES, FolderFiles
+from rlacd.io.read.beside import MAP, PICTURES, FolderFiles
 from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles, one_shape
-from rlacd.io.read.looks import BETWEEN, painted
+from rlacd.io.read.looks import BETWEEN, opened_picture, painted
 from rlacd.io.read.polygons import places_of
 from rlacd.io.read.text import check_text, numbers_in, plain_text, rows_of
 from rlacd.memory import BYTES_READ, require_memory
@@ -27,8 +28,8 @@ from rlacd.solid.topology import BoolArray, IntArray
 _UNREAD = {
     **dict.fromkeys((b"curv", b"curv2", b"surf", b"bzp", b"bsp", b"cdc", b"cdp"), "free-form curves and surfaces"),
     **dict.fromkeys((b"p", b"l"), "points and lines"),
+    b"call": "other files that it calls",
 }
-
 
 MOST_PARTS = 2_000
 """Materials of all objects; with more, looks are left out: writing takes a millisecond for each."""
@@ -177,12 +178,7 @@ def scene_of_obj(path: Path, content: bytes) -> trimesh.Scene:
     file = _File(path, content)
     names, owner = file.objects()
     called, paint = file.named(b"usemtl")
-    beside, paints = FolderFiles(path.parent, PICTURES), dict[str, Any]()
-    for library in file.libraries:
-        try:
-            paints |= parse_mtl(beside.get(library), resolver=beside)
-        except FileNotFoundError:
-            continue
+    paints = _paints(FolderFiles(path.parent, PICTURES), file.libraries)
     textures, directions = file.vectors(b"vt"), file.vectors(b"vn")
     scene, parts = trimesh.Scene(), list(_split(np.arange(len(owner)), owner * len(called) + paint))
     if len(parts) > MOST_PARTS:
@@ -193,11 +189,34 @@ def scene_of_obj(path: Path, content: bytes) -> trimesh.Scene:
         looks["NORMAL"] = directions, normals
         if file.colors is not None:
             looks["COLOR"] = file.colors, points
-        material = paints.get(called[pair % len(called)])
-        mesh = painted(looks, material and trimesh.visual.material.SimpleMaterial(**material))
+        mesh = painted(looks, paints.get(called[pair % len(called)]))
         name = f"{names[pair // len(called)] or path.stem}{BETWEEN}{called[pair % len(called)]}"
         scene.add_geometry(mesh, node_name=name, geom_name=name)
     return scene
+
+
+def _paints(beside: FolderFiles, libraries: Sequence[str]) -> dict[str, Any]:
+    """The materials of all libraries that are there, by name: colour, opacity, and a picture."""
+    found = {}
+    for library in libraries:
+        try:
+            named = parse_mtl(MAP.sub(rb"picture \1", beside.get(library)))
+        except FileNotFoundError:
+            missing = f"the materials {library!r:.100} were left out: they are not in the folder"
+            warnings.warn(missing, UserWarning, stacklevel=2)
+            continue
+        for name, said in named.items():
+            picture = opened_picture(beside, " ".join(said["picture"])) if "picture" in said else None
+            opacity = float(said["d"][-1]) if "d" in said else 1.0 - float(said.get("tr", [0.0])[-1])
+            found[name] = trimesh.visual.material.PBRMaterial(
+                name=name,
+                baseColorFactor=[*np.broadcast_to(said.get("diffuse", 0.4 if picture is None else 1.0), 3), opacity],
+                baseColorTexture=picture,
+                roughnessFactor=float((2.0 / (2.0 + max(said.get("glossiness", 1.0), 0.0))) ** 0.25),
+                metallicFactor=0.0,
+                alphaMode="BLEND" if opacity < 1.0 else None,
+            )
+    return found
 
 
 def _split(rows: IntArray, owner: IntArray) -> Iterator[tuple[int, npt.NDArray[np.int64]]]:

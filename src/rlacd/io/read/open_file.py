@@ -56,9 +56,7 @@ def _check(status: os.stat_result, path: str | os.PathLike[str], most: int) -> N
 
 CONVERTERS = {
     "blend": "export it from Blender (File > Export > glTF 2.0)",
-    "fbx": "import it into Blender and export it as glTF 2.0",
     **dict.fromkeys(("zip", "gz", "bz2", "xz", "zst", "7z", "rar", "tar", "tgz"), "unpack it, and give the mesh in it"),
-    **dict.fromkeys(("step", "stp", "iges", "igs"), "export it from a CAD program, such as FreeCAD, as stl or obj"),
     "xacro": "expand its macros with the tool xacro, and give the URDF",
     "urdf": "it describes a robot, which rlacd.rewrite_robot takes",
     "sdf": "robots are rewritten as .urdf and .xml (MJCF): give one of those, or a mesh",
@@ -75,6 +73,10 @@ def format_of(content: bytes) -> str | None:
     head = content[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith(b"glTF"):
         return "glb"
+    if head.startswith(b"Kaydara FBX Binary"):
+        return "fbx"
+    if head.startswith(b"ISO-10303-21;"):
+        return "step"
     if head.startswith(b"ply\n") or head.startswith(b"ply\r"):
         return "ply"
     if head.startswith(b"PK\x03\x04"):

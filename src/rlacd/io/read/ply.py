@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import re
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 
-from rlacd.io.read.beside import PICTURES
+from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.contents import Contents, one_shape
+from rlacd.io.read.looks import decoded
 from rlacd.io.read.polygons import strip_triangles, triangles_of
 from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, whole
-from rlacd.io.read.trimesh_scene import parsed
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset
@@ -188,7 +190,13 @@ def _header(path: Path, content: bytes) -> tuple[bytes, bool, int]:
 
 def scene_of_ply(path: Path, content: bytes) -> trimesh.Scene:
     """The same with all looks, as trimesh reads them."""
-    return parsed(path, content, "ply", PICTURES)
+    beside = FolderFiles(path.parent, PICTURES)
+    scene = trimesh.load_scene(io.BytesIO(content), "ply", resolver=beside, allow_remote=False, process=False)
+    for shape in scene.geometry.values():
+        material: Any = getattr(shape.visual, "material", None)
+        if getattr(material, "image", None) is not None:
+            material.image = decoded(material.image)
+    return scene
 
 
 def _elements(header: bytes, is_text: bool) -> dict[str, _Element]:

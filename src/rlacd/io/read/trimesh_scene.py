@@ -1,8 +1,7 @@
-"""Scenes and meshes of trimesh, from memory or parsed by it, as contents."""
+"""Scenes and meshes of trimesh, from memory or from what another process read, as contents."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,23 +10,11 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import MeshDataError
-from rlacd.io.read.beside import DATA, FolderFiles
-from rlacd.io.read.contents import Triangles, require_few
+from rlacd.io.read.contents import Contents, Triangles, require_few
+from rlacd.pool import Answer
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.input_mesh import SourceNode
+from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
-
-
-def parsed(path: Path, content: bytes, extension: str, endings: frozenset[str] = DATA, **options: Any) -> trimesh.Scene:
-    """Parse a file by trimesh; only files beside it with these endings are opened, and nothing is fetched."""
-    return trimesh.load_scene(
-        io.BytesIO(content),
-        file_type=extension,
-        resolver=FolderFiles(path.parent, endings),
-        allow_remote=False,
-        process=False,
-        **options,
-    )
 
 
 def geometry_of(source: Any, name: str) -> list[tuple[SourceNode, Triangles]]:
@@ -80,3 +67,32 @@ def arrays_of(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
         raise MeshDataError(f"faces are {f.dtype}, not integers: give indices into the vertices, counted from 0")
     f = f.astype(np.int64)
     return v, (np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]) if f.shape[1] == 4 else f)
+
+
+def contents_of(answer: Answer, path: Path) -> Contents:
+    """What a reader in a process of its own tells of a file (`rlacd.io.read.apart.ToldNodes`)."""
+    scene = trimesh.Scene()
+    for index, node in enumerate(answer.values["nodes"]):
+        points = np.frombuffer(answer.blobs[f"{index}.points"]).reshape(-1, 3).copy()
+        faces = np.frombuffer(answer.blobs[f"{index}.faces"], dtype=np.int64).reshape(-1, 3).copy()
+        mesh = trimesh.Trimesh(points, faces, process=False)
+        if node["look"]:
+            mesh.visual = trimesh.visual.TextureVisuals(material=_material(node["look"]))
+        transform = np.reshape(node["transform"], (4, 4))
+        scene.add_geometry(mesh, node_name=node["name"], geom_name=node["name"], transform=transform)
+    kept = len(scene.geometry) > 1 or any(one.visual.defined for one in scene.geometry.values())
+    asset = Asset(scene, extension=path.suffix[1:].lower()) if kept else None
+    said = answer.values
+    return Contents(geometry_of(scene, path.name), said.get("warnings", ()), said["up"], said["metres"], asset)
+
+
+def _material(look: dict[str, list[float]]) -> Any:
+    """A material of trimesh; UsdPreviewSurface gives colours as glTF does, in linear light."""
+    opacity = look.get("opacity", [1.0])[0]
+    return trimesh.visual.material.PBRMaterial(
+        baseColorFactor=np.clip([*look.get("diffuseColor", [0.18] * 3), opacity], 0.0, 1.0),
+        metallicFactor=float(np.clip(look.get("metallic", [0.0])[0], 0.0, 1.0)),
+        roughnessFactor=float(np.clip(look.get("roughness", [0.5])[0], 0.0, 1.0)),
+        emissiveFactor=np.clip(look.get("emissiveColor", [0.0] * 3), 0.0, 1.0),
+        alphaMode="BLEND" if opacity < 1.0 else "OPAQUE",
+    )

@@ -15,7 +15,8 @@ import trimesh
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES
+from rlacd.io.read.apart import ToldNodes
+from rlacd.io.read.contents import Triangles
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Shared, Values
@@ -51,13 +52,8 @@ def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
     check_files(path)
     stage = Usd.Stage.Open(str(path))
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
-    nodes: list[Values] = []
-    arrays: dict[str, bytes] = {}
-    names: set[str] = set()
-    count = 0
+    nodes = ToldNodes(path)
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
-        if len(nodes) > MOST_PLACES:
-            raise MeshFileError(f"{path} places more than {MOST_PLACES} meshes: join them first")
         if prim.IsA(UsdGeom.PointInstancer):
             raise MeshFileError(
                 f"{path} has a point instancer, which rlacd does not read: convert its instances to meshes first"
@@ -66,17 +62,11 @@ def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
             continue
         if not prim.IsA(UsdGeom.Mesh) and str(prim.GetTypeName()) not in PRIMITIVES:
             continue
-        points, faces = prim_geometry(path, prim)
-        count += len(faces)
-        if count > MOST_TRIANGLES:
-            raise MeshFileError(f"{path} places more than {MOST_TRIANGLES} triangles: simplify it first")
-        arrays |= {f"{len(nodes)}.points": points.tobytes(), f"{len(nodes)}.faces": faces.tobytes()}
-        name = prim.GetName() if prim.GetName() not in names else str(prim.GetPath())
-        names.add(name)
         to_world = np.array(cache.GetLocalToWorldTransform(prim), dtype=np.float64).T
-        nodes.append({"name": name, "transform": to_world.ravel().tolist(), "look": _look(prim)})
+        names = prim.GetName(), str(prim.GetPath())
+        nodes.add(names, to_world, _look(prim), Triangles(*prim_geometry(path, prim)))
     up = str(UsdGeom.GetStageUpAxis(stage)).lower()
-    return {"nodes": nodes, "up": up, "metres": float(UsdGeom.GetStageMetersPerUnit(stage))}, arrays
+    return {"nodes": nodes.values, "up": up, "metres": float(UsdGeom.GetStageMetersPerUnit(stage))}, nodes.blobs
 
 
 def _look(prim: Any) -> dict[str, list[float]] | None:

@@ -1,0 +1,70 @@
+"""Stdin and stdout, named ``-``, as files: what reads and writes meshes needs names."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from rlacd.cli.exit_codes import give
+from rlacd.errors import MeshFileError, OptionError
+
+STDIO = "-"
+
+
+@contextlib.contextmanager
+def stdin_as_file(mesh: Path, ending: str | None) -> Iterator[Path]:
+    """The mesh, or a file with what stdin holds, for as long as it is needed.
+
+    Parameters
+    ----------
+    mesh : Path
+        ``-`` for stdin.
+    ending : str, optional
+        The format of stdin; told from its content if it is not given.
+    """
+    if str(mesh) != STDIO:
+        if ending is not None:
+            raise OptionError(f"--from is the format of a mesh on stdin, not of {mesh}: give - as IN, or leave it out.")
+        yield mesh
+        return
+    from rlacd.io.read.open_file import LARGEST_FILE, format_of
+
+    content = b"" if sys.stdin is None else sys.stdin.buffer.read(LARGEST_FILE + 1)  # one more is refused as too large
+    ending = (ending or format_of(content) or "").lower().removeprefix(".")
+    if ending in ("urdf", "xml"):
+        raise OptionError("a robot refers to files beside it, so it is not read from stdin: give the name of its file.")
+    if not ending.isalnum():
+        raise OptionError("what stdin holds cannot be told from its content: add --from obj, or what it is.")
+    with TemporaryDirectory(prefix="rlacd-") as folder:
+        place = Path(folder) / f"stdin.{ending}"
+        place.write_bytes(content)
+        try:
+            yield place
+        except MeshFileError as error:
+            raise MeshFileError(str(error).replace(str(place), "stdin")) from error
+
+
+def stdout_name(output: str, file_format: str | None) -> str:
+    """The name of a file for what stdout is to get; any other output's own."""
+    from rlacd.io.write.target import FOLDER_FORMAT, MODELS, WITH_MESHES
+
+    if output != STDIO:
+        return output
+    if file_format in WITH_MESHES:
+        raise OptionError(f"{file_format} is several files, which do not fit into stdout: give -o a file name.")
+    return f"hulls.{MODELS[file_format][0] if file_format in MODELS else file_format or FOLDER_FORMAT}"
+
+
+@contextlib.contextmanager
+def file_for(output: str, file_format: str | None) -> Iterator[str]:
+    """The output, or a file whose content goes to stdout in the end."""
+    if output != STDIO:
+        yield output
+        return
+    with TemporaryDirectory(prefix="rlacd-") as folder:
+        place = Path(folder) / stdout_name(output, file_format)
+        yield str(place)
+        give(place.read_bytes())
