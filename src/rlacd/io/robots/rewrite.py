@@ -84,6 +84,7 @@ def rewrite_robot(
     output: str | os.PathLike[str],
     *,
     package_dirs: Sequence[str] = (),
+    keep_input: bool = False,
     **options: Any,
 ) -> Rewritten:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
@@ -99,6 +100,8 @@ def rewrite_robot(
         USD stage it is a layer over the original, which it refers to, and holds the hulls.
     package_dirs : sequence of str
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and is searched for packages.
+    keep_input : bool
+        Of a USD stage, write one file that holds all of it, instead of a layer over the original.
     **options
         Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_abs` are in the robot's unit, after the
         scale of a mesh; a `timeout` applies to each mesh.
@@ -118,7 +121,10 @@ def rewrite_robot(
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     if source.suffix.lower() in usd.ENDINGS:
-        return _rewrite_stage(source, place, options)
+        check_stage(source, place)
+        return rewrite_stage(usd.read_colliders(source), place, options, keep_input=keep_input)
+    if keep_input:
+        raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
     packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
     check_rewrite(source, place)
     kind, root = _parsed(source)
@@ -152,17 +158,19 @@ def rewrite_robot(
     return Rewritten(place, folder, list(meshes.values()), warnings)
 
 
-def _rewrite_stage(source: Path, place: Path, options: Mapping[str, Any]) -> Rewritten:
-    """Write a layer over a USD stage."""
-    check_stage(source, place)
+def rewrite_stage(
+    stage: usd.Colliders, place: Path, options: Mapping[str, Any], *, keep_input: bool = False
+) -> Rewritten:
+    """Rewrite a USD stage that has been read, as `rewrite_robot` does."""
+    check_stage(stage.source, place)
     _check_options(options)
-    data, done, warnings = usd.rewrite_stage(source, place, lambda mesh: _coarse(mesh, options))
+    data, done, warnings = usd.encode_layer(stage, place, lambda mesh: _coarse(mesh, options), flat=keep_input)
     meshes = [
         RewrittenMesh(Path(path), [f"hull_{i:03d}" for i in range(count)], result)
         for path, (result, count) in done.items()
     ]
     if not meshes:
-        warnings.append(f"{source} has no mesh that collides, so the layer changes nothing.")
+        warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
     return Rewritten(place, place, meshes, warnings)
 

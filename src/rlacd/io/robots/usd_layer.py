@@ -15,11 +15,19 @@ from rlacd.io.read.usd_stage import check_files, prim_geometry
 from rlacd.io.write.usd import mesh_prim, stage_bytes
 from rlacd.pool import Blobs, Shared, Values
 
-OF_THE_MESH = re.compile(r"(Mass|RigidBody|MeshCollision|ConvexHull|ConvexDecomposition|SDFMesh|TriangleMesh|Binding)")
-"""Schemas that say how a mesh itself collides, moves and looks; the others go to its hulls too."""
+OF_THE_MESH = re.compile(
+    r"(Mass|RigidBody|MeshCollision|ConvexHull|ConvexDecomposition|SDFMesh|TriangleMesh|SkelBinding)"
+)
+"""Schemas that say how a mesh itself collides and moves; the others go to its hulls too."""
 
 OF_COLLISIONS = re.compile(r"(physics|physx\w*|newton|mjc):|material:binding:physics$|material:binding$")
 """Properties that go from a mesh to its hulls."""
+
+TO_COLLIDERS = re.compile(r"collection:.*:(in|ex)cludes$|physics:filteredPairs$|physxContactReport:reportPairs$")
+"""Relationships that name colliders, any number of them: they name the hulls too."""
+
+TO_FRAMES = re.compile(r"physics:body[01]$")
+"""Relationships that name where something is, which a mesh still says."""
 
 
 class StageRewriter:
@@ -29,7 +37,8 @@ class StageRewriter:
         os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there
 
     def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each."""
+        """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each: over the
+        stage as ``sublayer``, or all in one for a ``folder``."""
         from pxr import Tf
 
         path = Path(values["path"])
@@ -54,10 +63,16 @@ def _answer(path: Path, values: Values, blobs: Blobs) -> tuple[Values, dict[str,
     if "counts" in values:
         for body in {body.GetPath(): body for prim in colliders if (body := _body(prim))}.values():
             _fix_mass(path, body)
+        hulls = {}
         for index, (prim, count) in enumerate(zip(colliders, values["counts"], strict=True)):
-            _replace(stage, prim, [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)])
-        layer.subLayerPaths = [f"./{values['sublayer']}"]
-        return {}, {"layer": stage_bytes(layer, values["ending"])}
+            arrays = [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)]
+            hulls[prim.GetPath()] = _replace(stage, prim, arrays)
+        left = _retarget(stage, hulls)
+        if values["sublayer"] is None:
+            layer = _flat(stage, values["folder"])
+        else:
+            layer.subLayerPaths = [f"./{values['sublayer']}"]
+        return {"warnings": left}, {"layer": stage_bytes(layer, values["ending"])}
     nodes: list[Values] = []
     arrays: dict[str, bytes] = {}
     for index, prim in enumerate(colliders):
@@ -141,8 +156,36 @@ def _fix_mass(path: Path, body: Any) -> None:
     api.CreatePrincipalAxesAttr(axes)
 
 
-def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> None:
-    """Put hulls beside a mesh, or below it if it is a rigid body, and let it no longer collide."""
+def _flat(stage: Any, folder: str) -> Any:
+    """All layers of the stage as one, which names pictures and other files from the folder it will be in."""
+    from pxr import UsdUtils
+
+    layer = stage.Flatten(addSourceFileComment=False)
+
+    def relative(named: str) -> str:
+        return Path(os.path.relpath(named, folder)).as_posix() if os.path.isabs(named) else named
+
+    UsdUtils.ModifyAssetPaths(layer, relative)
+    return layer
+
+
+def _retarget(stage: Any, hulls: Mapping[Any, list[Any]]) -> list[str]:
+    """Let what names a mesh as a collider name its hulls too; returns warnings about what else names it."""
+    left = []
+    for prim in stage.Traverse():
+        for link in prim.GetAuthoredRelationships():
+            named = [path for path in link.GetTargets() if path in hulls]
+            if named and TO_COLLIDERS.match(link.GetName()):
+                for path in named:
+                    for hull in hulls[path]:
+                        link.AddTarget(hull)
+            elif named and OF_COLLISIONS.match(link.GetName()) and not TO_FRAMES.match(link.GetName()):
+                left.append(f"{link.GetPath()} names {named[0]}, which no longer collides: its hulls do.")
+    return left
+
+
+def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[Any]:
+    """Put hulls beside a mesh, or below it if it is a rigid body, and let it no longer collide; returns their paths."""
     from pxr import UsdGeom, UsdPhysics
 
     inside = prim.HasAPI(UsdPhysics.RigidBodyAPI)
@@ -172,3 +215,4 @@ def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> None:
             ):
                 each.FlattenTo(hull)
     UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)
+    return [hull.GetPath() for hull in group.GetPrim().GetChildren()]
