@@ -5,6 +5,7 @@ Engines that are not in the project's own environment are asked by ``make engine
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -120,8 +121,8 @@ def in_newton(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fal
     for _ in range(round(SECONDS / STEP)):
         solver.step(now, then, control, None, STEP)
         now, then = then, now
-    hulls = [source for source, kind in zip(builder.shape_source, builder.shape_type, strict=True) if source]
-    assert kind == newton.GeoType.CONVEX_MESH
+    kinds = zip(builder.shape_source, builder.shape_type, strict=True)
+    hulls = [source for source, kind in kinds if kind == newton.GeoType.CONVEX_MESH]
     corners = [min(len(hull.vertices), hull.maxhullvert) for hull in hulls]
     height, speed = now.body_q.numpy()[0][2], np.abs(now.body_qd.numpy()).max()
     return Fallen(builder.body_mass[body], corners, height, speed)
@@ -145,10 +146,53 @@ def test_a_body_gets_hulls_keeps_its_mass_falls_and_rests(engine: Callable[..., 
             engine(result, result, options)
 
 
-def in_newtons_builder(mesh: trimesh.Trimesh, folder: Path) -> int:
+def newton_takes(mesh: trimesh.Trimesh, folder: Path) -> list[Any]:
     newton = pytest.importorskip("newton", reason="newton is not installed (make engines)")
     builder = newton.ModelBuilder()
-    body = builder.add_body()
-    builder.add_shape_mesh(body, mesh=newton.Mesh(mesh.vertices, mesh.faces.ravel()))
-    builder.approximate_meshes("coacd", cache_dir=str(folder))
-    return len(builder.shape_type)
+    builder.add_shape_mesh(builder.add_body(), mesh=newton.Mesh(mesh.vertices, mesh.faces.ravel()))
+    builder.approximate_meshes("coacd")
+    return [shape.vertices for shape in builder.shape_source]
+
+
+def genesis_takes(mesh: trimesh.Trimesh, folder: Path) -> list[Any]:
+    genesis = pytest.importorskip("genesis", reason="genesis is not installed (make engines)")
+    from genesis.options import CoacdOptions
+    from genesis.utils.mesh import convex_decompose
+
+    genesis.init(backend=genesis.cpu, logging_level="error")
+
+    return [hull.vertices for hull in convex_decompose(mesh, CoacdOptions())]
+
+
+def obj2mjcf_takes(mesh: trimesh.Trimesh, folder: Path) -> list[Any]:
+    command = pytest.importorskip("obj2mjcf.cli", reason="obj2mjcf is not installed (make engines)")
+    mesh.export(folder / "table.obj")
+    command.process_obj(folder / "table.obj", command.Args(str(folder), decompose=True, save_mjcf=True, overwrite=True))
+    return [trimesh.load_mesh(file).vertices for file in sorted((folder / "table").glob("*_collision_*.obj"))]
+
+
+def scikit_robot_takes(mesh: trimesh.Trimesh, folder: Path) -> list[Any]:
+    module = pytest.importorskip("skrobot.utils.convex_decomposition", reason="scikit-robot is not installed")
+    return [hull.vertices for hull in module.convex_decomposition(mesh)]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("takes", [newton_takes, genesis_takes, obj2mjcf_takes, scikit_robot_takes])
+def test_what_calls_coacd_takes_hulls_of_rlacd_in_its_place(
+    takes: Callable[..., list[Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls, original = [], coacd.run_coacd
+
+    @functools.wraps(original)
+    def run_coacd(*args: Any, **kwargs: Any) -> Any:
+        calls.append(original(*args, **kwargs))
+        return calls[-1]
+
+    monkeypatch.setattr(coacd, "run_coacd", run_coacd)
+    monkeypatch.setitem(sys.modules, "coacd", coacd)
+    monkeypatch.setenv("GS_CACHE_FILE_PATH", str(tmp_path))  # Genesis keeps hulls for later runs
+    found = takes(table(), tmp_path)
+    (ours,) = calls
+    assert len(found) == len(ours) > 1
+    for points, (vertices, _) in zip(found, ours, strict=True):
+        assert np.sort(points, axis=0) == pytest.approx(np.sort(vertices, axis=0), abs=1e-6)

@@ -138,13 +138,11 @@ def _rewrite(stage: Any, robot: Path, wanted: OutputOptions, options: dict[str, 
 
 def _stage(mesh: Path, wanted: OutputOptions) -> Any:
     """The colliding meshes of a USD stage that is to become another; None if there are none."""
-    endings = (".usd", ".usda", ".usdc")
-    if not {mesh.suffix.lower(), Path(str(wanted.output)).suffix.lower()} <= set(endings):
+    if Path(str(wanted.output)).suffix.lower() not in (".usd", ".usda", ".usdc"):
         return None
-    from rlacd.io.robots.usd import read_colliders
+    from rlacd.io.robots.usd import colliders_of
 
-    found = read_colliders(mesh)
-    return found if found.nodes else None
+    return colliders_of(mesh)
 
 
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:

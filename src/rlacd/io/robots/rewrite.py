@@ -164,7 +164,8 @@ def rewrite_stage(
     """Rewrite a USD stage that has been read, as `rewrite_robot` does."""
     check_stage(stage.source, place)
     _check_options(options)
-    data, done, warnings = usd.encode_layer(stage, place, lambda mesh: _coarse(mesh, options), flat=keep_input)
+    data, done, warnings, files = usd.encode_layer(stage, place, lambda mesh: _coarse(mesh, options), flat=keep_input)
+    warnings += _left_behind(files, stage.source.parent, place)
     meshes = [
         RewrittenMesh(Path(path), [f"hull_{i:03d}" for i in range(count)], result)
         for path, (result, count) in done.items()
@@ -228,14 +229,17 @@ def _plan(root: Element, kind: str, references: References, place: Path, folder:
         within = os.path.relpath(source / compiler.mesh_folder, source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
         plan = plan_mjcf(compiler, references, lambda _, hull: (Path(target) / hull).as_posix())
-    warnings = list(plan.warnings)
-    if plan.relative and os.path.realpath(place.absolute().parent) != os.path.realpath(source):
-        warnings.append(
-            f"{len(plan.relative)} other files, such as {plan.relative[0]}, are referred to relative to "
-            f"{source} and will not be found from {place.absolute().parent}: write the result "
-            "beside the input, or copy them too."
-        )
-    return plan, warnings
+    return plan, [*plan.warnings, *_left_behind(plan.relative, source, place)]
+
+
+def _left_behind(files: Sequence[str], source: Path, place: Path) -> list[str]:
+    """Warn about other files that are named relative to a folder which the result does not lie in."""
+    if not files or os.path.realpath(place.absolute().parent) == os.path.realpath(source):
+        return []
+    return [
+        f"{len(files)} other files, such as {files[0]}, are referred to relative to {source} and will not be found "
+        f"from {place.absolute().parent}: write the result beside the input, or copy them too."
+    ]
 
 
 def _reference(old: str, hull: str, references: References, folder: Path) -> str:

@@ -59,9 +59,15 @@ def read_colliders(stage: Path) -> Colliders:
     return Colliders(stage, answer.values["nodes"], answer.blobs, answer.values["warnings"])
 
 
+def colliders_of(mesh: Path) -> Colliders | None:
+    """Find them as `read_colliders` does; None if the file is no stage, or nothing of it collides."""
+    found = read_colliders(mesh) if mesh.suffix.lower() in ENDINGS else None
+    return found if found is not None and found.nodes else None
+
+
 def encode_layer(
     stage: Colliders, place: Path, decomposed: Callable[[trimesh.Trimesh], Decomposition], *, flat: bool
-) -> tuple[bytes, dict[str, tuple[Decomposition, int]], list[str]]:
+) -> tuple[bytes, dict[str, tuple[Decomposition, int]], list[str], list[str]]:
     """Decompose the meshes that collide, each once at its scale.
 
     Parameters
@@ -72,12 +78,13 @@ def encode_layer(
     decomposed : callable
         Decomposes a mesh, in the stage's unit.
     flat : bool
-        Whether to write the whole stage as one layer, instead of one over the original.
+        Whether to write the whole stage as one layer, instead of one over the original; it names pictures and other
+        files as before, relative to the folder of the original.
 
     Returns
     -------
-    tuple of (bytes, dict, list of str)
-        The layer, the result and the number of hulls of each prim, and warnings.
+    tuple of (bytes, dict, list of str, list of str)
+        The layer, the result and the number of hulls of each prim, warnings, and the other files that `flat` names.
     """
     blobs, warnings = stage.blobs, list(stage.warnings)
     results: dict[tuple[bytes, bytes, tuple[float, ...]], Decomposition] = {}
@@ -96,13 +103,12 @@ def encode_layer(
             hulls[f"{index}.{number}.points"] = ((mesh.vertices + shift) / scale).astype("<f4").tobytes()
             hulls[f"{index}.{number}.faces"] = np.asarray(mesh.faces, dtype="<i4").tobytes()
         done[node["path"]] = results[key], len(results[key])
-    folder = place.absolute().parent
     asked = {
         "path": str(stage.source),
-        "sublayer": None if flat else Path(os.path.relpath(stage.source, folder)).as_posix(),
-        "folder": str(folder),
+        "sublayer": None if flat else Path(os.path.relpath(stage.source, place.absolute().parent)).as_posix(),
         "ending": place.suffix.lower().lstrip("."),
+        "masses": {path: result.report.get("mass") for path, (result, _) in done.items()},
         "counts": [count for _, count in done.values()],
     }
     answer = answer_of(SERVER, stage.source, "USD", asked, hulls)
-    return answer.blobs["layer"], done, warnings + answer.values["warnings"]
+    return answer.blobs["layer"], done, warnings + answer.values["warnings"], answer.values["files"]
