@@ -65,8 +65,8 @@ def _answer(path: Path, values: Values, blobs: Blobs) -> tuple[Values, dict[str,
             _fix_mass(path, body, values["masses"])
         hulls = {}
         for index, (prim, count) in enumerate(zip(colliders, values["counts"], strict=True)):
-            arrays = [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)]
-            hulls[prim.GetPath()] = _replace(stage, prim, arrays)
+            shapes = [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)]
+            hulls[prim.GetPath()] = _replace(stage, prim, shapes)
         left = _retarget(stage, hulls)
         files: list[str] = []
         if values["sublayer"] is None:
