@@ -85,12 +85,21 @@ nightly: test-all sanitize soak
 # Physics engines, from the registries, to hold hulls and files against: 12 GB, most of it PyTorch for Genesis.
 engines: $(VENV)/test-extras build/engines/installed
 	$(BIN)/pytest -m nightly tests/engines
+	build/engines/bin/python -m pytest -p no:cacheprovider tests/engines/test_in_code.py
 
-build/engines/installed: tests/engines/requirements.txt tests/engines/package.json
+build/engines/packages: tests/engines/requirements.txt tests/engines/package.json
 	test -x build/engines/bin/python || $(PYTHON) -m venv build/engines
 	build/engines/bin/pip install --quiet --requirement tests/engines/requirements.txt
+	test -x build/engines/usd/bin/python || $(PYTHON) -m venv build/engines/usd
+	build/engines/usd/bin/pip install --quiet urdf-usd-converter==0.3.4 example-robot-data==6.0.0
 	cp tests/engines/package.json build/engines
 	npm install --no-audit --no-fund --prefix build/engines
+	touch $@
+
+# This package beside them, for programs that use both.
+build/engines/installed: build/engines/packages $(NATIVE_SOURCES)
+	build/engines/bin/pip install --quiet --no-build-isolation --editable . \
+	  --config-settings=build-dir=build/engines/native
 	touch $@
 
 # The native tests and a cross-section of $$RLACD_MESHES, decomposed in every way, watched by sanitizers.

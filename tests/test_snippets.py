@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import sys
 from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
@@ -16,6 +17,7 @@ import typer
 
 import rlacd
 from rlacd.cli.main import app
+from rlacd.compat import coacd
 from rlacd.view import viewer
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -29,8 +31,9 @@ PAGES_OF_TEXT = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PAGES = {
     str(page.relative_to(ROOT)): found
     for page in PAGES_OF_TEXT
-    if (found := SNIPPET.findall(page.read_text(encoding="utf-8")))
+    if page.name != "simulators.md" and (found := SNIPPET.findall(page.read_text(encoding="utf-8")))
 }
+"""But for the recipes for simulators: tests/engines/test_recipes.py."""
 
 COMMAND = re.compile(r"^ *(?:rlacd|python -m) ([a-z].*)$", re.MULTILINE)
 COMMANDS = sorted(
@@ -46,7 +49,7 @@ COMMANDS = sorted(
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with the files that pages name; nothing waits for Ctrl-C, or changes trimesh for later tests."""
+    """A folder with the files that pages name; nothing waits for Ctrl-C, or changes other packages for later tests."""
     post = trimesh.creation.box((1, 1, 3))
     seat = trimesh.creation.box((3, 1, 1), trimesh.transformations.translation_matrix((1, 0, -1)))
     ell = trimesh.boolean.union([post, seat])
@@ -58,6 +61,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(viewer.ViewServer, "wait", lambda self: None)
+    monkeypatch.setitem(sys.modules, "coacd", coacd)
     monkeypatch.setattr(trimesh.decomposition, "convex_decomposition", trimesh.decomposition.convex_decomposition)
     return tmp_path
 

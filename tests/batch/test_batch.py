@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -159,6 +160,7 @@ def test_no_name_stops_a_batch_and_no_file_of_others_is_replaced(tmp_path: Path)
 
 URDF = """<robot name="r"><link name="l"><collision><geometry><mesh filename="meshes/l.obj"/></geometry></collision>
 </link></robot>"""
+WEIGHT = "<inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial>"
 MJCF = """<mujoco><asset><mesh name="m" file="meshes/l.obj"/></asset>
 <worldbody><body><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
 
@@ -184,6 +186,50 @@ def test_robots_are_worked_on_like_meshes_and_other_xml_is_passed_over(tmp_path:
     changed = batch(assets, "-o", out, "--glob", "r.*", "--jobs", 1, "--quality", "fast")
     assert "2 of 2 meshes are done" in changed.stderr
     assert rows(out)["r.urdf"]["parts"] > 1, "done again when a mesh has changed"
+
+
+def test_a_folder_of_robots_with_their_meshes_beside_them_takes_one_command(tmp_path: Path) -> None:
+    """As PartNet-Mobility has them: a folder for each, whose URDF names meshes; two robots share one."""
+    pybullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    assets, out = tmp_path / "in", tmp_path / "out"
+    mesh = "<geometry><mesh filename='{}'/></geometry>"
+    for name, shared in (("148", "../shared.obj"), ("152", "objs/seat.obj"), ("153", "../shared.obj")):
+        write_ell(assets / name / "objs" / "seat.obj")
+        box(assets / name / "objs" / "look.obj")
+        link = f"<visual>{mesh.format('objs/look.obj')}</visual><collision>{mesh.format(shared)}</collision>"
+        (assets / name / "mobility.urdf").write_text(f"<robot name='r'><link name='l'>{WEIGHT}{link}</link></robot>")
+    write_ell(assets / "shared.obj")
+    run = batch(assets, "-o", out, "--glob", "*.urdf", "--jobs", 1, "--quality", "fast")
+    assert run.exit_code == 0, run.output
+    told = rows(out)
+    assert set(told) == {f"{name}/mobility.urdf" for name in ("148", "152", "153")}
+    shutil.copytree(
+        assets,
+        out,
+        ignore=lambda folder, names: [name for name in names if name == "mobility.urdf"],
+        dirs_exist_ok=True,
+    )
+    pybullet.connect(pybullet.DIRECT)
+    for name, row in told.items():
+        assert ["objs/look.obj" in warning for warning in row["warnings"]] == [True]
+        body = pybullet.loadURDF(str(out / name))
+        assert len(pybullet.getCollisionShapeData(body, -1)) == row["parts"] > 1
+        assert len(pybullet.getVisualShapeData(body)) == 1
+    pybullet.disconnect()
+
+
+def test_a_stage_that_collides_becomes_a_stage_with_hulls(tmp_path: Path) -> None:
+    pytest.importorskip("pxr", reason="the extra usd is not installed")
+    from tests.io.test_robots_usd import Usd, colliders, write_stage
+
+    (tmp_path / "in").mkdir()
+    write_stage(tmp_path / "in" / "r.usda")
+    run = batch(tmp_path / "in", "-o", tmp_path / "out", "--format", "usd", "--jobs", 1, "--quality", "fast")
+    assert run.exit_code == 0, run.output
+    (tmp_path / "in" / "r.usda").unlink()
+    stage = Usd.Stage.Open(str(tmp_path / "out" / "r.usd"))
+    assert stage.GetPrimAtPath("/robot/table")
+    assert len(colliders(stage)) == rows(tmp_path / "out")["r.usda"]["parts"] > 1
 
 
 def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> None:

@@ -84,11 +84,18 @@ class Engine:
             if shutil.which("node") is None or not (FOLDER / "node_modules" / self.package).is_dir():
                 pytest.skip(f"{self.package} is not installed (make build/engines)")
             return ["node", str(HERE / name), *arguments]
-        python = sys.executable if find_spec(self.package) else str(FOLDER / "bin" / "python")
-        finds = f"import importlib.util as u, sys; sys.exit(u.find_spec({self.package!r}) is None)"
-        if not Path(python).is_file() or subprocess.run([python, "-c", finds], check=False).returncode:
-            pytest.skip(f"{self.package} is not installed (make build/engines)")
-        return [python, str(HERE / name), *arguments]
+        return [python_with(self.package), str(HERE / name), *arguments]
+
+
+def python_with(*packages: str) -> str:
+    """The Python that has packages: the project's own, or that of the engines; skips the test where neither has."""
+    if all(find_spec(package) for package in packages):
+        return sys.executable
+    python = str(FOLDER / "bin" / "python")
+    finds = f"import importlib.util as u, sys; sys.exit(not all(map(u.find_spec, {packages!r})))"
+    if not Path(python).is_file() or subprocess.run([python, "-c", finds], check=False).returncode:
+        pytest.skip(f"{packages[0]} is not installed (make build/engines)")
+    return python
 
 
 ENGINES = {

@@ -284,6 +284,7 @@ def test_the_input_is_seen_and_hulls_collide(tmp_path: Path, wooden: Decompositi
         assert len(root.findall(".//visual")) == 1
         assert len(root.findall(".//collision")) == len(wooden)
     assert len(root.findall(".//collision//{http://drake.mit.edu}declare_convex")) == len(wooden)
+    assert len(root.findall(".//collision//mesh[@optimization='convex_hull']")) == len(wooden)
 
 
 def test_far_from_the_origin_a_model_keeps_the_shape_and_the_place(tmp_path: Path) -> None:

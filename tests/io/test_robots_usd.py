@@ -16,14 +16,15 @@ from rlacd.errors import MeshFileError, OptionError
 from tests.models import TABLE_VOLUME, table
 
 pytest.importorskip("pxr", reason="the extra usd is not installed")
-from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdValidation, Vt
 
 SCALE = (100.0, 200.0, 100.0)
 
 
 def add_table(stage: Any, path: str) -> Any:
-    """A table that collides, moved and stretched unequally."""
+    """A table that collides and lacks a triangle, moved and stretched unequally."""
     shape, mesh = table(), UsdGeom.Mesh.Define(stage, path)
+    shape.update_faces(np.arange(len(shape.faces)) > 0)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.array(shape.vertices, dtype=np.float32)))
     mesh.CreateFaceVertexCountsAttr([3] * len(shape.faces))
     mesh.CreateFaceVertexIndicesAttr(shape.faces.ravel().tolist())
@@ -88,11 +89,61 @@ def test_hulls_lie_where_the_mesh_lay_and_nothing_else_changes(tmp_path: Path, b
     assert mass == pytest.approx(TABLE_VOLUME * np.prod(SCALE) * 0.01**3 * 1000, rel=1e-5)
 
 
+@pytest.mark.parametrize("keep_input", [False, True])
+def test_what_names_a_mesh_as_a_collider_names_its_hulls_and_the_rest_gives_a_warning(
+    tmp_path: Path, keep_input: bool
+) -> None:
+    stage = Usd.Stage.Open(str(write_stage(tmp_path / "in.usda")))
+    wall = UsdGeom.Cube.Define(stage, "/robot/wall").GetPrim()
+    UsdPhysics.CollisionAPI.Apply(wall)
+    pairs = UsdPhysics.FilteredPairsAPI.Apply(wall)
+    pairs.CreateFilteredPairsRel().AddTarget("/robot/table")
+    group = UsdPhysics.CollisionGroup.Define(stage, "/robot/group")
+    group.GetCollidersCollectionAPI().IncludePath("/robot/table")
+    rubber = UsdShade.Material.Define(stage, "/robot/rubber")
+    UsdPhysics.MaterialAPI.Apply(rubber.GetPrim()).CreateDynamicFrictionAttr(0.9)
+    table = stage.GetPrimAtPath("/robot/table")
+    UsdShade.MaterialBindingAPI.Apply(table).Bind(rubber, UsdShade.Tokens.weakerThanDescendants, "physics")
+    wall.CreateRelationship("mjc:target").AddTarget("/robot/table")
+    (tmp_path / "grey.png").write_bytes(b"")
+    wall.CreateAttribute("picture", Sdf.ValueTypeNames.Asset).Set("./grey.png")
+    stage.Save()
+    (tmp_path / "new").mkdir()
+    done = rlacd.rewrite_robot(
+        tmp_path / "in.usda", tmp_path / "new" / "out.usda", threads=1, quality="fast", keep_input=keep_input
+    )
+    assert len(done.warnings) == 1 + keep_input
+    assert "mjc:target" in done.warnings[0]
+    assert "grey.png" in done.warnings[-1] or not keep_input
+    if keep_input:
+        (tmp_path / "in.usda").unlink()
+    stage = Usd.Stage.Open(str(done.path))
+    hulls = [prim for prim in colliders(stage) if prim.GetName() != "wall"]
+    paths = {hull.GetPath() for hull in hulls}
+    assert len(paths) == len(done.meshes[0].files)
+    named = UsdPhysics.FilteredPairsAPI(stage.GetPrimAtPath("/robot/wall")).GetFilteredPairsRel().GetTargets()
+    assert paths < set(named)
+    members = UsdPhysics.CollisionGroup(stage.GetPrimAtPath("/robot/group")).GetCollidersCollectionAPI()
+    assert all(members.ComputeMembershipQuery().IsPathIncluded(path) for path in paths)
+    for hull in hulls:
+        bound, _ = UsdShade.MaterialBindingAPI(hull).ComputeBoundMaterial("physics")
+        assert bound.GetPath() == "/robot/rubber"
+    picture = stage.GetPrimAtPath("/robot/wall").GetAttribute("picture").Get()
+    assert picture.path == "./grey.png"
+    assert Path(picture.resolvedPath) == tmp_path / "grey.png" or keep_input
+    assert str(tmp_path) not in done.path.read_text()
+    assert [said for said in findings(stage) if "grey.png" not in said] == []
+
+
+def findings(stage: Any) -> list[str]:
+    """What all validators of OpenUSD say."""
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    return [error.GetMessage() for error in UsdValidation.ValidationContext(validators).Validate(stage)]
+
+
 def test_the_validators_of_usd_find_nothing(tmp_path: Path) -> None:
     rlacd.rewrite_robot(write_stage(tmp_path / "in.usda"), tmp_path / "out.usda", threads=1, quality="fast")
-    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-    stage = Usd.Stage.Open(str(tmp_path / "out.usda"))
-    assert [error.GetMessage() for error in UsdValidation.ValidationContext(validators).Validate(stage)] == []
+    assert findings(Usd.Stage.Open(str(tmp_path / "out.usda"))) == []
 
 
 def test_instances_that_collide_are_opened_and_each_gets_the_hulls(tmp_path: Path) -> None:
@@ -112,10 +163,11 @@ def test_instances_that_collide_are_opened_and_each_gets_the_hulls(tmp_path: Pat
 
 def test_the_command_rewrites_a_stage_whose_meshes_collide(tmp_path: Path) -> None:
     source = write_stage(tmp_path / "in.usda")
-    given = ["decompose", str(source), "-o", str(tmp_path / "out.usda"), "--quality", "fast", "--threads", "1"]
-    done = CliRunner().invoke(app, given)
-    assert done.exit_code == 0, done.output
-    assert "@./in.usda@" in (tmp_path / "out.usda").read_text()
+    for flag in ([], ["--keep-input"]):
+        given = ["decompose", str(source), "-o", str(tmp_path / "out.usda"), "--quality", "fast", "--threads", "1"]
+        done = CliRunner().invoke(app, given + flag)
+        assert done.exit_code == 0, done.output
+        assert ("@./in.usda@" in (tmp_path / "out.usda").read_text()) == (not flag)
 
 
 def test_what_cannot_be_rewritten_is_refused(tmp_path: Path) -> None:

@@ -21,7 +21,8 @@ from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, Rla
 from rlacd.fit import LENGTHS, Fit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
-from rlacd.io.robots import is_robot, rewrite_robot
+from rlacd.io.robots import is_robot, rewrite_robot, usd
+from rlacd.io.robots.rewrite import rewrite_stage
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.process import peak_memory
 
@@ -59,8 +60,10 @@ def make(
         The mesh cannot be used, or its hulls cannot be written.
     """
     with TemporaryDirectory(dir=staging) as folder:
-        if is_robot(mesh):
-            facts = _robot(spec, mesh, Path(folder, f"{stem}{mesh.suffix}"), hull_only)
+        stage = usd.colliders_of(mesh) if spec.ending in usd.ENDINGS else None
+        if is_robot(mesh) or stage is not None:
+            ending = mesh.suffix if stage is None else spec.ending
+            facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)
             return facts, _files_in(Path(folder))
         result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
         place = f"{folder}/{stem}{spec.ending or '/'}"
@@ -79,10 +82,14 @@ def _files_in(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
 
-def _robot(spec: JobSpec, robot: Path, place: Path, hull_only: bool) -> dict[str, Any]:
-    """Rewrite a robot with hulls in place of its collision meshes; returns facts."""
+def _robot(spec: JobSpec, robot: Path | usd.Colliders, place: Path, hull_only: bool) -> dict[str, Any]:
+    """Rewrite a robot, or a stage as one file, with hulls in place of its collision meshes; returns facts."""
     options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.arguments()
-    done = rewrite_robot(robot, place, **options)
+    if isinstance(robot, Path):
+        done = rewrite_robot(robot, place, **options)
+    else:
+        done = rewrite_stage(robot, place, options, keep_input=True)
+        robot = robot.source
     here = {str(place.parent): "the results", str(robot.absolute().parent): "the robot's folder"}
     warnings = [STAND_IN] if hull_only else []
     for warning in done.warnings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -68,13 +69,14 @@ def _run(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> bool:
     if STDIO in (asked.report, asked.output):
         give("")  # before any work
     wanted = _named(mesh, asked, how.get("preset"))
-    robot = mesh.suffix.lower() in ROBOTS or _is_stage(mesh, wanted)
+    stage = _stage(mesh, wanted)
+    robot = mesh.suffix.lower() in ROBOTS or stage is not None
     _check_output(mesh, wanted)
     _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted)
     if wanted.balls is not None and how.get("criterion") != "navigable":
         raise OptionError("--balls needs --criterion navigable.")
     options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
-    run = _rewrite if robot else _write
+    run = partial(_rewrite, stage) if robot else _write
     return run(mesh, wanted, options, unit_given(how))
 
 
@@ -129,29 +131,31 @@ def is_html(path: str) -> bool:
     return Path(path).suffix.lower() in (".html", ".htm")
 
 
-def _rewrite(robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
-    """Replace the collision meshes of a robot; returns whether all are complete."""
+def _rewrite(stage: Any, robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
+    """Replace the collision meshes of a robot, or of a stage that has been read; returns whether all are complete."""
     from rlacd.cli.terminal import rewrite_summary, watching
-    from rlacd.io.robots import rewrite_robot
+    from rlacd.io.robots.rewrite import rewrite_robot, rewrite_stage
     from rlacd.plain_json import to_json
 
     with watching(quiet=bool(wanted.quiet)) as watch:
-        packages = wanted.package_dirs or ()
-        done = rewrite_robot(robot, str(wanted.output), package_dirs=packages, **options, progress=watch)
+        options, place, flat = {**options, "progress": watch}, str(wanted.output), bool(wanted.keep_input)
+        if stage is not None:
+            done = rewrite_stage(stage, Path(place), options, keep_input=flat)
+        else:
+            done = rewrite_robot(robot, place, package_dirs=wanted.package_dirs or (), keep_input=flat, **options)
     if not wanted.quiet:
         say(rewrite_summary(done, unit))
     _write_report(wanted, to_json({str(mesh.path): mesh.result.report for mesh in done.meshes}))
     return done.complete
 
 
-def _is_stage(mesh: Path, wanted: OutputOptions) -> bool:
-    """Tell whether a USD stage whose meshes collide is to become another."""
-    endings = (".usd", ".usda", ".usdc")
-    if not {mesh.suffix.lower(), Path(str(wanted.output)).suffix.lower()} <= set(endings):
-        return False
-    from rlacd.io.robots.usd import collides
+def _stage(mesh: Path, wanted: OutputOptions) -> Any:
+    """The colliding meshes of a USD stage that is to become another; None if there are none."""
+    if Path(str(wanted.output)).suffix.lower() not in (".usd", ".usda", ".usdc"):
+        return None
+    from rlacd.io.robots.usd import colliders_of
 
-    return collides(mesh)
+    return colliders_of(mesh)
 
 
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:
@@ -206,7 +210,7 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
         raise OptionError("a robot is several files, which do not fit into stdout: give -o a file name.")
     if wanted.report is not None and is_html(wanted.report):
         raise OptionError("--report as a page is for a single mesh; for a robot give a .json file.")
-    for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "keep_input", "scene"):
+    for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "scene"):
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")
             raise OptionError(f"--{spelled} is for a single mesh; leave it out for a robot.")

@@ -46,7 +46,7 @@ class OutputOptions:
         Mass of the whole body, instead of --density.
     keep_input
         In a .glb, the input's own scene with the hulls added under the nodes they belong to; always so with --format
-        unreal and godot.
+        unreal and godot. Of a USD stage with colliding meshes, one file that holds all of it, not a layer over it.
     scene
         In .xml (MJCF), add a floor and a light and place the body just above the floor, ready for MuJoCo's viewer.
     one_mesh

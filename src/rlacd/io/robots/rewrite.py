@@ -85,6 +85,7 @@ def rewrite_robot(
     output: str | os.PathLike[str],
     *,
     package_dirs: Sequence[str] = (),
+    keep_input: bool = False,
     **options: Any,
 ) -> Rewritten:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
@@ -100,6 +101,8 @@ def rewrite_robot(
         USD stage it is a layer over the original, which it refers to, and holds the hulls.
     package_dirs : sequence of str
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and is searched for packages.
+    keep_input : bool
+        Of a USD stage, write one file that holds all of it, instead of a layer over the original.
     **options
         Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_abs` are in the robot's unit, after the
         scale of a mesh; a `timeout` applies to each mesh.
@@ -119,7 +122,10 @@ def rewrite_robot(
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     if source.suffix.lower() in usd.ENDINGS:
-        return _rewrite_stage(source, place, options)
+        _check_place(source, place, usd.ENDINGS)
+        return rewrite_stage(usd.read_colliders(source), place, options, keep_input=keep_input)
+    if keep_input:
+        raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
     packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
     check_rewrite(source, place)
     kind, root = _parsed(source)
@@ -153,17 +159,20 @@ def rewrite_robot(
     return Rewritten(place, folder, list(meshes.values()), warnings)
 
 
-def _rewrite_stage(source: Path, place: Path, options: Mapping[str, Any]) -> Rewritten:
-    """Write a layer over a USD stage."""
-    _check_place(source, place, usd.ENDINGS)
+def rewrite_stage(
+    stage: usd.Colliders, place: Path, options: Mapping[str, Any], *, keep_input: bool = False
+) -> Rewritten:
+    """Rewrite a USD stage that has been read, as `rewrite_robot` does."""
+    _check_place(stage.source, place, usd.ENDINGS)
     _check_options(options)
-    data, done, warnings = usd.rewrite_stage(source, place, lambda mesh: _coarse(mesh, options))
+    data, done, warnings, files = usd.encode_layer(stage, place, lambda mesh: _coarse(mesh, options), flat=keep_input)
+    warnings += _left_behind(files, stage.source.parent, place)
     meshes = [
         RewrittenMesh(Path(path), [f"hull_{i:03d}" for i in range(count)], result)
         for path, (result, count) in done.items()
     ]
     if not meshes:
-        warnings.append(f"{source} has no mesh that collides, so the layer changes nothing.")
+        warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
     return Rewritten(place, place, meshes, warnings)
 
@@ -218,14 +227,17 @@ def _plan(root: Element, kind: str, references: References, place: Path, folder:
         within = os.path.relpath(source / compiler.mesh_folder, source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
         plan = plan_mjcf(compiler, references, lambda _, hull: (Path(target) / hull).as_posix())
-    warnings = list(plan.warnings)
-    if plan.relative and os.path.realpath(place.absolute().parent) != os.path.realpath(source):
-        warnings.append(
-            f"{len(plan.relative)} other files, such as {plan.relative[0]}, are referred to relative to "
-            f"{source} and will not be found from {place.absolute().parent}: write the result "
-            "beside the input, or copy them too."
-        )
-    return plan, warnings
+    return plan, [*plan.warnings, *_left_behind(plan.relative, source, place)]
+
+
+def _left_behind(files: Sequence[str], source: Path, place: Path) -> list[str]:
+    """Warn about other files that are named relative to a folder which the result does not lie in."""
+    if not files or os.path.realpath(place.absolute().parent) == os.path.realpath(source):
+        return []
+    return [
+        f"{len(files)} other files, such as {files[0]}, are referred to relative to {source} and will not be found "
+        f"from {place.absolute().parent}: write the result beside the input, or copy them too."
+    ]
 
 
 def _reference(old: str, hull: str, references: References, folder: Path) -> str:

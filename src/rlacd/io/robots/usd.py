@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,30 @@ ENDINGS = (".usd", ".usda", ".usdc")
 SERVER = "rlacd.io.robots.usd_layer:StageRewriter"
 
 
-def collides(stage: Path) -> bool:
-    """Tell whether a mesh of the stage collides, by the schemas of UsdPhysics.
+@dataclass(frozen=True, eq=False)
+class Colliders:
+    """The meshes of a stage that collide, by the schemas of UsdPhysics.
+
+    Attributes
+    ----------
+    source
+        The stage.
+    nodes
+        For each its ``path``, and its ``scale`` [3] on the stage.
+    blobs
+        ``INDEX.points`` and ``INDEX.faces`` of each.
+    warnings
+        What of the stage is not rewritten, or changes with it.
+    """
+
+    source: Path
+    nodes: list[Mapping[str, Any]]
+    blobs: Mapping[str, bytes]
+    warnings: list[str]
+
+
+def read_colliders(stage: Path) -> Colliders:
+    """Find the meshes of a stage that collide.
 
     Raises
     ------
@@ -31,31 +54,43 @@ def collides(stage: Path) -> bool:
     MissingExtraError
         The extra ``usd`` is not installed.
     """
-    return bool(_colliders(stage)[0])
+    require_usd()
+    answer = answer_of(SERVER, stage, "USD", {"path": str(stage)}, {})
+    return Colliders(stage, answer.values["nodes"], answer.blobs, answer.values["warnings"])
 
 
-def rewrite_stage(
-    source: Path, place: Path, decomposed: Callable[[trimesh.Trimesh], Decomposition]
-) -> tuple[bytes, dict[str, tuple[Decomposition, int]], list[str]]:
+def colliders_of(mesh: Path) -> Colliders | None:
+    """Find them as `read_colliders` does; None if the file is no stage, or nothing of it collides."""
+    found = read_colliders(mesh) if mesh.suffix.lower() in ENDINGS else None
+    return found if found is not None and found.nodes else None
+
+
+def encode_layer(
+    stage: Colliders, place: Path, decomposed: Callable[[trimesh.Trimesh], Decomposition], *, flat: bool
+) -> tuple[bytes, dict[str, tuple[Decomposition, int]], list[str], list[str]]:
     """Decompose the meshes that collide, each once at its scale.
 
     Parameters
     ----------
-    source, place : Path
-        The stage, and where the layer will be.
+    stage : Colliders
+    place : Path
+        Where the layer will be.
     decomposed : callable
         Decomposes a mesh, in the stage's unit.
+    flat : bool
+        Whether to write the whole stage as one layer, instead of one over the original; it names pictures and other
+        files as before, relative to the folder of the original.
 
     Returns
     -------
-    tuple of (bytes, dict, list of str)
-        The layer, the result and the number of hulls of each prim, and warnings.
+    tuple of (bytes, dict, list of str, list of str)
+        The layer, the result and the number of hulls of each prim, warnings, and the other files that `flat` names.
     """
-    nodes, blobs, warnings = _colliders(source)
+    blobs, warnings = stage.blobs, list(stage.warnings)
     results: dict[tuple[bytes, bytes, tuple[float, ...]], Decomposition] = {}
     hulls: dict[str, bytes] = {}
     done: dict[str, tuple[Decomposition, int]] = {}
-    for index, node in enumerate(nodes):
+    for index, node in enumerate(stage.nodes):
         points, faces, scale = blobs[f"{index}.points"], blobs[f"{index}.faces"], np.array(node["scale"])
         key = points, faces, tuple(node["scale"])
         if key not in results:
@@ -69,15 +104,11 @@ def rewrite_stage(
             hulls[f"{index}.{number}.faces"] = np.asarray(mesh.faces, dtype="<i4").tobytes()
         done[node["path"]] = results[key], len(results[key])
     asked = {
-        "path": str(source),
-        "sublayer": Path(os.path.relpath(source, place.absolute().parent)).as_posix(),
+        "path": str(stage.source),
+        "sublayer": None if flat else Path(os.path.relpath(stage.source, place.absolute().parent)).as_posix(),
         "ending": place.suffix.lower().lstrip("."),
+        "masses": {path: result.report.get("mass") for path, (result, _) in done.items()},
         "counts": [count for _, count in done.values()],
     }
-    return answer_of(SERVER, source, "USD", asked, hulls).blobs["layer"], done, warnings
-
-
-def _colliders(source: Path) -> tuple[list[Mapping[str, Any]], Mapping[str, bytes], list[str]]:
-    require_usd()
-    answer = answer_of(SERVER, source, "USD", {"path": str(source)}, {})
-    return answer.values["nodes"], answer.blobs, answer.values["warnings"]
+    answer = answer_of(SERVER, stage.source, "USD", asked, hulls)
+    return answer.blobs["layer"], done, warnings + answer.values["warnings"], answer.values["files"]

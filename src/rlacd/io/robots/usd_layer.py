@@ -15,11 +15,19 @@ from rlacd.io.read.usd_stage import check_files, prim_geometry
 from rlacd.io.write.usd import mesh_prim, stage_bytes
 from rlacd.pool import Blobs, Shared, Values
 
-OF_THE_MESH = re.compile(r"(Mass|RigidBody|MeshCollision|ConvexHull|ConvexDecomposition|SDFMesh|TriangleMesh|Binding)")
-"""Schemas that say how a mesh itself collides, moves and looks; the others go to its hulls too."""
+OF_THE_MESH = re.compile(
+    r"(Mass|RigidBody|MeshCollision|ConvexHull|ConvexDecomposition|SDFMesh|TriangleMesh|SkelBinding)"
+)
+"""Schemas that say how a mesh itself collides and moves; the others go to its hulls too."""
 
 OF_COLLISIONS = re.compile(r"(physics|physx\w*|newton|mjc):|material:binding:physics$|material:binding$")
 """Properties that go from a mesh to its hulls."""
+
+TO_COLLIDERS = re.compile(r"collection:.*:(in|ex)cludes$|physics:filteredPairs$|physxContactReport:reportPairs$")
+"""Relationships that name colliders, any number of them: they name the hulls too."""
+
+TO_FRAMES = re.compile(r"physics:body[01]$")
+"""Relationships that name where something is, which a mesh still says."""
 
 
 class StageRewriter:
@@ -29,7 +37,8 @@ class StageRewriter:
         os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there
 
     def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each."""
+        """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each: over the
+        stage as ``sublayer``, or all in one."""
         from pxr import Tf
 
         path = Path(values["path"])
@@ -53,11 +62,18 @@ def _answer(path: Path, values: Values, blobs: Blobs) -> tuple[Values, dict[str,
     colliders, warnings = _colliders(path, stage)
     if "counts" in values:
         for body in {body.GetPath(): body for prim in colliders if (body := _body(prim))}.values():
-            _fix_mass(path, body)
+            _fix_mass(path, body, values["masses"])
+        hulls = {}
         for index, (prim, count) in enumerate(zip(colliders, values["counts"], strict=True)):
-            _replace(stage, prim, [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)])
-        layer.subLayerPaths = [f"./{values['sublayer']}"]
-        return {}, {"layer": stage_bytes(layer, values["ending"])}
+            shapes = [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)]
+            hulls[prim.GetPath()] = _replace(stage, prim, shapes)
+        left = _retarget(stage, hulls)
+        files: list[str] = []
+        if values["sublayer"] is None:
+            layer, files = _flat(stage, path.absolute().parent)
+        else:
+            layer.subLayerPaths = [f"./{values['sublayer']}"]
+        return {"warnings": left, "files": files}, {"layer": stage_bytes(layer, values["ending"])}
     nodes: list[Values] = []
     arrays: dict[str, bytes] = {}
     for index, prim in enumerate(colliders):
@@ -115,21 +131,25 @@ def _body(prim: Any) -> Any:
     return prim
 
 
-def _fix_mass(path: Path, body: Any) -> None:
-    """State the mass, centre and inertia of a body, as they follow from its shapes before hulls are among them."""
-    import trimesh
+def _fix_mass(path: Path, body: Any, masses: Mapping[str, Any]) -> None:
+    """State the mass, centre and inertia of a body, as they follow from its shapes before hulls are among them.
+
+    Meshes that become hulls have `masses`: those of the repaired solids, along their axes on the stage.
+    """
     from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
     cache, scale = UsdGeom.XformCache(Usd.TimeCode.EarliestTime()), np.array(_scale(body))
 
     def of(prim: Any) -> Any:
-        points, faces = prim_geometry(path, prim)
-        to_body = np.array(cache.ComputeRelativeTransform(prim, body)[0])
-        solid = trimesh.Trimesh((points @ to_body[:3, :3] + to_body[3, :3]) * scale, faces, process=False)
-        solid = solid if solid.is_volume else solid.convex_hull
+        mass = masses.get(str(prim.GetPath())) or _mass(*prim_geometry(path, prim), _scale(prim))
+        to_body = np.array(cache.ComputeRelativeTransform(prim, body)[0]) * [*scale, 1]
+        turn, inertia = to_body[:3, :3] / np.array(_scale(prim))[:, None], np.array(mass["inertia_abs"])
+        bigger = abs(np.linalg.det(turn))
+        spread = bigger * turn.T @ (np.eye(3) * np.trace(inertia) / 2 - inertia) @ turn  # the second moments
         said = UsdPhysics.RigidBodyAPI.MassInformation()
-        said.volume, said.centerOfMass = float(solid.volume), Gf.Vec3f(*solid.center_mass.tolist())
-        said.inertia = Gf.Matrix3f(*np.asarray(solid.moment_inertia).ravel().tolist())
+        said.volume = bigger * mass["volume_abs"]
+        said.centerOfMass = Gf.Vec3f(*(mass["centre_abs"] @ turn + to_body[3, :3]).tolist())
+        said.inertia = Gf.Matrix3f(*(np.eye(3) * np.trace(spread) - spread).ravel().tolist())
         said.localPos, said.localRot = Gf.Vec3f(0), Gf.Quatf(1)
         return said
 
@@ -141,8 +161,47 @@ def _fix_mass(path: Path, body: Any) -> None:
     api.CreatePrincipalAxesAttr(axes)
 
 
-def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> None:
-    """Put hulls beside a mesh, or below it if it is a rigid body, and let it no longer collide."""
+def _flat(stage: Any, folder: Path) -> tuple[Any, list[str]]:
+    """All layers of the stage as one, and the files that it names, relative to a folder."""
+    from pxr import UsdUtils
+
+    layer, files = stage.Flatten(addSourceFileComment=False), []
+
+    def relative(named: str) -> str:
+        if not os.path.isabs(named):
+            return named
+        files.append(Path(os.path.relpath(named, folder)).as_posix())
+        return f"./{files[-1]}"
+
+    UsdUtils.ModifyAssetPaths(layer, relative)
+    return layer, sorted(set(files))
+
+
+def _retarget(stage: Any, hulls: Mapping[Any, list[Any]]) -> list[str]:
+    """Let what names a mesh as a collider name its hulls too; returns warnings about what else names it."""
+    left = []
+    for prim in stage.Traverse():
+        for link in prim.GetAuthoredRelationships():
+            named = [path for path in link.GetTargets() if path in hulls]
+            if named and TO_COLLIDERS.match(link.GetName()):
+                for path in named:
+                    for hull in hulls[path]:
+                        link.AddTarget(hull)
+            elif named and OF_COLLISIONS.match(link.GetName()) and not TO_FRAMES.match(link.GetName()):
+                left.append(f"{link.GetPath()} names {named[0]}, which no longer collides: its hulls do.")
+    return left
+
+
+def _mass(points: Any, faces: Any, scale: list[float]) -> dict[str, Any]:
+    import trimesh
+
+    solid = trimesh.Trimesh(points * scale, faces, process=False)
+    solid = solid if solid.is_volume else solid.convex_hull
+    return {"volume_abs": solid.volume, "centre_abs": solid.center_mass, "inertia_abs": solid.moment_inertia}
+
+
+def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[Any]:
+    """Put hulls beside a mesh, or below it if it is a rigid body, and let it no longer collide; returns their paths."""
     from pxr import UsdGeom, UsdPhysics
 
     inside = prim.HasAPI(UsdPhysics.RigidBodyAPI)
@@ -172,3 +231,4 @@ def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> None:
             ):
                 each.FlattenTo(hull)
     UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)
+    return [hull.GetPath() for hull in group.GetPrim().GetChildren()]

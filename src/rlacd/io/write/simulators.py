@@ -136,7 +136,7 @@ def encode_urdf(model: Model, shapes: list[Shape], visuals: list[MeshFile], fold
 
 def encode_sdf(model: Model, shapes: list[Shape], visuals: list[MeshFile], folder: str) -> bytes:
     """A model for Gazebo and Drake, with a ``<collision>`` per hull."""
-    root = etree.Element("sdf", version="1.9", nsmap={"drake": DRAKE})
+    root = etree.Element("sdf", version="1.11", nsmap={"drake": DRAKE})
     described = etree.SubElement(root, "model", name=model.name)
     if model.up != "z":
         _pose(described, (0, 0, 0), TO_Z_UP[model.up])
@@ -154,7 +154,8 @@ def encode_sdf(model: Model, shapes: list[Shape], visuals: list[MeshFile], folde
                 _text(part, "pose", f"{numbers(shape.shift)} 0 0 0")
             mesh = etree.SubElement(etree.SubElement(part, "geometry"), "mesh")
             _text(mesh, "uri", f"{folder}/{shape.name}")
-            if shape not in visuals:  # without this, Drake takes the mesh for a surface, with far poorer contacts
+            if shape not in visuals:  # else Gazebo and Drake take the mesh for a surface, with far poorer contacts
+                mesh.set("optimization", "convex_hull")
                 etree.SubElement(mesh, f"{{{DRAKE}}}declare_convex")
             continue
         _pose(part, shape.centre, shape.quaternion)
