@@ -13,7 +13,7 @@ from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.criteria.limited import BOX, FEWEST
 from rlacd.cut import CutTree
-from rlacd.cut_and_merge import cut_and_merge
+from rlacd.cut_and_merge import MOST_CUTTING, MOST_PER_FACE, cut_and_merge
 from rlacd.merge import COARSER, best_within, drop_slivers, merge_parts
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
@@ -80,7 +80,7 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
         parts = decomposer.at_most(parts, goal)
     elif options.hull_limits.allow(*BOX) and not options.hull_limits.allow(*FEWEST):
         try:
-            with run.stage("limit"):
+            with run.stage("limit"), run.limited(MOST_CUTTING + MOST_PER_FACE * root.size, cuts="cut"):
                 parts = decomposer.cut_to_limits(parts, goal)
         except Stopped:
             run.note_stop()
