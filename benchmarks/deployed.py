@@ -116,7 +116,8 @@ class Deployed:
             cost = generator_of(component).random(len(candidates)) if random else excess_norm(swept)
             valid = next((v for s in SLIVERS if (v := exists & swept.valid(s)).any()), exists & False)
         else:
-            cost = -self._network(sweep_features(component, self._threshold or self._network.threshold))[:, 0]
+            seen = sweep_features(component, self._threshold or self._network.threshold)
+            cost = -self._network(seen)[:, 0].astype(np.float64)
             valid = exists & valid_planes(component, candidates)
         ranked = np.argsort(np.where(valid, cost, np.inf), kind="stable")
         best = np.sort(ranked[: min(self._of.planes, int(valid.sum()))])  # sweep order: ties go to the first

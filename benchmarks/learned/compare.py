@@ -87,7 +87,7 @@ def summary(rows: list[dict[str, object]], policies: list[str], criteria: list[s
                     continue
                 drawn = logs[rng.integers(len(logs), size=(SAMPLES, len(logs)))].mean(axis=1)
                 low, high = np.exp(np.quantile(drawn, [0.025, 0.975]))
-                mean, other = (float(np.mean([x for x in column if x])) for column in zip(*pairs, strict=True))  # type: ignore[arg-type]
+                mean, other = (float(np.mean([x for x in column if x])) for column in zip(*pairs, strict=True))
                 print(
                     f"{criterion:9s} {policy:22s} {key:6s} {np.exp(logs.mean()):.3f} ({low:.3f} to {high:.3f})"
                     f"  of totals {mean / other:.3f}  mean {mean:.4g}  {len(logs)} meshes"

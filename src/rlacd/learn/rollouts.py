@@ -200,12 +200,10 @@ class RolloutServer:
         """
         self._take_over(shared)
         key = f"{values['name']} {values['axis'] if values['degrees'] else 0} {values['degrees']}"
-        component, memory = self._known.pop(key, None) or (
-            turned(blobs["solid"], values["axis"], values["degrees"]),
-            Memory(),
-        )
+        known = self._known.pop(key) if key in self._known else None
+        component, memory = known or (turned(blobs["solid"], values["axis"], values["degrees"]), Memory())
         cutting = None if component is None else CutProcess(component, Concavity(self._options.threshold), memory)
-        if cutting is None or not cutting.unfinished or len(cutting.all) > self._options.max_parts:
+        if component is None or cutting is None or not cutting.unfinished or len(cutting.all) > self._options.max_parts:
             return {}, {"episode": Episode.empty("nothing").to_bytes()}
         network = self._network if "network" in shared else None
         rng = np.random.default_rng(values["seed"])
