@@ -176,11 +176,10 @@ class _Decomposer:
         inside = self.model.solid.inside(part.hull)
         if not inside.size:
             return [part]
-        policy = make_policy(self.options.policy, SweepCache(), _scale(limited))
+        policy = make_policy(self.options.first_policy, SweepCache(), _scale(limited))
         tree, best = CutTree(Component((inside.vertices, inside.faces)), policy, self.run), [part]
-        for power in range(
-            0 if most == math.inf else FIRST_POWER, -1, -1
-        ):  # the finest that fits, by way of cheap ones
+        first = 0 if most == math.inf else FIRST_POWER
+        for power in range(first, -1, -1):  # the finest that fits, by way of cheap ones
             criterion = limited.scaled(COARSER**power)
             new = cut_and_merge(tree, criterion, self.run, merge=self.options.merge).parts
             if len(new) > most:

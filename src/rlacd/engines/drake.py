@@ -44,7 +44,8 @@ def add_hulls(plant: Any, body: Any, mesh: Any, *, settings: Any = None, **optio
     taken = len(plant.GetCollisionGeometriesForBody(body))
     for number, (hull, shift) in enumerate(hulls, taken):
         name = f"hull_{number:03d}"
-        shape = Convex(hull.vertices.T, name)
+        points: Any = hull.vertices.T
+        shape = Convex(points, name)
         how = CoulombFriction(1.0, 1.0) if settings is None else settings
         plant.RegisterCollisionGeometry(body, RigidTransform(shift), shape, name, how)
     return result
