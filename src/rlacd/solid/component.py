@@ -124,7 +124,9 @@ class Part:
         hull = hull or Hull.around(first.hull, second.hull)
         for part in (first, second):
             if isinstance(part, ClippedPart):
-                return ClippedPart(part.solid, first, second, hull)
+                clipped = ClippedPart(part.solid, first, second, hull)
+                if clipped.size:  # clipping may leave nothing of what is as thin as rounding
+                    return clipped
         return _Union(first, second, hull)
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:

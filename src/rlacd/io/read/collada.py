@@ -154,6 +154,8 @@ class _Document:
             for inner in inputs:
                 arrays.setdefault(inner.get("semantic"), (self._rows(self._source(inner)), offset))
         points, offset = arrays["POSITION"]
+        if points.shape[1] != 3:
+            raise ValueError(f"positions of {points.shape[1]} numbers")
         if min(offsets) < 0:
             raise ValueError("an offset below zero")
         corners = _corners(primitive, points, offset, max(offsets) + 1)
