@@ -75,7 +75,7 @@ def test_a_damaged_file_that_is_read_apart_is_read_or_refused(
     kind: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip(module)
-    monkeypatch.setattr(apart, "LIMITS", ProcessLimits(seconds=20.0))  # OpenCASCADE may never end
+    monkeypatch.setattr(apart, "LIMITS", ProcessLimits(seconds=5.0))  # OpenCASCADE may never end
     assert untyped(kind, tmp_path) == {}
 
 
