@@ -75,8 +75,9 @@ def test_openusd_finds_nothing_that_it_did_not_find_before(
     from tests.io.test_robots_usd import Usd, colliders, findings
 
     before, done = stages[robot]
-    assert findings(Usd.Stage.Open(str(done.path))) == findings(Usd.Stage.Open(str(before)))
-    hulls = [prim for prim in colliders(Usd.Stage.Open(str(done.path))) if prim.GetName().startswith("hull_")]
+    stage = Usd.Stage.Open(str(done.path))
+    assert findings(stage) == findings(Usd.Stage.Open(str(before)))
+    hulls = [prim for prim in colliders(stage) if prim.GetName().startswith("hull_")]
     assert len(hulls) == sum(len(mesh.files) for mesh in done.meshes) > 0
 
 

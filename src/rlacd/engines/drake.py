@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 from rlacd.decomposition import Decomposition
 from rlacd.engines.hulls import hulls_of
@@ -43,8 +43,7 @@ def add_hulls(plant: Any, body: Any, mesh: Any, *, settings: Any = None, **optio
     result, hulls = hulls_of(mesh, options)
     taken = len(plant.GetCollisionGeometriesForBody(body))
     for number, (hull, shift) in enumerate(hulls, taken):
-        name = f"hull_{number:03d}"
-        points: Any = hull.vertices.T
+        name, points = f"hull_{number:03d}", cast(Any, hull.vertices.T)
         shape = Convex(points, name)
         how = CoulombFriction(1.0, 1.0) if settings is None else settings
         plant.RegisterCollisionGeometry(body, RigidTransform(shift), shape, name, how)
