@@ -164,7 +164,7 @@ class _Decomposer:
         try:
             if not searches and options.merge and policy not in AS_PUBLISHED and run.stopped_by is None:
                 with run.stage("merge"), run.limited(run.work.done):
-                    parts = grow_cover(parts, goal, run, self.model.component, only_crossing=True)
+                    parts = grow_cover(parts, goal, run, self.model.component)
             if first and run.stopped_by is None:
                 with run.stage("search"):
                     parts = eliminate_parts(context, parts, run)

@@ -38,10 +38,8 @@ MOST_PIECES = 400
 """With more pieces, all of them against each other would take longer than a pass."""
 
 
-def grow_cover(
-    merged: list[Part], criterion: Criterion, run: Run, solid: Component, only_crossing: bool = False
-) -> list[Part]:
-    """Cover a solid by parts grown from its pieces, if that takes fewer.
+def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
+    """Cover a solid in which bodies cross by parts grown from its pieces, if that takes fewer.
 
     Parameters
     ----------
@@ -52,8 +50,6 @@ def grow_cover(
         The merged parts are returned when its work runs out.
     solid : Component
         The solid that was decomposed.
-    only_crossing : bool
-        Give up unless bodies cross.
     """
     pieces = [member for part in merged for member in part.members]
     units = sum(work.testing(len(piece.hull.vertices)) for piece in pieces)
@@ -62,7 +58,7 @@ def grow_cover(
         return merged
     depth = DEPTH * criterion.overhang
     grown = run.map(lambda piece: solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth), pieces)
-    if only_crossing and not _cross(merged, grown):
+    if not _cross(merged, grown):
         return merged
     parts = drop_slivers(_chosen(pieces, grown, criterion, run, solid), run)
     parts = drop_slivers(merge_parts(parts, criterion, run, solid=solid), run)

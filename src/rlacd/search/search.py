@@ -200,7 +200,9 @@ class _Search:
                     continue
             if all(cost(other.parts) != cost(known) for known in found):
                 found.append(other.parts)
-        found = [grow_cover(each, context.criterion, run, context.root) for each in found]
+        for i, each in enumerate(found):
+            with run.limited(self.first_pass):
+                found[i] = grow_cover(each, context.criterion, run, context.root)
         found.sort(key=cost)
         self.fewest = min(self.fewest, len(found[0]))
         return found
