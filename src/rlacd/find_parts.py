@@ -13,7 +13,7 @@ from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import best_within, drop_slivers
+from rlacd.merge import best_within, drop_slivers, grow_cover
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -162,6 +162,9 @@ class _Decomposer:
         searches = options.quality != "fast"
         first = eliminates and (not searches or goal.obstacles is not None)
         try:
+            if not searches and options.merge and policy not in AS_PUBLISHED and run.stopped_by is None:
+                with run.stage("merge"), run.limited(run.work.done):
+                    parts = grow_cover(parts, goal, run, self.model.component)
             if first and run.stopped_by is None:
                 with run.stage("search"):
                     parts = eliminate_parts(context, parts, run)
