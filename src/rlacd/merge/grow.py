@@ -16,7 +16,7 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import is_alone, merge_parts
 from rlacd.merge.slivers import drop_slivers
 from rlacd.run import Run, work
-from rlacd.solid.arrays import BoolArray, FloatArray, heights
+from rlacd.solid.arrays import FloatArray, heights
 from rlacd.solid.component import ClippedPart, Component, Part, Plane
 from rlacd.solid.hull import TOLERANCE, Hull
 
@@ -30,6 +30,10 @@ planted solids of research/search.md take 3 % more parts."""
 LEAST = 0.5
 """What has grown is taken only if it holds as much more as this share of the volume of the piece it grew from: merging
 does the rest better. With 0, the planted solids take 4 % more parts."""
+
+
+HOLDING = 0.1
+"""Units of work to find which half-spaces hold a point."""
 
 
 def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
@@ -49,36 +53,50 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
     if not judges or sum(not is_alone(part) for part in merged) < CROSSING * len(merged):
         return merged
     pieces = [member for part in merged for member in part.members]
-    if not run.work.pay(sum(work.testing(len(piece.hull.vertices)) for piece in pieces)):
+    corners = sum(len(piece.hull.vertices) for piece in pieces)
+    growing = sum(work.testing(len(piece.hull.vertices)) for piece in pieces)
+    if not run.work.pay(growing + HOLDING * corners * len(pieces)):
         return merged
     depth = DEPTH * criterion.overhang
     grown = run.map(lambda piece: solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth), pieces)
-    parts = drop_slivers(_chosen(pieces, grown, criterion, run, solid), run)
+    chosen = _chosen(pieces, grown)
+    if len(chosen) >= len(merged):
+        return merged
+    parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run, solid), run)
     parts = drop_slivers(merge_parts(parts, criterion, run, solid=solid), run)
     return parts if len(parts) < len(merged) and not run.is_over else merged
 
 
-def _chosen(
+def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[int]:
+    """Numbers of intersections of half-spaces that cover most of the pieces, the one that holds the most first."""
+    points = [(piece.hull.vertices + piece.hull.vertices.mean(axis=0)) / 2 for piece in pieces]
+    volumes = np.repeat(
+        [piece.volume / len(some) for some, piece in zip(points, pieces, strict=True)], [*map(len, points)]
+    )
+    held = [np.flatnonzero(_heights(np.concatenate(points), spaces).max(axis=1) <= TOLERANCE) for spaces in grown]
+    gains = np.array([volumes[own].sum() for own in held])
+    chosen = list[int]()
+    while gains.max() > 0:
+        best = int(gains.argmax())
+        if gains[best] >= LEAST * pieces[best].volume:
+            chosen.append(best)
+            volumes[held[best]] = 0
+            gains = np.array([volumes[own].sum() if old > 0 else 0.0 for own, old in zip(held, gains, strict=True)])
+        gains[best] = 0
+    return chosen
+
+
+def _taken(
     pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run, solid: Component
 ) -> list[Part]:
-    """Parts of what has grown, that which holds the most of the rest first; and what no such part could take."""
-    points = [(piece.hull.vertices + piece.hull.vertices.mean(axis=0)) / 2 for piece in pieces]
-    volumes = np.concatenate([np.full(len(some), piece.volume / len(some)) for some, piece in zip(points, pieces, strict=True)])
-    if not run.work.pay(len(grown) * len(volumes) / 10):
-        return list(pieces)
-    holds = _held(np.concatenate(points), grown)
+    """Parts that take what is in each intersection of half-spaces, as far as they meet the criterion; and the rest."""
     rest, parts = list(pieces), list[Part]()
-    gains = np.array([volumes[own].sum() for own in holds])
-    while run.may_continue():
-        best = int(gains.argmax())
-        if gains[best] <= 0:
-            break
-        gain, gains[best] = gains[best], 0
-        if gain < LEAST * pieces[best].volume:
-            continue
-        inside, outside, units = _divided(rest, grown[best])
+    for spaces in grown:
+        inside, outside, units = _divided(rest, spaces)
         hull = Hull.of(*(member.hull.vertices for member in inside)) if inside else None
-        if not run.work.pay(units) or hull is None:
+        if not run.may_continue() or not run.work.pay(units):
+            break
+        if hull is None:
             continue
         part = ClippedPart(solid, inside, hull)
         if not run.work.pay(work.filling(part.size, len(hull.faces)) + work.judging(part.size, len(hull.faces))):
@@ -86,14 +104,12 @@ def _chosen(
         if part.is_whole and criterion.is_met(part):
             parts.append(part)
             rest = outside
-            volumes[holds[best]] = 0
-            gains = np.array([volumes[own].sum() if old > 0 else 0.0 for own, old in zip(holds, gains, strict=True)])
     return [*parts, *rest]
 
 
-def _held(points: FloatArray, grown: Sequence[FloatArray]) -> list[BoolArray]:
-    """Which points are in each intersection of half-spaces."""
-    return [(heights(points, spaces[:, :3]) <= spaces[:, 3] + TOLERANCE).all(axis=1) for spaces in grown]
+def _heights(points: FloatArray, spaces: FloatArray) -> FloatArray:
+    """Heights of points [N, 3] over the planes of half-spaces [P, 4]."""
+    return heights(points, spaces[:, :3]) - spaces[:, 3]
 
 
 def _divided(components: Sequence[Component], spaces: FloatArray) -> tuple[list[Component], list[Component], float]:
@@ -102,7 +118,7 @@ def _divided(components: Sequence[Component], spaces: FloatArray) -> tuple[list[
     outside: list[Component] = []
     units = 0.0
     for component in components:
-        above = heights(component.hull.vertices, spaces[:, :3]) - spaces[:, 3]
+        above = _heights(component.hull.vertices, spaces)
         most = above.max(axis=0)
         if above.min(axis=0).max() >= -TOLERANCE:
             outside.append(component)
