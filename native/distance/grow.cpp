@@ -11,7 +11,6 @@ namespace rlacd {
 namespace {
 
 constexpr double kTouching = 1e-6;  // a face no farther than this from the hull is at no distance
-constexpr double kPoking = 0.5;     // of the depth: how far the hull may reach beyond a face's plane that is moved out
 
 using Polygon = std::vector<Vec3>;
 
@@ -98,7 +97,7 @@ class Growth {
     double beyond = 0;
     for (const Vec3 p : hull_.vertices) beyond = std::max(beyond, dot(n, p - a));
     const auto least = [&, a = a, b = b, c = c](Vec3 m) { return std::min({dot(m, a), dot(m, b), dot(m, c)}); };
-    open_.push({distance(least), -1, {}, face, area, n, beyond, beyond <= kPoking * depth_});
+    open_.push({distance(least), -1, {}, face, area, n, beyond, beyond <= depth_});
   }
 
   // How far something is beyond the facet of the hull that it is farthest beyond, given its least height.

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import is_alone, merge_parts
 from rlacd.merge.slivers import drop_slivers
@@ -32,10 +33,6 @@ LEAST = 0.5
 does the rest better. With 0, the planted solids take 4 % more parts."""
 
 
-HOLDING = 0.1
-"""Units of work to find which half-spaces hold a point."""
-
-
 def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
     """Cover a solid in which bodies cross by parts grown from its pieces, if that takes fewer.
 
@@ -52,10 +49,19 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
     judges = criterion.screen.looks_inside and math.isfinite(criterion.overhang)
     if not judges or sum(not is_alone(part) for part in merged) < CROSSING * len(merged):
         return merged
+    try:
+        parts = _regrown(merged, criterion, run, solid)
+    except Stopped:
+        run.note_stop()
+        return merged
+    return parts if len(parts) < len(merged) and not run.is_over else merged
+
+
+def _regrown(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
+    """Parts grown from the pieces and merged; the merged parts if points of the pieces tell that there are no fewer."""
     pieces = [member for part in merged for member in part.members]
     corners = sum(len(piece.hull.vertices) for piece in pieces)
-    growing = sum(work.testing(len(piece.hull.vertices)) for piece in pieces)
-    if not run.work.pay(growing + HOLDING * corners * len(pieces)):
+    if not run.work.pay(sum(work.growing(len(piece.hull.vertices), corners) for piece in pieces)):
         return merged
     depth = DEPTH * criterion.overhang
     grown = run.map(lambda piece: solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth), pieces)
@@ -63,8 +69,7 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
     if len(chosen) >= len(merged):
         return merged
     parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run, solid), run)
-    parts = drop_slivers(merge_parts(parts, criterion, run, solid=solid), run)
-    return parts if len(parts) < len(merged) and not run.is_over else merged
+    return drop_slivers(merge_parts(parts, criterion, run, solid=solid), run)
 
 
 def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[int]:
