@@ -126,7 +126,7 @@ void bind_concavity(nb::module_& m) {
           },
           Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("depth"),
           "Half-spaces n.x <= d that hold a hull, rows of n and d [P, 4]: their intersection has grown until the\n"
-          "solid's surface comes no deeper than `depth` into it.")
+          "solid's surface stops it, which may come as deep as `depth` into it.")
       .def(
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,
