@@ -32,6 +32,10 @@ LEAST = 0.5
 """What has grown is taken only if it holds as much more as this share of the volume of the piece it grew from: merging
 does the rest better. With 0, the planted solids take 4 % more parts."""
 
+WORTH = 0.85
+"""The parts grown are kept if they are at most this share of the merged ones: what follows can save more of parts that
+were cut less. Of the 56 of a pot's proxy, 41 are left when they are carried back, but 47 of 55 grown ones."""
+
 
 def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
     """Cover a solid in which bodies cross by parts grown from its pieces, if that takes fewer.
@@ -54,7 +58,7 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
     except Stopped:
         run.note_stop()
         return merged
-    return parts if len(parts) < len(merged) and not run.is_over else merged
+    return parts if len(parts) <= WORTH * len(merged) and not run.is_over else merged
 
 
 def _regrown(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
@@ -123,21 +127,20 @@ def _divided(components: Sequence[Component], spaces: FloatArray) -> tuple[list[
     outside: list[Component] = []
     units = 0.0
     for component in components:
-        above = _heights(component.hull.vertices, spaces)
-        most = above.max(axis=0)
-        if above.min(axis=0).max() >= -TOLERANCE:
+        beyond = _heights(component.hull.vertices, spaces)
+        most = beyond.max(axis=0)
+        if beyond.min(axis=0).max() >= -TOLERANCE:
             outside.append(component)
             continue
-        left: Component | None = component
-        cut_off: list[Component] = []
+        left, cut_off = component, list[Component]()
         for *normal, offset in spaces[np.argsort(-most, kind="stable")][: np.count_nonzero(most > TOLERANCE)].tolist():
             units += work.cutting(left.size)
-            left, off = left.cut(Plane((normal[0], normal[1], normal[2]), offset))
-            if left is None:
+            below, above = left.cut(Plane((normal[0], normal[1], normal[2]), offset))
+            if below is None:
+                outside.append(component)
                 break
-            cut_off += [off] if off is not None else []
-        if left is None:
-            outside.append(component)
+            left = below
+            cut_off += [above] if above is not None else []
         else:
             inside.append(left)
             outside += cut_off
