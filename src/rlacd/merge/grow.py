@@ -70,9 +70,12 @@ def _regrown(merged: list[Part], criterion: Criterion, run: Run, solid: Componen
     depth = DEPTH * criterion.overhang
     grown = run.map(lambda piece: solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth), pieces)
     chosen = _chosen(pieces, grown)
-    if len(chosen) >= len(merged):
+    if len(chosen) > WORTH * len(merged):
         return merged
-    parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run, solid), run)
+    parts = _taken(pieces, [grown[i] for i in chosen], criterion, run, solid)
+    if not parts:
+        return merged
+    parts = drop_slivers(parts, run)
     return drop_slivers(merge_parts(parts, criterion, run, solid=solid), run)
 
 
@@ -98,9 +101,14 @@ def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[in
 def _taken(
     pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run, solid: Component
 ) -> list[Part]:
-    """Parts that take what is in each intersection of half-spaces, as far as they meet the criterion; and the rest."""
+    """Parts that take what is in each intersection of half-spaces, as far as they meet the criterion; and the rest.
+
+    Empty if most do not.
+    """
     rest, parts = list(pieces), list[Part]()
-    for spaces in grown:
+    for tried, spaces in enumerate(grown):
+        if tried > 2 * (len(parts) + 1):  # what has grown is mostly empty space
+            return []
         inside, outside, units = _divided(rest, spaces)
         hull = Hull.of(*(member.hull.vertices for member in inside)) if inside else None
         if not run.may_continue() or not run.work.pay(units):
