@@ -121,6 +121,17 @@ void bind_concavity(nb::module_& m) {
           "The solid clipped to a convex hull and closed by caps on the hull's facets: vertices [V, 3], faces [F, 3],\n"
           "volume, and what makes the tree of that surface.")
       .def(
+          "grown",
+          [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double depth) {
+            std::vector<std::array<double, 4>> spaces;
+            for (const auto& [n, d] : self.grown(to_finite_mesh(hull_vertices, hull_faces), depth))
+              spaces.push_back({n.x, n.y, n.z, d});
+            return rows<double>(std::move(spaces));
+          },
+          Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("depth"),
+          "Half-spaces n.x <= d that hold a hull, rows of n and d [P, 4]: their intersection has grown until the\n"
+          "solid's surface stops it, which may come as deep as `depth` into it.")
+      .def(
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,
              double reach, double grain, int threads) {

@@ -11,6 +11,7 @@
 #pragma once
 
 #include "distance/convex_clip.hpp"
+#include "distance/grow.hpp"
 #include "distance/surface.hpp"
 #include "distance/uncovered.hpp"
 #include "hull/convex_planes.hpp"
@@ -55,6 +56,9 @@ class Filling {
 
   // All that the solid fills of a convex hull, closed by caps on its facets.
   ClippedSolid clipped(const Mesh& hull) const;
+  std::vector<HalfSpace> grown(const Mesh& hull, double depth) const {
+    return grow(solid_, surface_.bvh(), hull, depth);
+  }
   std::vector<std::vector<Vec3>> uncovered(const std::vector<Mesh>& hulls, double reach, double grain,
                                            int threads) const {
     return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain, threads);

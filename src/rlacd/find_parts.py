@@ -14,7 +14,7 @@ from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.criteria.limited import BOX, FEWEST
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, MOST_PER_FACE, cut_and_merge
-from rlacd.merge import COARSER, best_within, drop_slivers, merge_parts
+from rlacd.merge import COARSER, best_within, drop_slivers, grow_cover, merge_parts
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -200,9 +200,14 @@ class _Decomposer:
         eliminates = options.merge and goal.eliminates and policy not in AS_PUBLISHED
         searches = options.quality != "fast"
         first = eliminates and (not searches or goal.obstacles is not None)
-        if run.stopped_by is not None or not (first or searches):
+        if run.stopped_by is not None:
             return parts, None
         try:
+            if not searches and options.merge and policy not in AS_PUBLISHED:
+                with run.stage("merge"), run.limited(run.work.done):
+                    parts = grow_cover(parts, goal, run, self.model.component)
+            if run.stopped_by is not None or not (first or searches):
+                return parts, None
             with run.stage("search"):
                 merged = parts = eliminate_parts(context, parts, run) if first else parts
                 if not searches or run.stopped_by is not None:

@@ -355,7 +355,7 @@ def is_alone(part: Part) -> bool:
 
 
 def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: Component) -> ClippedPart | None:
-    clipped = ClippedPart(solid, first, second, hull)
+    clipped = ClippedPart(solid, (first, second), hull)
     fits = clipped.is_whole and not criterion.screen.excludes(clipped.volume, hull.volume)
     return clipped if fits and criterion.is_met(clipped) else None
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from rlacd.cut import CutCache, CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import drop_slivers
+from rlacd.merge import drop_slivers, grow_cover
 from rlacd.run import Run
 from rlacd.search.context import Ranking, SearchContext
 from rlacd.search.neighbourhood import PATIENCE, Neighbourhood, SearchOutcome, cost
@@ -200,6 +200,9 @@ class _Search:
                     continue
             if all(cost(other.parts) != cost(known) for known in found):
                 found.append(other.parts)
+        for i, each in enumerate(found):
+            with run.limited(self.first_pass):
+                found[i] = grow_cover(each, context.criterion, run, context.root)
         found.sort(key=cost)
         self.fewest = min(self.fewest, len(found[0]))
         return found

@@ -124,7 +124,7 @@ class Part:
         hull = hull or Hull.around(first.hull, second.hull)
         for part in (first, second):
             if isinstance(part, ClippedPart):
-                clipped = ClippedPart(part.solid, first, second, hull)
+                clipped = ClippedPart(part.solid, (first, second), hull)
                 if clipped.size:  # clipping may leave nothing of what is as thin as rounding
                     return clipped
         return _Union(first, second, hull)
@@ -172,7 +172,7 @@ class _Union(Part):
 
 
 class ClippedPart(Part):
-    """All that the solid fills of the joint hull of two of its parts, whichever part it came from.
+    """All that the solid fills of a hull of several of its parts, whichever part it came from.
 
     Parts on both sides of a third become one this way, such as a beam that another crosses: hulls may overlap, and
     material that lies in any of them is covered. The members stay disjoint, so parts can be reunited and cut again.
@@ -181,22 +181,22 @@ class ClippedPart(Part):
     ----------
     solid : Component
         The whole solid.
-    first, second : Part
+    parts : sequence of Part
         Consist of components of the solid.
     hull : Hull
-        Their joint hull.
+        Contains them.
 
     Attributes
     ----------
     solid : Component
     """
 
-    def __init__(self, solid: Component, first: Part, second: Part, hull: Hull) -> None:
+    def __init__(self, solid: Component, parts: Sequence[Part], hull: Hull) -> None:
         inside = solid.inside(hull)
-        super().__init__(inside.vertices, inside.faces, inside.volume, hull, first.piece_hulls + second.piece_hulls)
+        super().__init__(inside.vertices, inside.faces, inside.volume, hull, sum(part.piece_hulls for part in parts))
         self.tree = inside.tree
         self.solid = solid
-        self._members = (*first.members, *second.members)
+        self._members = tuple(member for part in parts for member in part.members)
 
     @property
     def is_whole(self) -> bool:
