@@ -143,6 +143,7 @@ def test_the_table_names_every_option() -> None:
     options = {
         name for p in command.params if not getattr(p, "hidden", False) for name in p.opts if name.startswith("--")
     } - {
+        "--from",  # of stdin, see docs/formats.md
         "--help",
         "--help-all",
     }

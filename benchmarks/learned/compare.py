@@ -94,8 +94,8 @@ def summary(rows: list[dict[str, object]], policies: list[str], criteria: list[s
                 )
 
 
-def main() -> None:
-    """Measure what is missing and print the summary."""
+def parser() -> argparse.ArgumentParser:
+    """What the command takes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("meshes", type=Path)
     parser.add_argument("out", type=Path)
@@ -105,7 +105,12 @@ def main() -> None:
     parser.add_argument("--merge", action="store_true")
     parser.add_argument("--criteria", nargs="+", default=["0.05"])
     parser.add_argument("--policies", nargs="+", default=["greedy-hull-sum+edges", "greedy", "learned"])
-    args = parser.parse_args()
+    return parser
+
+
+def main() -> None:
+    """Measure what is missing and print the summary."""
+    args = parser().parse_args()
     with open(args.meshes / "index.csv", encoding="utf-8") as file:
         listed = [r for r in csv.DictReader(file) if r["split"] == args.split]
     names = sorted((int(r["faces"]), r["file"]) for r in listed if int(r["faces"]) <= args.faces)

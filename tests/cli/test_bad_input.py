@@ -214,7 +214,7 @@ WRONG_OPTIONS = {
     "keep_open": [0, 0.05, 1, NAN, "0.9", True],
     "keep_open_abs": [0, -1, NAN, INFINITE, "a", 1e9, 1e-9],
     "merge": [None, "no", 0, 2],
-    "policy": ["", None, 3, "GREEDY", "greedy-", ["greedy"]],
+    "policy": ["", 3, "GREEDY", "greedy-", ["greedy"]],
     "gap": [0, 0.004, 0.16, NAN, "3", None, True],
     "resolution": [0, -1, 19, 401, 2.5, "3", None, 10**6],
     "seed": [-1, 1.5, "a", None, 2**70],
