@@ -116,7 +116,7 @@ def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, rando
             reached = float(distance_to_triangles(on, mesh[0][mesh[1]]).max())
             assert reached <= upper + 2e-5, f"over: {reached} > {upper}"
     pairs = np.array([[i, j] for i in range(len(hulls)) for j in range(i)], dtype=np.int32).reshape(-1, 2)
-    same(lambda threads: _native.joint_hull_volumes([hull.vertices for hull in hulls], pairs, threads))
+    same(lambda threads: _native.joint_hull_volumes([hull.corners for hull in hulls], pairs, threads))
 
 
 def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generator) -> None:
@@ -143,7 +143,7 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
     reached = distance_to_triangles(sampled(hull.vertices, hull.faces.astype(np.int64), 30, random), mesh[0][mesh[1]])
     assert reached.max() <= upper + ROUNDING, f"concavity: {reached.max()} > {upper}"
     _native.glue(*mesh, *other)
-    _native.do_touch(*mesh, *other)
+    _native.do_touch(*([array] for array in (*mesh, *other)))
 
 
 def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generator) -> None:

@@ -111,12 +111,21 @@ def too_narrow(found: Sequence[dict[str, Any]], reached: Reached) -> list[str]:
         elif left < MOSTLY * radius:
             others.append((radius - left, at, radius, left))
     return [
-        f"Passages that {what}: {len(lost)}, of which {sum(left <= ACCURACY * r for *_, r, left in lost)} close; near "
-        f"({', '.join(f'{x:.4g}' for x in max(lost)[1])}), a ball of radius {max(lost)[2]:.4g} fits in the input, of "
-        f"{max(lost)[3]:.4g} between the hulls (see `passages`); {cure}."
-        for lost, what, cure in (
-            (asked, "lose more than keep_open allows", "limits on the hulls leave no other way"),
-            (others, "lose over a third of their radius", "--keep-open or a smaller threshold may keep such open"),
+        _narrows(lost, share, cure)
+        for lost, share, cure in (
+            (asked, "more than keep_open allows", "limits on the hulls leave no other way"),
+            (others, "over a third", "--keep-open or a smaller threshold keeps more of it"),
         )
         if lost
     ]
+
+
+def _narrows(lost: list[tuple[float, list[float], float, float]], share: str, cure: str) -> str:
+    closed = sum(left <= ACCURACY * radius for *_, radius, left in lost)
+    _, at, radius, left = max(lost)
+    return (
+        f"{len(lost)} passage{'s narrow' if len(lost) > 1 else ' narrows'} by {share}"
+        f"{f', {closed} to nothing' if closed else ''}: "
+        f"near ({', '.join(f'{x:.4g}' for x in at)}) a ball of radius {radius:.4g} fits in the input, of {left:.4g} "
+        f"between the hulls (see `passages`); {cure}."
+    )
