@@ -38,12 +38,15 @@ MOST_BALLS = 500
 
 MOST_LISTED = 50
 
-ACCURACY = 0.02
+LOOKED_AT = 5
+"""Places of a passage at which it is found what is left."""
+
+ACCURACY = 0.05
 """Share of its radius to within which it is found what is left of a ball."""
 
 _NEIGHBOURS = 8
 _ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]
-_INSIDE = np.array(list(itertools.product(np.linspace(-0.75, 0.75, 7), repeat=3)))
+_INSIDE = np.array(list(itertools.product(np.linspace(-0.5, 0.5, 7), repeat=3)))
 _AROUND = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
 _SEARCH = [(1.0, _INSIDE), *((2.0**-i, _AROUND) for i in (2, 3, 4, 5, 6) for _ in range(3))]
 
@@ -66,12 +69,14 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, threads: int)
     balls = balls.some(np.argsort(union.distance(balls.centres, threads) / balls.radii, kind="stable")[:MOST_BALLS])
     passage, found = _passages(balls, surface, threads), []
     for i in np.sort(np.unique(passage, return_index=True)[1])[:MOST_LISTED]:
-        own, radius = balls.some(passage == passage[i]), float(balls.radii[i])
+        own = balls.some(passage == passage[i])
         ends = np.concatenate([own.centres - own.radii[:, None], own.centres + own.radii[:, None]])
-        left = _left(union, balls.centres[i], radius) if np.ptp(ends, axis=0).max() >= LEAST_EXTENT else radius
+        if np.ptp(ends, axis=0).max() < LEAST_EXTENT:
+            continue
+        at, radius, left = _narrowest(own, union)
         if left < (1 - LEAST_LOSS) * radius:
-            at = frame.to_input(balls.centres[i])
-            found.append({"at_abs": at.tolist(), "radius_abs": radius / frame.scale, "left_abs": left / frame.scale})
+            place = frame.to_input(at).tolist()
+            found.append({"at_abs": place, "radius_abs": radius / frame.scale, "left_abs": left / frame.scale})
     return sorted(found, key=lambda one: one["left_abs"] / one["radius_abs"])
 
 
@@ -89,40 +94,63 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> IntArray:
     return _native.components(len(balls), first[is_free], second[is_free])[1].astype(np.int32)
 
 
+def _narrowest(balls: Balls, union: _native.HullUnion) -> tuple[FloatArray, float, float]:
+    """Centre and radius of the ball of a passage of which least is left, and how much.
+
+    Of balls whose centres are about as much covered, some along the passage are looked at: where it opens, part of a
+    ball is outside of it.
+    """
+    covered = union.distance(balls.centres, 1) / balls.radii
+    some = np.flatnonzero(covered <= covered.min() + LEAST_LOSS)
+    axis = int(np.ptp(balls.centres, axis=0).argmax())
+    along = some[np.argsort(balls.centres[some, axis], kind="stable")]
+    looked_at = along[np.unique(np.linspace(0, len(along) - 1, LOOKED_AT).astype(int))].tolist()
+    left = [_left(union, balls.centres[i], balls.radii[i]) for i in looked_at]
+    worst = int(np.argmin(np.array(left) / balls.radii[looked_at]))
+    i = looked_at[worst]
+    return balls.centres[i], float(balls.radii[i]), left[worst]
+
+
 def _left(union: _native.HullUnion, centre: FloatArray, radius: float) -> float:
-    """Radius of the largest ball that fits inside a ball and outside the hulls, to within `ACCURACY`."""
+    """Radius of the largest ball that fits inside a ball and outside the hulls, to within `ACCURACY`.
+
+    Its centre is that of the ball to within half the radius: beside a plate thinner than the ball, much of it is free.
+    """
     at, left = centre, 0.0
     for step, around in _SEARCH:
         there = at + step * radius * around
-        aside = there - centre
-        fits = np.minimum(union.distance(there, 1), radius - np.sqrt(dots(aside, aside)))
+        away = np.sqrt(dots(there - centre, there - centre))
+        fits = np.where(away <= radius / 2, np.minimum(union.distance(there, 1), radius - away), 0.0)
         if fits.max() > left:
             at, left = there[fits.argmax()], float(fits.max())
     return left
 
 
-def too_narrow(found: Sequence[dict[str, Any]], reached: Reached) -> list[str]:
+def too_narrow(found: Sequence[dict[str, Any]], reached: Reached, is_stopped: bool) -> list[str]:
     """Warn of passages that keep less than asked for, and of others that lose over a third of their radius."""
     options, scale, asked, others = reached.options, reached.solid.frame.scale, [], []
+    ball, told = options.keep_open_abs, MOSTLY if options.keep_open_abs is None else 1 - LEAST_LOSS
     for at, radius, left in (one.values() for one in found):
-        least = (options.keep_open or 0.0) * radius + (options.keep_open_abs or 0.0)
         if radius * scale >= least_kept(options, scale):
-            asked += [(radius - left, at, radius, left)] if left < least - ACCURACY * radius else []
-        elif left < MOSTLY * radius:
-            others.append((radius - left, at, radius, left))
+            if left < (options.keep_open or 0.0) * radius + (ball or 0.0) - ACCURACY * radius:
+                asked.append((at, radius, left))
+        elif left < told * radius:
+            others.append((at, radius, left))
+    reason = "the work was stopped before" if is_stopped else "limits on the hulls leave no other way"
+    share = "over a third" if ball is None else f"over a tenth, too narrow for a ball of radius {ball:.4g}"
     return [
-        _narrows(lost, share, cure)
-        for lost, share, cure in (
-            (asked, "more than keep_open allows", "limits on the hulls leave no other way"),
-            (others, "over a third", "--keep-open or a smaller threshold keeps more of it"),
+        _narrows(lost, by, cure)
+        for lost, by, cure in (
+            (asked, "more than --keep-open allows", reason),
+            (others, share, "--keep-open with a length, or a smaller threshold, keeps more open"),
         )
         if lost
     ]
 
 
-def _narrows(lost: list[tuple[float, list[float], float, float]], share: str, cure: str) -> str:
-    closed = sum(left <= ACCURACY * radius for *_, radius, left in lost)
-    _, at, radius, left = max(lost)
+def _narrows(lost: list[tuple[list[float], float, float]], share: str, cure: str) -> str:
+    closed = sum(left <= ACCURACY * radius for _, radius, left in lost)
+    at, radius, left = min(lost, key=lambda one: (max(one[2] / one[1], ACCURACY), -one[1]))
     return (
         f"{len(lost)} passage{'s narrow' if len(lost) > 1 else ' narrows'} by {share}"
         f"{f', {closed} to nothing' if closed else ''}: "

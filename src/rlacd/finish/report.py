@@ -86,7 +86,7 @@ def make_report(
             warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
         exceeds = len(summary.warnings) > 0
         warnings += [*summary.warnings, *_shortcomings([part.hull for part in parts], apart, reached, exceeds)]
-        warnings += too_narrow(apart.passages if apart else [], reached)
+        warnings += too_narrow(apart.passages if apart else [], reached, run.stopped_by is not None)
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return {
