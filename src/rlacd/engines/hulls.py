@@ -20,5 +20,7 @@ def hulls_of(
     """Decompose a mesh, unless it is a decomposition; each hull comes with how far it has to be moved."""
     if isinstance(mesh, Decomposition) and options:
         raise OptionError(f"this mesh is decomposed already: leave out {', '.join(options)}.")
+    if options.get("primitives"):
+        raise OptionError("hulls are added as meshes, also where they stand for primitives: leave primitives out.")
     result = mesh if isinstance(mesh, Decomposition) else decompose(mesh, **options)
     return result, [required_hull(hull, hull_name(i), "for a simulator") for i, hull in enumerate(result)]
