@@ -57,9 +57,8 @@ def room() -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
 
 
-def main() -> None:
+def main(folder: Path) -> None:
     """Decompose the room for a small and for a large ball and draw both."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
     folder.mkdir(parents=True, exist_ok=True)
     for radius in (0.02, 0.10):
         result = rlacd.decompose(
@@ -73,4 +72,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))

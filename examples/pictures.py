@@ -17,7 +17,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import coacd
 import furnished_room
 import gallery
 import mug
@@ -100,6 +99,8 @@ def open_bodies() -> Iterator[trimesh.Trimesh]:
 
 def kettles(path: Path) -> list[Image.Image]:
     """CoACD's kettle by CoACD and by rlacd, both with their default options."""
+    import coacd  # only here, since Mitsuba does not find its plugins in a process that has loaded it
+
     own = rlacd.decompose(path)
     coacd.set_log_level("error")
     theirs = coacd.run_coacd(coacd.Mesh(own.source.vertices, own.source.faces), seed=0)

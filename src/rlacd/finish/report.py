@@ -74,9 +74,7 @@ def make_report(
     errors = None if is_cover else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
-    apart: _Distances | None = None
-    if has_surface:
-        apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None)
+    apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
         stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
@@ -84,8 +82,8 @@ def make_report(
             warnings += _unmeasured(solid)
         if options.overlap > 0:
             warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
-        exceeds = len(summary.warnings) > 0
-        warnings += [*summary.warnings, *_shortcomings([part.hull for part in parts], apart, reached, exceeds)]
+        missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
+        warnings += [*summary.warnings, *missed]
         warnings += too_narrow(apart.passages if apart else [], reached, run.stopped_by is not None)
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
