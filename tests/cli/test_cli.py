@@ -417,6 +417,10 @@ def test_other_commands_say_that_they_do_not_read_stdin(command: str) -> None:
     assert "only rlacd decompose reads stdin" in rlacd(command, "-").stderr
 
 
+def test_view_takes_no_threshold_with_a_unit_and_does_not_send_to_options_of_decompose(mesh: Path) -> None:
+    assert "it has to be a number or a share such as 2%" in rlacd("view", mesh, "--threshold", "2mm").stderr
+
+
 def test_hulls_of_stdin_are_not_poured_onto_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = types.SimpleNamespace(stdout=types.SimpleNamespace(isatty=lambda: True))
     monkeypatch.setattr("rlacd.cli.decompose.sys", terminal)

@@ -95,8 +95,8 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
     return with_criterion(given)
 
 
-def lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
-    """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m)."""
+def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
+    """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m), which None refuses."""
     taken = dict(given)
     for name, longest in LONGEST_SIDE.items():
         word = taken.get(name)
@@ -111,13 +111,13 @@ def lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
         if unit not in METRES:
             taken[name] = value / 100 * longest if unit == "%" else value
             continue
+        if metres is None or f"{name}_abs" not in _ABSOLUTE:
+            raise OptionError(f"--{flag} is {word}; it has to be a number or a share such as 2%.")
         if not metres:
             raise OptionError(
                 f"--{flag} is {word}, so the file's unit has to be known: give --unit file if the file states it (dae, "
                 f"fbx, 3mf, usd), --unit with its unit otherwise, or --{flag}-abs in the file's own."
             )
-        if f"{name}_abs" not in _ABSOLUTE:
-            raise OptionError(f"--{flag} is {word}; it has to be a number or a share such as 2%.")
         if f"{name}_abs" in taken:
             raise OptionError(f"--{flag} and --{flag}-abs are both lengths; give one of the two.")
         del taken[name]

@@ -38,7 +38,7 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
     from rlacd.decompose_mesh import decompose
     from rlacd.view.viewer import open_viewer
 
-    controls = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=False)
+    controls = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
     with open_viewer(mesh, decompose, controls, **given) as server, contextlib.suppress(KeyboardInterrupt):
         say(f"{mesh.name} is shown at {server.address} (Ctrl-C ends)")
         if browser:
