@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -278,6 +279,12 @@ def in_metres(source: InputMesh, options: Options) -> InputMesh:
     if options.unit == "file" and source.metres is None:
         raise OptionError(f"unit is 'file', but {source.name} does not say its unit; give mm, cm, m or in.")
     if options.unit is not None:
+        stated = source.metres
+        if stated is not None and not math.isclose(stated, UNITS.get(options.unit, stated)):
+            said = (
+                f"the unit of {source.name} is {stated:g} m, by its format or by what it says; --unit {options.unit} "
+            )
+            source = replace(source, warnings=(*source.warnings, f"{said}overrides that"))
         factor *= UNITS.get(options.unit, source.metres or 1.0)
         source = replace(source, metres=1.0)
     return source if factor == 1.0 else source.scaled(factor)

@@ -233,7 +233,8 @@ def test_a_stage_that_collides_becomes_a_stage_with_hulls(tmp_path: Path) -> Non
 
 
 def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> None:
-    run = batch(assets, "-o", tmp_path / "out", "--dry-run", "--format", "urdf")
+    units = ("--unit", "mm", "--threshold", "2mm", "--overlap", "1mm", "--keep-open", "3mm")
+    run = batch(assets, "-o", tmp_path / "out", "--dry-run", "--format", "urdf", *units)
     assert run.exit_code == 0
     assert run.stdout.splitlines() == ["a.obj -> a.obj.urdf", "a.stl -> a.stl.urdf", "b/椅子.ply -> b/椅子.urdf"]
     assert "3 meshes: 0 done, 3 to do" in run.stderr

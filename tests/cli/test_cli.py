@@ -213,12 +213,13 @@ def test_a_concavity_above_the_threshold_is_reported(mesh: Path, stand_in: Stand
         (["-o", "{dir}/out.fbx"], 2, ".glb, .obj, .ply, .stl"),
         (["-o", "{dir}/ell.stl/out.glb"], 3, "is a file, not a folder"),
         (["-o", "-", "--format", "urdf"], 2, "give -o a file name"),
-        (["-o", "-", "--report", "-"], 2, "--report - would overwrite what -o writes"),
+        (["-o", "-", "--format", "xml"], 2, "give -o a file name"),
+        (["-o", "-", "--report", "-"], 2, "--report - would overwrite the hulls"),
         (["--from", "obj"], 2, "give - as IN"),
         (["-o", "{dir}/ell.stl"], 2, "overwrite the input"),
         (["--report", "{dir}/ell.stl/r.json"], 3, "is a file, not a folder"),
         (["--report", "{dir}"], 3, "it is a folder"),
-        (["--report", "{dir}/ell_hulls.glb"], 2, "overwrite what -o writes"),
+        (["--report", "{dir}/ell_hulls.glb"], 2, "overwrite the hulls"),
         (["--picture", "{dir}/p.jpg"], 2, ".png"),
         (["--criterion", "navigable", "--balls", "{dir}/b.ply"], 2, ".csv or .glb"),
         (["-o", ""], 2, "no name"),
@@ -395,7 +396,10 @@ def test_a_mesh_from_stdin_becomes_hulls_on_stdout(mesh: Path, words: list[str],
     ("words", "given", "says"),
     [
         ([], b"no mesh at all", "add --from obj"),
-        (["--from", "obj"], b"", "stdin is empty"),
+        ([], b"", "stdin is empty"),
+        (["mug.obj"], b"", "takes one mesh, not 2; for many, put them in a folder: rlacd batch . "),
+        (["--from", "stl"], b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "stdin is not stl but obj: use --from obj"),
+        (["--report", "-", "--from", "obj"], b"v 0 0 0\n", "--report - would overwrite the hulls"),
         (["--from", "obj"], b"v 0 0 0\nf 1 2 9\n", "stdin cannot be read as obj"),
         (["--from", "abc"], b"abc", "stdin is in a format that rlacd does not read"),
         (["--from", "urdf", "-o", "out.urdf"], b"<robot/>", "files beside it"),
@@ -406,6 +410,28 @@ def test_what_stdin_cannot_be_read_as_is_said(words: list[str], given: bytes, sa
     assert run.exit_code == 2
     assert says in run.stderr
     assert len(run.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["info", "view"])
+def test_other_commands_say_that_they_do_not_read_stdin(command: str) -> None:
+    assert "only rlacd decompose reads stdin" in rlacd(command, "-").stderr
+
+
+def test_view_takes_no_threshold_with_a_unit_and_does_not_send_to_options_of_decompose(mesh: Path) -> None:
+    assert "it has to be a number or a share such as 2%" in rlacd("view", mesh, "--threshold", "2mm").stderr
+
+
+def test_hulls_of_stdin_are_not_poured_onto_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = types.SimpleNamespace(stdout=types.SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("rlacd.cli.decompose.sys", terminal)
+    run = rlacd("decompose", "-")
+    assert (run.exit_code, len(run.stderr.splitlines())) == (2, 1)
+    assert "give -o a file name" in run.stderr
+
+
+def test_the_format_names_the_file_where_o_does_not(mesh: Path, stand_in: StandIn) -> None:
+    assert rlacd("decompose", mesh, "--format", "ply", "--quiet").exit_code == 0
+    assert sorted(path.name for path in mesh.parent.iterdir()) == ["ell.stl", "ell_hulls.ply"]
 
 
 @pytest.mark.slow

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from click.testing import CliRunner
 
 import rlacd
+from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.cad import DEVIATION
 from rlacd.io.read.load import load_mesh
@@ -54,6 +56,13 @@ def test_hulls_lie_below_their_parts_which_keep_their_colours(tmp_path: Path) ->
         assert [header["nodes"][child]["name"] for child in nodes[name]["children"]] == [f"UCX_{name}_00"]
     colours = [one["pbrMetallicRoughness"].get("baseColorFactor") for one in header["materials"]]
     assert [1.0, 0.0, 0.0, 1.0] in colours
+
+
+def test_a_length_needs_no_unit_and_another_than_metres_is_warned_of(tmp_path: Path) -> None:
+    words = ["decompose", str(STAND), "-o", str(tmp_path / "out.glb"), "--quality", "fast", "--threshold", "1mm"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    run = CliRunner().invoke(app, [*words[:-1], "5%", "--unit", "mm"])
+    assert "warning: the unit of stand.step is 1 m, by its format or by what it says; --unit mm overrides" in run.stderr
 
 
 @pytest.mark.slow

@@ -218,7 +218,7 @@ def test_shares_that_no_object_can_have_are_refused(given: dict[str, float]) -> 
 
 @pytest.mark.parametrize("given", [{"radius_abs": 1e-320}, {"tolerance_abs": 1e300}, {"radius_abs": 1e-5}])
 def test_lengths_that_do_not_fit_the_object_are_refused(given: dict[str, float]) -> None:
-    with pytest.raises(OptionError, match=r"for this object it has to be between 0\.0001 and 10"):
+    with pytest.raises(OptionError, match=r"as a length\) is .* for this object it has to be between 0\.0001 and 10"):
         rlacd.decompose(creation.box(), criterion=rlacd.NavigableSpace(**given))
 
 
@@ -232,8 +232,12 @@ def test_a_length_may_be_a_share_or_in_metres() -> None:
     assert decompose_options({"threshold": "5 mm"}, metres=True) == {"threshold_abs": 0.005}
     space = decompose_options({"criterion": "navigable", "radius": "4%", "tolerance": "2cm"}, metres=True)["criterion"]
     assert (space.radius, space.tolerance_abs) == (0.04, 0.02)
-    with pytest.raises(OptionError, match="does not say its unit; give --unit, or --threshold-abs"):
-        decompose_options({"threshold": "0.05m"})
+    with pytest.raises(OptionError, match=r"give --unit file if the file states it .*, or --keep-open-abs"):
+        decompose_options({"keep_open": "0.05m"})
+    with pytest.raises(OptionError, match="--keep-open is 'abc'"):
+        decompose_options({"keep_open": "abc"})
+    with pytest.raises(OptionError, match="--keep-open 2mm or --keep-open-abs"):
+        Options(keep_open=2.0)
     for word in ("tight", "5 %%", "", "1e", "m", "0.1 miles"):
         with pytest.raises(OptionError, match="--threshold is"):
             decompose_options({"threshold": word}, metres=True)

@@ -73,6 +73,9 @@ def test_units_that_files_state(tmp_path: Path) -> None:
     assert np.allclose(in_inches.source.extents, table().extents, atol=1e-6)  # as they are, unless asked for
     in_metres = rlacd.decompose(path, threads=1, unit="file")
     assert np.allclose(in_metres.source.extents, table().extents * 0.0254, atol=1e-7)
+    assert not any("overrides" in said for said in in_metres.report["warnings"])
+    otherwise = rlacd.decompose(path, threads=1, unit="mm").report["warnings"]
+    assert any("the unit of chair.dae is 0.0254 m" in said and "--unit mm overrides" in said for said in otherwise)
     with pytest.raises(OptionError, match="does not say its unit"):
         rlacd.decompose(written(tmp_path, "ply"), unit="file")
 

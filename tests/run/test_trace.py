@@ -31,8 +31,11 @@ def test_no_core_makes_up_for_the_lock_and_for_what_one_thread_does_alone() -> N
 
 
 def test_a_trace_holds_the_work_of_all_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "torus.json"))
     torus = trimesh.creation.torus(1.0, 0.4, major_sections=24, minor_sections=12)
+    monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "missing" / "torus.json"))
+    with pytest.raises(rlacd.OutputError, match="correct RLACD_TRACE"):
+        rlacd.decompose(torus, progress=lambda _: pytest.fail("work was begun"))
+    monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "torus.json"))
     rlacd.decompose(torus, threads=2)
     spans = json.loads((tmp_path / "torus.json").read_text())["traceEvents"]
     (whole,) = (span for span in spans if span["cat"] == "run")

@@ -82,7 +82,8 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     if where.jobs == 0:
         raise OptionError("--jobs is 0; a batch needs at least 1 process.")
     written = {"file_format": own.file_format, **{name: given.pop(name) for name in WRITTEN}}
-    spec = JobSpec.of(decompose_options({**given, "threads": own.threads}), folders=own.folders, **written)
+    options = decompose_options({**given, "threads": own.threads}, metres=given["unit"] is not None)
+    spec = JobSpec.of(options, folders=own.folders, **written)
     work = Batch(assets, own.output, spec, where.limits(), own.fallback, own.glob, own.redo)
     if not quiet:
         _print_large(work)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import sys
 import warnings
 from functools import partial
 from pathlib import Path
@@ -20,8 +21,8 @@ from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.options.output import OutputOptions
 
 ROBOTS = (".urdf", ".xml")
-IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm")
-"""File formats that define the metre as their unit."""
+IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
+"""File formats that define the metre as their unit, or are read in metres whatever theirs is."""
 
 MESH = (
     "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd, fbx, step, iges. It need not be closed or clean. "
@@ -54,7 +55,10 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
     Ctrl-C once stops and writes the result so far; twice quits at once.
     """
     asked = OutputOptions(**taken(how, OutputOptions))
+    _check_single(mesh)
     if asked.output is None and str(mesh) == STDIO:
+        if sys.stdout is not None and sys.stdout.isatty():
+            raise OptionError("the hulls would go to the terminal: give -o a file name, or - to print them anyway.")
         asked = dataclasses.replace(asked, output=STDIO)
     with stdin_as_file(mesh, source) as file:
         complete = _run(file, asked, how)
@@ -161,6 +165,7 @@ def _stage(mesh: Path, wanted: OutputOptions) -> Any:
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:
     """Fill in the output path and format that the preset or the input determines."""
     from rlacd.io.write import MODELS
+    from rlacd.io.write.target import ending_of
     from rlacd.options.presets import find_preset
 
     output, file_format = asked.output, asked.file_format
@@ -169,8 +174,8 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
         ending = ".glb" if engine is None else engine.ending
         if mesh.suffix.lower() in ROBOTS:
             ending = mesh.suffix
-        elif file_format in MODELS:
-            ending = f".{MODELS[file_format][0]}"
+        elif file_format is not None:
+            ending = f".{ending_of(file_format)}"
         output = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
     if engine is not None and engine.file_format is not None and file_format is None:
         fits = Path(output).suffix.lower().lstrip(".") in MODELS[engine.file_format]
@@ -218,14 +223,18 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
         check_file(Path(wanted.report))
 
 
-def _check_input(mesh: Path) -> None:
-    """Report a missing input before any problem with the output; loading reports everything else."""
+def _check_single(mesh: Path) -> None:
+    """Reject more than one input."""
     if more := click.get_current_context().args:
         ending = f"'*{mesh.suffix}'" if mesh.suffix else "'*.obj'"
         raise OptionError(
             f"decompose takes one mesh, not {1 + len(more)}; for many, put them in a folder: "
             f"rlacd batch {mesh.parent} -o hulls/ --glob {ending}."
         )
+
+
+def _check_input(mesh: Path) -> None:
+    """Report a missing input before any problem with the output; loading reports everything else."""
     try:
         mesh.stat()
     except FileNotFoundError as error:
@@ -246,7 +255,7 @@ def _check_output(mesh: Path, wanted: OutputOptions) -> None:
         place = path if path == STDIO else _same(path)
         if place in seen:
             raise OptionError(f"{flag} {path} would overwrite {seen[place]}; choose another name.")
-        seen[place] = f"what {flag} writes"
+        seen[place] = "the hulls" if name == "output" else f"what {flag} writes"
 
 
 def _same(path: str | Path) -> str:

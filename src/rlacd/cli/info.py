@@ -10,6 +10,7 @@ from typing import Any
 from rlacd.cli.commands import Argument, Command, Option
 from rlacd.cli.exit_codes import give
 from rlacd.cli.lean import import_trimesh
+from rlacd.cli.pipes import refuse_stdin
 from rlacd.plain_json import printable, to_json
 
 
@@ -21,6 +22,7 @@ def _info(mesh: Path, as_json: bool) -> None:
       rlacd info chair.glb
       rlacd info chair.glb --json | jq .repair
     """
+    refuse_stdin(mesh)
     import_trimesh(mesh)
     facts = describe(mesh)
     give(to_json(facts) if as_json else printable(describe_text(facts)))

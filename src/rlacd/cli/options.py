@@ -95,30 +95,31 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
     return with_criterion(given)
 
 
-def lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
-    """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m)."""
+def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
+    """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m), which None refuses."""
     taken = dict(given)
     for name, longest in LONGEST_SIDE.items():
         word = taken.get(name)
         if not isinstance(word, str):
             continue
-        found = _LENGTH.fullmatch(word.strip())
+        flag, found = name.replace("_", "-"), _LENGTH.fullmatch(word.strip())
         value, unit = (_number(found[1]), found[2]) if found else (_number(word), None)
         if value is None:
             raise OptionError(
-                f"--{name} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
+                f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
             )
         if unit not in METRES:
             taken[name] = value / 100 * longest if unit == "%" else value
             continue
+        if metres is None or f"{name}_abs" not in _ABSOLUTE:
+            raise OptionError(f"--{flag} is {word}; it has to be a number or a share such as 2%.")
         if not metres:
             raise OptionError(
-                f"--{name} is {word}, but the file does not say its unit; give --unit, or --{name}-abs in its own."
+                f"--{flag} is {word}, so the file's unit has to be known: give --unit file if the file states it (dae, "
+                f"fbx, 3mf, usd), --unit with its unit otherwise, or --{flag}-abs in the file's own."
             )
-        if f"{name}_abs" not in _ABSOLUTE:
-            raise OptionError(f"--{name} is {word}; it has to be a number or a share such as 2%.")
         if f"{name}_abs" in taken:
-            raise OptionError(f"--{name} and --{name}-abs are both lengths; give one of the two.")
+            raise OptionError(f"--{flag} and --{flag}-abs are both lengths; give one of the two.")
         del taken[name]
         taken[f"{name}_abs"] = value * METRES[unit]
     return taken

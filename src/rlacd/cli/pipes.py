@@ -33,6 +33,8 @@ def stdin_as_file(mesh: Path, ending: str | None) -> Iterator[Path]:
     from rlacd.io.read.open_file import LARGEST_FILE, format_of
 
     content = b"" if sys.stdin is None else sys.stdin.buffer.read(LARGEST_FILE + 1)  # one more is refused as too large
+    if not content.strip(b"\0 \t\r\n"):
+        raise MeshFileError("stdin is empty: check what writes the mesh to it")
     ending = (ending or format_of(content) or "").lower().removeprefix(".")
     if ending in ("urdf", "xml"):
         raise OptionError("a robot refers to files beside it, so it is not read from stdin: give the name of its file.")
@@ -44,18 +46,26 @@ def stdin_as_file(mesh: Path, ending: str | None) -> Iterator[Path]:
         try:
             yield place
         except MeshFileError as error:
-            raise MeshFileError(str(error).replace(str(place), "stdin")) from error
+            said = str(error).replace(str(place), "stdin").replace("rename it to .", "use --from ")
+            raise MeshFileError(said) from error
+
+
+def refuse_stdin(mesh: Path) -> None:
+    """Reject ``-`` where a file is needed."""
+    if str(mesh) == STDIO:
+        raise OptionError("only rlacd decompose reads stdin: give the name of a file.")
 
 
 def stdout_name(output: str, file_format: str | None) -> str:
     """The name of a file for what stdout is to get; any other output's own."""
-    from rlacd.io.write.target import FOLDER_FORMAT, MODELS, WITH_MESHES
+    from rlacd.io.write.target import FOLDER_FORMAT, MODEL_OF, WITH_MESHES, ending_of
 
     if output != STDIO:
         return output
-    if file_format in WITH_MESHES:
+    ending = ending_of(file_format or FOLDER_FORMAT)
+    if MODEL_OF.get(ending) in WITH_MESHES:
         raise OptionError(f"{file_format} is several files, which do not fit into stdout: give -o a file name.")
-    return f"hulls.{MODELS[file_format][0] if file_format in MODELS else file_format or FOLDER_FORMAT}"
+    return f"hulls.{ending}"
 
 
 @contextlib.contextmanager

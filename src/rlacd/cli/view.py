@@ -11,6 +11,7 @@ from rlacd.cli.commands import Argument, Command, Option, chosen, options_of
 from rlacd.cli.decompose import ROBOTS
 from rlacd.cli.exit_codes import leave, say
 from rlacd.cli.options import lengths
+from rlacd.cli.pipes import refuse_stdin
 from rlacd.errors import OptionError
 from rlacd.options import Options
 from rlacd.options.output import OutputOptions
@@ -31,12 +32,13 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
     The page turns, pulls apart and colours the hulls, decomposes anew while you move a slider, and downloads any
     format. Nothing leaves this machine. Ctrl-C ends it.
     """
+    refuse_stdin(mesh)
     if mesh.suffix.lower() in ROBOTS:
         raise OptionError(f"{mesh} is a robot; view shows a single mesh: give one of the meshes that it refers to.")
     from rlacd.decompose_mesh import decompose
     from rlacd.view.viewer import open_viewer
 
-    controls = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=False)
+    controls = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
     with open_viewer(mesh, decompose, controls, **given) as server, contextlib.suppress(KeyboardInterrupt):
         say(f"{mesh.name} is shown at {server.address} (Ctrl-C ends)")
         if browser:

@@ -91,6 +91,12 @@ _POLICY = custom(
     "greedy navacd learned rl-acd FILE.npz …",
 )
 _CORNERS = integer(4, rule="an integer, at least 4 (a tetrahedron)")
+_OPENNESS = number(
+    *(0.1, 0.99),
+    rule="a number between 0.1 and 0.99, a share of each passage's radius; a radius is keep_open_abs "
+    "(--keep-open 2mm or --keep-open-abs)",
+    typed=str,
+)
 _SECONDS = number(above=0, rule="a positive number of seconds")
 _FACTOR = number(above=0, rule="a positive factor")
 
@@ -227,9 +233,7 @@ class Options:
     )
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
     overlap_abs: float | None = option(None, LIMITS, LENGTH)
-    keep_open: float | None = option(
-        None, LIMITS, number(0.1, 0.99, typed=str), metavar="NUMBER", usual="passages may close"
-    )
+    keep_open: float | None = option(None, LIMITS, _OPENNESS, metavar="NUMBER", usual="passages may close")
     keep_open_abs: float | None = option(None, LIMITS, LENGTH)
     merge: bool = option(True, METHOD, usual="merge")
     policy: str | Policy | None = option(None, METHOD, _POLICY, metavar="NAME", usual="greedy; learned with --no-merge")

@@ -396,7 +396,8 @@ def relative(name: str, length: float, scale: float, bounds: tuple[float, float]
     if not least <= number <= most:
         unit = scale * side / 2
         raise OptionError(
-            f"{name}_abs is {length!r}; for this object it has to be between {least / unit:.4g} and {most / unit:.4g} "
-            f"({100 * least / side:g} % and {100 * most / side:g} % of its longest side)."
+            f"{name}_abs (--{name.replace('_', '-')} as a length) is {length!r}; for this object it has to be between "
+            f"{least / unit:.4g} and {most / unit:.4g} ({100 * least / side:g} % and {100 * most / side:g} % of its "
+            "longest side)."
         )
     return number

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from rlacd._native import kernel_times, time_kernels
+from rlacd.errors import OutputError
 
 _R = TypeVar("_R")
 
@@ -31,6 +32,10 @@ class Trace:
         self._spans: list[dict[str, Any]] = []
         self._numbers: dict[Future[Any], int] = {}
         if path:
+            try:
+                Path(path).open("a").close()  # before the work: writing comes after it
+            except OSError as error:
+                raise OutputError(f"cannot write the trace {path} ({error.strerror}): correct RLACD_TRACE.") from error
             time_kernels(True)
 
     @contextmanager

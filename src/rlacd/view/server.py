@@ -202,7 +202,7 @@ class ViewServer(BoundedServer):
         try:
             super().__init__((ADDRESS, USUAL_PORT if port is None else port), _Handler)
         except OverflowError:
-            raise OptionError(f"{port} is not a port; choose one from 1024 to 65535.") from None
+            raise OptionError(f"{port} is not a port; choose one from 1024 to 65535, or 0 for any free one.") from None
         except OSError as error:
             if port is None:
                 super().__init__((ADDRESS, 0), _Handler)

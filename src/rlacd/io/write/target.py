@@ -27,7 +27,7 @@ MODELS: dict[str, tuple[str, ...]] = {
 }
 """Formats of hulls with their mesh, for a simulator or an engine, and the endings of each."""
 
-_MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
+MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
 
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 
@@ -105,20 +105,26 @@ def hull_target(
     return target
 
 
+def ending_of(file_format: str) -> str:
+    """The ending of a file of some format."""
+    name = file_format.lower().lstrip(".")
+    return MODELS[name][0] if name in MODELS else name
+
+
 def _target(text: str, file_format: str | None) -> Target:
     if not text:
         raise OptionError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
     place = Path(text)
     ending = place.suffix.lower().lstrip(".")
     wanted = None if file_format is None else file_format.lower().lstrip(".")
-    if wanted in _MODEL_OF:
-        wanted = _MODEL_OF[wanted]
+    if wanted in MODEL_OF:
+        wanted = MODEL_OF[wanted]
     if wanted in MODELS:
         return _model_target(text, wanted)
     if wanted is not None and wanted not in FORMATS:
         raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
-    if wanted is None and ending in _MODEL_OF and not text.endswith(SEPARATORS):
-        return _model_target(text, _MODEL_OF[ending])
+    if wanted is None and ending in MODEL_OF and not text.endswith(SEPARATORS):
+        return _model_target(text, MODEL_OF[ending])
 
     with output_errors(place):
         is_folder = text.endswith(SEPARATORS) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending)
@@ -127,7 +133,7 @@ def _target(text: str, file_format: str | None) -> Target:
             return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
 
     if ending not in FORMATS:
-        known = ", ".join(f".{name}" for name in (*FORMATS, *_MODEL_OF))
+        known = ", ".join(f".{name}" for name in (*FORMATS, *MODEL_OF))
         said = (
             f"{shown(str(place))}, whose ending is .{ending}" if ending else f"{shown(str(place))}, which has no ending"
         )
