@@ -36,10 +36,11 @@ from rlacd.view.viewer import open_viewer
 
 def main(docs: Path, meshes: Path) -> None:
     """Draw them all into the folder of the documentation."""
-    with step("the chair of make demo"):
-        rlacd.decompose(sample()).picture(docs / "demo.png", up="y")
-    with step("its boxes"):
-        rlacd.decompose(sample(), primitives="all").picture(docs / "primitives.png", up="y", width=1200)
+    with step("the chair of make demo, and its boxes"), TemporaryDirectory() as folder:
+        mesh = Path(folder) / "chair.glb"
+        sample().export(mesh)
+        rlacd.decompose(mesh).picture(docs / "demo.png")
+        rlacd.decompose(mesh, primitives="all").picture(docs / "primitives.png", width=1200)
     with step("a mug on a peg"), TemporaryDirectory() as folder:
         mug.draw(mug.main(Path(folder)), docs / "mug.png")
     with step("furnished rooms"), TemporaryDirectory() as folder:
@@ -65,10 +66,10 @@ def step(what: str) -> Iterator[None]:
     yield
 
 
-def panels(result: Result) -> Image.Image:
+def panels(result: Result, up: str = "z") -> Image.Image:
     """The input, its hulls, and the hulls pulled apart, on white."""
     with renderer() as render:
-        drawn = Image.open(io.BytesIO(picture_bytes(result, width=900, clear=True, render=render)))
+        drawn = Image.open(io.BytesIO(picture_bytes(result, width=900, up=up, clear=True, render=render)))
     return Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB")
 
 
@@ -107,7 +108,7 @@ def kettles(path: Path) -> list[Image.Image]:
     hulls = [trimesh.Trimesh(vertices, faces, process=False) for vertices, faces in theirs]
     rows = []
     for name, result in (("CoACD", Result(hulls, {}, own.source, input=own.input)), ("rlacd", own)):
-        row = panels(result)
+        row = panels(result, up="y")
         text = f"{name}: {len(result)} hulls, {sum(len(hull.faces) for hull in result):,} triangles"
         ImageDraw.Draw(row).text((24, 20), text, font=ImageFont.load_default(size=22), fill="black")
         rows.append(row)
