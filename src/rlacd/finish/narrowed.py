@@ -11,6 +11,7 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria.kept_open import least_kept
 from rlacd.find_parts import Reached
+from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
@@ -51,7 +52,7 @@ _AROUND = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
 _SEARCH = [(1.0, _INSIDE), *((2.0**-i, _AROUND) for i in (2, 3, 4, 5, 6) for _ in range(3))]
 
 
-def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, threads: int) -> list[dict[str, Any]]:
+def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> list[dict[str, Any]]:
     """Find the passages that hulls narrow by more than a tenth, one entry each, the most narrowed first.
 
     A ball of ``radius_abs`` around ``at_abs`` fits in the input, and in it one of ``left_abs`` between the hulls, which
@@ -60,7 +61,8 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, threads: int)
     most = min(over / LEAST_LOSS, 2.0)
     if reached.root is None or most <= NARROWEST:
         return []
-    surface, union, frame = reached.root.filling.surface, hull_union(hulls, threads), reached.solid.frame
+    threads, frame = run.threads, reached.solid.frame
+    surface, union = reached.root.filling.surface, hull_union(hulls, threads)
 
     def lose(balls: Balls) -> BoolArray:
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
@@ -68,12 +70,9 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, threads: int)
     balls = passage_balls(reached.solid.mesh, surface, (NARROWEST, most), STARTS, threads, lose)
     balls = balls.some(np.argsort(union.distance(balls.centres, threads) / balls.radii, kind="stable")[:MOST_BALLS])
     passage, found = _passages(balls, surface, threads), []
-    for i in np.sort(np.unique(passage, return_index=True)[1])[:MOST_LISTED]:
-        own = balls.some(passage == passage[i])
-        ends = np.concatenate([own.centres - own.radii[:, None], own.centres + own.radii[:, None]])
-        if np.ptp(ends, axis=0).max() < LEAST_EXTENT:
-            continue
-        at, radius, left = _narrowest(own, union)
+    first = np.sort(np.unique(passage, return_index=True)[1])[:MOST_LISTED]
+    long = [own for own in (balls.some(passage == passage[i]) for i in first) if _is_long(own)]
+    for at, radius, left in run.map(lambda own: _narrowest(own, union), long):
         if left < (1 - LEAST_LOSS) * radius:
             place = frame.to_input(at).tolist()
             found.append({"at_abs": place, "radius_abs": radius / frame.scale, "left_abs": left / frame.scale})
@@ -92,6 +91,12 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> IntArray:
     ways = np.ascontiguousarray((start + _ON_THE_WAY * (end - start)).reshape(-1, 3))
     is_free = surface.distance(ways, threads).reshape(-1, len(_ON_THE_WAY)).min(axis=1) > needed
     return _native.components(len(balls), first[is_free], second[is_free])[1].astype(np.int32)
+
+
+def _is_long(balls: Balls) -> bool:
+    """Whether a passage is more than a nick (see `LEAST_EXTENT`)."""
+    ends = np.concatenate([balls.centres - balls.radii[:, None], balls.centres + balls.radii[:, None]])
+    return bool(np.ptp(ends, axis=0).max() >= LEAST_EXTENT)
 
 
 def _narrowest(balls: Balls, union: _native.HullUnion) -> tuple[FloatArray, float, float]:

@@ -255,7 +255,7 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
         _, (face,) = surface.closest(np.array([point]))
         return solid.frame.place(point, int(solid.body_of[face]))
 
-    passages = narrowed(reached, hulls, found.over[1], run.threads)
+    passages = narrowed(reached, hulls, found.over[1], run)
     return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at), passages)
 
 
