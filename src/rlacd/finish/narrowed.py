@@ -40,10 +40,10 @@ MOST_BALLS = 500
 MOST_LISTED = 50
 
 LOOKED_AT = 5
-"""Places of a passage at which it is found what is left."""
+"""Places along a passage at which what is left is measured."""
 
 ACCURACY = 0.05
-"""Share of its radius to within which it is found what is left of a ball."""
+"""Share of its radius to within which what is left of a ball is measured; less counts as closed."""
 
 _NEIGHBOURS = 8
 _ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]

@@ -118,8 +118,8 @@ class Part:
     def glued(first: Part, second: Part, hull: Hull | None = None) -> Part:
         """Unite two parts with disjoint interiors; the regions where they touch are not part of the union's surface.
 
-        If either is a `ClippedPart`, which also holds what other parts contribute, the union is one too. Pass the joint
-        hull if it is known.
+        If either is a `ClippedPart`, which also holds what other parts contribute, the union is one too, if clipping
+        leaves any of it. Pass the joint hull if it is known.
         """
         hull = hull or Hull.around(first.hull, second.hull)
         for part in (first, second):
