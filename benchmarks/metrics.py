@@ -161,7 +161,8 @@ def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> t
         if share.is_empty() or share.volume() < NOTHING:
             empty += 1
             continue
-        mesh = share.to_mesh64()
+        # A mesh may overlap itself: a piece that lies within another has no surface that could be seen.
+        mesh = Manifold.batch_boolean(share.decompose(), OpType.Add).to_mesh64()
         vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
         part = Part(vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32), share.volume(), hull)
         # Only the maximum is needed: parts below the current worst need no exact value.
