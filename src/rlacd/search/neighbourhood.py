@@ -39,17 +39,12 @@ CLUSTER = 3
 DRAWS = 10
 """Draws of a cluster before a trial is skipped for lack of a new one."""
 
-REPEATS = 4
-"""How often a part may be offered to the same parts, each time divided in other places."""
-
-OPENING = 16
-"""Recuts before the first attempt to redistribute all parts: later recuts undo some of what that gains."""
-
 SMALLEST_FIRST = 0.5
 """Share of the parts, the smallest, that are redistributed first: nothing saves more parts per unit of work."""
 
-RECUTS_PER_PART = 2
-"""Recuts per part between two attempts to redistribute all parts."""
+PARTS_PER_RECUT = 4
+"""Between two attempts to redistribute all parts, a cluster is recut for so many parts: a recut takes the work of three
+attempts to redistribute a part and saves a tenth as many parts, but changes what there is to redistribute."""
 
 PATIENCE = 24
 """By default the search is exhausted after this many trials per part without a gain, ..."""
@@ -120,18 +115,14 @@ class Neighbourhood:
         self._steps = self._accepted = self._without_gain = 0
         self._begun: deque[_Begun] = deque()
         self._recut: set[tuple[Cluster, int]] = set()
-        self._offered: dict[tuple[int, Cluster], int] = {}
         self._price = 0.0  # units that the last trials took
-        self._exhausted = False
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     def improve(self, most: float = math.inf) -> SearchOutcome:
         """Search until nothing is left to try, the run is over, `most` recuts are made or no fewer parts can do."""
-        self._exhausted = False
         if most > 0:
             self._make(self._trials(most))
-        exhausted = self._exhausted or self._gave_up or self._is_least
-        return SearchOutcome(self._best, self._steps, self._accepted, exhausted)
+        return SearchOutcome(self._best, self._steps, self._accepted, self._gave_up or self._is_least)
 
     def redistribute_all(self) -> None:
         """Offer each part to those around."""
@@ -139,10 +130,8 @@ class Neighbourhood:
 
     def _trials(self, most: float) -> Iterator[_Trial]:
         yield from self._redistributions(SMALLEST_FIRST)
-        yield from self._recuts(min(most, OPENING))
-        yield from self._redistributions()
-        while not self._exhausted and self._steps < most and self._may_continue():
-            yield from self._recuts(min(most, self._steps + RECUTS_PER_PART * len(self._graph.parts)))
+        while self._steps < most and self._may_continue():
+            yield from self._recuts(min(most, self._steps + math.ceil(len(self._graph.parts) / PARTS_PER_RECUT)))
             yield from self._redistributions()
 
     def _redistributions(self, share: float = 1.0) -> Iterator[_Trial]:
@@ -167,7 +156,6 @@ class Neighbourhood:
             elif self._begun:  # what they find may bring new clusters
                 self._settle()
             elif (failed := failed + 1) == LAG:
-                self._exhausted = True
                 return
 
     @property
@@ -201,10 +189,7 @@ class Neighbourhood:
         if which not in self._graph.parts:
             return None
         around = self._graph.near(which, self._near)
-        key, seed = (which, around), int(self._random.integers(2**32))
-        self._offered[key] = self._offered.get(key, 0) + 1
-        if self._offered[key] > REPEATS:
-            return None
+        seed = int(self._random.integers(2**32))
         part, takers, context = self._graph.parts[which], self._graph.of(around), self._context
         return lambda run: redistribute(part, takers, context.criterion, np.random.default_rng(seed), context.root, run)
 

@@ -28,7 +28,7 @@ LEAST_WORK, MOST_WORK = 0.15e6, 6e6
 WORK_OF_A_STEP = 1e5
 """Where only the number of steps is limited, the work allowed for each: far more than most take."""
 
-BOUNDED_PATIENCE = 4
+BOUNDED_PATIENCE = 2
 """A bounded search gives up after this many trials per part without a gain."""
 
 ANOTHER_PASS = 1.5
