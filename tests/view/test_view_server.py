@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import contextlib
 import hashlib
 import http.client
 import io
@@ -217,14 +216,12 @@ def test_a_report_under_way_holds_up_no_decomposition(viewer: ViewServer, monkey
     settled(viewer, run=1)
     begun, done = threading.Event(), threading.Event()
 
-    @contextlib.contextmanager
-    def slow() -> Iterator[Any]:
+    def slow(*_: Any, **__: Any) -> bytes:
         begun.set()
         assert done.wait(PATIENCE)
         raise OutputError("the picture could not be drawn: its process died of SIGKILL.")
-        yield
 
-    monkeypatch.setattr("rlacd.view.downloads.renderer", slow)
+    monkeypatch.setattr("rlacd.view.report.picture_bytes", slow)
     answers: list[Answer] = []
     reports = [
         threading.Thread(target=lambda: answers.append(ask(viewer, "GET", "/download?format=report.html")))

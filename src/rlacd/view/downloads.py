@@ -17,7 +17,6 @@ from rlacd.io.write.usd import require_usd
 from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.apart import renderer
 from rlacd.view.report import report_page
 
 FOLDERS = ("obj", "stl")
@@ -129,9 +128,7 @@ def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "
         raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
     stem = file_stem(decomposition.name)
     if wanted == "report.html":
-        with renderer() as render:
-            page = report_page(decomposition, up=up, unit=unit, render=render)
-        return Download(f"{stem}_hulls.html", page.encode())
+        return Download(f"{stem}_hulls.html", report_page(decomposition, up=up, unit=unit).encode())
     if wanted == "report.json":
         return Download(f"{stem}_hulls.json", to_json(decomposition.report).encode())
     with tempfile.TemporaryDirectory() as name:

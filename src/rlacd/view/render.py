@@ -6,11 +6,10 @@ find no OpenGL and abort the process.
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -37,10 +36,6 @@ class Spheres:
     centres: npt.NDArray[np.float64]
     radii: npt.NDArray[np.float64]
     color: npt.NDArray[np.float64]
-
-
-Render: TypeAlias = Callable[..., npt.NDArray[np.uint8]]
-"""`render`, here or in another process."""
 
 
 def require_extra(module: str) -> Any:
@@ -84,28 +79,28 @@ def render(
         Mitsuba is not installed.
     """
     mi = require_extra("mitsuba")
+    mi.set_variant("scalar_rgb")  # needs no compiler at run time
     points = np.concatenate([body.triangles.reshape(-1, 3) for body in bodies])
     low, high = points.min(axis=0), points.max(axis=0)
     view = _view(points - (low + high) / 2.0, width / height)
     # The scene is centred and scaled, since the renderer computes in float32.
     size = float(np.linalg.norm(high - low)) or 1.0
-    with _scalar_variant(mi):
-        scene: dict[str, Any] = {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 3, "hide_emitters": True},
-            "sensor": _sensor(mi, view / size, width, height),
-            "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.42}},
-            "key": _lamp(mi),
-        }
-        for index, body in enumerate(bodies):
-            placed = (body.triangles - (low + high) / 2.0) / size
-            scene[f"body_{index}"] = _mesh(mi, placed, body.color)
-        if spheres is not None:
-            surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": spheres.color.tolist()}}
-            centres = ((spheres.centres - (low + high) / 2.0) / size).tolist()
-            for index, (centre, radius) in enumerate(zip(centres, (spheres.radii / size).tolist(), strict=True)):
-                scene[f"sphere_{index}"] = {"type": "sphere", "center": centre, "radius": radius, "surface": surface}
-        light = np.array(mi.render(mi.load_dict(scene), spp=samples))
+    scene: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 3, "hide_emitters": True},
+        "sensor": _sensor(mi, view / size, width, height),
+        "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.42}},
+        "key": _lamp(mi),
+    }
+    for index, body in enumerate(bodies):
+        placed = (body.triangles - (low + high) / 2.0) / size
+        scene[f"body_{index}"] = _mesh(mi, placed, body.color)
+    if spheres is not None:
+        surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": spheres.color.tolist()}}
+        centres = ((spheres.centres.reshape(-1, 3) - (low + high) / 2.0) / size).tolist()
+        for index, (centre, radius) in enumerate(zip(centres, (spheres.radii / size).tolist(), strict=True)):
+            scene[f"sphere_{index}"] = {"type": "sphere", "center": centre, "radius": radius, "surface": surface}
+    light = np.array(mi.render(mi.load_dict(scene), spp=samples))
     if clear:
         covered = np.clip(light[..., 3:], 0.0, 1.0)
         colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
@@ -168,15 +163,3 @@ def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.flo
     arrays["faces"] = np.arange(3 * len(triangles), dtype=np.uint32)
     arrays.update()
     return mesh
-
-
-@contextlib.contextmanager
-def _scalar_variant(mi: Any) -> Iterator[None]:
-    """Select Mitsuba's scalar variant, which needs no compiler at run time; the caller's choice is restored after."""
-    before = mi.variant()
-    mi.set_variant("scalar_rgb")
-    try:
-        yield
-    finally:
-        if before is not None:
-            mi.set_variant(before)
