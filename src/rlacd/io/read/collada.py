@@ -18,12 +18,14 @@ from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
 from rlacd.io.read.conventions import COLLADA_HEAD, collada
 from rlacd.io.read.looks import opened_picture, painted
-from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles, triangles_within
+from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles
 from rlacd.io.read.text import rows_of, whole
 from rlacd.io.read.xml import open_archive, parse_xml, unpack
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
+
+_REFUSED = {"ph": "polygons with holes, which are not read: triangulate them", "skew": "skewed parts: apply transforms"}
 
 _UNREAD = {
     "lines": "lines of {} were left out",
@@ -60,6 +62,8 @@ class _Document:
             element.get("id"): element for element in self.root.iter("{*}*") if element.get("id")
         }
         tags = {etree.QName(element).localname for element in self.root.iter("{*}*")}
+        for tag in _REFUSED.keys() & tags:
+            raise MeshFileError(f"{path} has {_REFUSED[tag]}, and export it again")
         self.warnings = list(dict.fromkeys(said.format(path.name) for tag, said in _UNREAD.items() if tag in tags))
         self.placed: dict[str, _Placed] = {}
         self._keys: Counter[str | None] = Counter()
@@ -229,16 +233,9 @@ def _corners(primitive: Any, points: FloatArray, offset: int, width: int) -> Int
     rings = [_integers(p.text, width) for p in primitive.iterchildren("{*}p")]
     rows = np.concatenate([np.empty((0, width), dtype=np.int64), *rings])
     counts = np.array([len(ring) for ring in rings], dtype=np.int64)
-    more = []
-    for holed in primitive.iterchildren("{*}ph"):
-        outline, *holes = (_integers(ring.text, width) for ring in holed.iterchildren("{*}p", "{*}h"))
-        own = np.concatenate([outline, *holes])
-        _check(own[:, offset], points)
-        places = triangles_within(points[outline[:, offset]], [points[hole[:, offset]] for hole in holes])
-        if places is None:
-            raise ValueError("a polygon with holes that cross it")
-        more.append(own[places])
-    _check(rows[:, offset], points)
+    corners = rows[:, offset]
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
     match tag:
         case "triangles":
             places = np.arange(len(rows)).reshape(-1, 3)
@@ -249,13 +246,8 @@ def _corners(primitive: Any, points: FloatArray, offset: int, width: int) -> Int
             counts = _integers(primitive.findtext("{*}vcount"), 1)[:, 0] if tag == "polylist" else counts
             if (counts < 0).any() or counts.sum() != len(rows):
                 raise ValueError(f"polygons of {counts.sum()} corners, but {len(rows)} are there")
-            places = places_of(points, counts, rows[:, offset])
-    return np.concatenate([rows[places], *more])
-
-
-def _check(corners: IntArray, points: FloatArray) -> None:
-    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
+            places = places_of(points, counts, corners)
+    return np.asarray(rows[places])
 
 
 def _numbers(text: str | None) -> FloatArray:
@@ -281,36 +273,12 @@ def _rotation(values: FloatArray) -> FloatArray:
     return np.asarray(trimesh.transformations.rotation_matrix(np.radians(angle), axis))
 
 
-def _skew(values: FloatArray) -> FloatArray:
-    """By RenderMan, to which COLLADA refers: turn one axis to the other, along which all points move."""
-    angle, (turned, along) = np.radians(values[0]), values[1:].reshape(2, 3)
-    turned, along = turned / np.linalg.norm(turned), along / np.linalg.norm(along)
-    between = np.arccos(np.clip(turned @ along, -1, 1))
-    if not between - np.pi < angle < between:
-        raise ValueError("a skew that is none")
-    across = (turned - turned @ along * along) / np.sin(between)
-    matrix = np.eye(4)
-    matrix[:3, :3] += (1 / np.tan(between - angle) - 1 / np.tan(between)) * np.outer(along, across)
-    return matrix
-
-
-def _lookat(values: FloatArray) -> FloatArray:
-    """A view from one point to another."""
-    eye, aim, up = values.reshape(3, 3)
-    back = (eye - aim) / np.linalg.norm(eye - aim)
-    right = np.cross(up, back) / np.linalg.norm(np.cross(up, back))
-    matrix = np.eye(4)
-    matrix[:3] = np.stack([right, np.cross(back, right), back, eye], axis=1)
-    return matrix
-
-
 _MOVES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "matrix": lambda values: values.reshape(4, 4),
     "translate": lambda values: np.asarray(trimesh.transformations.translation_matrix(values)),
     "rotate": _rotation,
     "scale": lambda values: np.diag([*values.reshape(3), 1.0]),
-    "skew": _skew,
-    "lookat": _lookat,
+    "lookat": lambda _: np.full((4, 4), np.nan),  # of cameras and lights; a mesh there is left out, with a warning
 }
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from manifold3d import triangulate
 
@@ -74,40 +72,25 @@ def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) 
     return np.unique(owner[turned])
 
 
-def triangles_within(ring: FloatArray, holes: Sequence[FloatArray] = ()) -> IntArray | None:
-    """Triangles of one polygon ``[N, 3]`` that do not fold over; None if there are none.
-
-    ``[N - 2, 3]`` without holes; each hole gives two more than it has corners, which count on after those of the ring.
-    """
-    total = len(ring) + sum(map(len, holes))
-    middle = ring.mean(axis=0)
-    rings = [one - middle for one in (ring, *holes)]
-    if total > MOST_CORNERS or not all(np.isfinite(one).all() for one in rings):
+def triangles_within(ring: FloatArray) -> IntArray | None:
+    """Triangles ``[N - 2, 3]`` of one polygon ``[N, 3]`` that do not fold over; None if there are none."""
+    if len(ring) > MOST_CORNERS or not np.isfinite(ring).all():
         return None
-    normal = _normal(rings[0])
+    ring = ring - ring.mean(axis=0)
+    normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
     length = float(np.linalg.norm(normal))
     if not length > 0:
         return None
     normal /= length
-    across = np.eye(3)[np.abs(normal).argmin()]
-    right = np.cross(across, normal)
+    right = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
     right /= np.linalg.norm(right)
-    flat = [np.ascontiguousarray(np.stack([one @ right, one @ np.cross(normal, right)], axis=1)) for one in rings]
-    places = np.split(np.arange(total), np.cumsum([len(one) for one in rings])[:-1])
-    for hole, one in enumerate(rings[1:], 1):
-        if _normal(one) @ normal > 0:  # holes run the other way
-            flat[hole], places[hole] = np.ascontiguousarray(flat[hole][::-1]), places[hole][::-1]
-    found = np.asarray(triangulate(flat), dtype=np.int64)
-    if found.shape != (total - 2 + 2 * len(holes), 3):
+    flat = np.ascontiguousarray(np.stack([ring @ right, ring @ np.cross(normal, right)], axis=1))
+    found = np.asarray(triangulate([flat]), dtype=np.int64)
+    if found.shape != (len(ring) - 2, 3):
         return None
-    points = np.concatenate(flat)
-    a, b, c = points[found[:, 0]], points[found[:, 1]], points[found[:, 2]]
+    a, b, c = flat[found[:, 0]], flat[found[:, 1]], flat[found[:, 2]]
     areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return np.concatenate(places)[found] if areas.min() >= -TURNED_SHARE * length else None
-
-
-def _normal(ring: FloatArray) -> FloatArray:
-    return np.asarray(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0))
+    return found if areas.min() >= -TURNED_SHARE * length else None
 
 
 def strip_triangles(corners: IntArray) -> IntArray:
