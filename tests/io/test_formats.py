@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from rlacd.errors import OptionError, OutputError
 from rlacd.io.write import FORMATS, hull_target, save_hulls
 from rlacd.io.write.palette import hull_colors
+from rlacd.options.output import OutputOptions
 from tests.assets import read_glb
 from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
 
@@ -230,9 +231,9 @@ def test_a_folder_without_permission_is_refused_before_work(tmp_path: Path) -> N
 
 def test_contradicting_formats_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="contradicts"):
-        hull_target(tmp_path / "out.glb", "obj")
+        hull_target(tmp_path / "out.glb", OutputOptions(file_format="obj"))
     with pytest.raises(OptionError, match="unknown format"):
-        hull_target(f"{tmp_path}/out/", "fbx")
+        hull_target(f"{tmp_path}/out/", OutputOptions(file_format="fbx"))
 
 
 # --- whole or not at all ----------------------------------------------------------------------------------------------

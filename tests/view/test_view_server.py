@@ -29,7 +29,7 @@ from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace
-from rlacd.view.controls import ViewerControls, read_controls
+from rlacd.view.controls import read_controls
 from rlacd.view.downloads import offered
 from rlacd.view.server import ViewServer
 from tests.view.viewing import open_viewer
@@ -581,9 +581,8 @@ def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
 
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
-    controls, usual, space = ViewerControls(), Options(), NavigableSpace()
+    controls, usual, space = read_controls({}), Options(), NavigableSpace()
     for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap", "open"):
-        assert getattr(controls, name) == getattr(usual, name)
-    assert bool(controls.primitives) == bool(usual.primitives)
-    assert (controls.radius, controls.tolerance) == (space.radius, space.tolerance)
-    assert read_controls({}) == controls
+        assert controls[name] == getattr(usual, name)
+    assert bool(controls["primitives"]) == bool(usual.primitives)
+    assert (controls["radius"], controls["tolerance"]) == (space.radius, space.tolerance)

@@ -17,7 +17,7 @@ from rlacd.batch.job_spec import POLICY, JobSpec
 from rlacd.batch.store import open_store, put_files, under
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, RlacdError
+from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, sentence_of
 from rlacd.fit import LENGTHS, Fit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
@@ -177,15 +177,9 @@ class MeshServer:
                 spec = self._spec(values["spec"], shared)
                 report, files = make(spec, path, values["stem"], self._staging, values["hull_only"])
                 answer: dict[str, Any] = {"report": report}
-            except MeshError as error:
-                answer = {"error": self._sentence(error, path, values["name"]), "unusable": True}
-            except RlacdError as error:
-                answer = {"error": self._sentence(error, path, values["name"])}
-            except MemoryError:
-                answer = {"error": "there is not enough memory for it"}
             except Exception as error:
-                sentence = self._sentence(error, path, values["name"])
-                answer = {"error": f"a bug in rlacd ({type(error).__name__}: {sentence})"}
+                said = sentence_of(error).replace(str(path), values["name"]).replace(str(self._staging), "")
+                answer = {"error": said, "unusable": isinstance(error, MeshError)}
         if values["out"] is not None:
             with contextlib.suppress(OutputNameError):  # left to the batch, which knows what it owns
                 there = under(values["parent"], files)
@@ -204,8 +198,3 @@ class MeshServer:
         if not network.exists():
             network.write_bytes(shared[POLICY].blobs["network"])
         return spec.with_policy(network)
-
-    def _sentence(self, error: Exception, path: Path, name: str) -> str:
-        """First line of a message, with this machine's path replaced by the mesh's name."""
-        line = (str(error).strip().splitlines() or ["no message"])[0]
-        return line.replace(str(path), name).replace(str(self._staging), "")

@@ -8,6 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 
@@ -203,40 +204,31 @@ class AddressStore:
 
     def write(self, name: str, data: bytes) -> None:
         """See `FolderStore`; atomic where the system writes objects atomically, as all object stores do."""
-        path = self._path(name)
-        with self._errors(path):
+
+        def put(path: str) -> None:
             self._system.makedirs(path.rpartition("/")[0], exist_ok=True)
             self._system.pipe_file(path, data)
 
+        self._ask(name, put)
+
     def read(self, name: str) -> bytes | None:
         """See `FolderStore`."""
-        with self._errors(self._path(name)):
-            try:
-                return bytes(self._system.cat_file(self._path(name)))
-            except FileNotFoundError:
-                return None
+        found = self._ask(name, self._system.cat_file, absent=None)
+        return None if found is None else bytes(found)
 
     def size(self, name: str) -> int | None:
         """See `FolderStore`."""
-        with self._errors(self._path(name)):
-            try:
-                return int(self._system.size(self._path(name)))
-            except FileNotFoundError:
-                return None
+        found = self._ask(name, self._system.size, absent=None)
+        return None if found is None else int(found)
 
     def remove(self, name: str) -> None:
         """See `FolderStore`."""
-        with self._errors(self._path(name)), contextlib.suppress(FileNotFoundError):
-            self._system.rm_file(self._path(name))
+        self._ask(name, self._system.rm_file, absent=None)
 
     def names(self, folder: str) -> list[str]:
         """List the files of a folder, sorted."""
-        with self._errors(self._path(folder)):
-            self._system.invalidate_cache()
-            try:
-                found: list[Any] = self._system.ls(self._path(folder), detail=False)
-            except FileNotFoundError:
-                return []
+        self._system.invalidate_cache()
+        found = self._ask(folder, partial(self._system.ls, detail=False), absent=())
         return sorted(f"{folder}/{str(path).rstrip('/').rpartition('/')[2]}" for path in found)
 
     def journal(self, name: str) -> Journal:
@@ -249,16 +241,16 @@ class AddressStore:
     def close(self) -> None:
         """Do nothing."""
 
-    def _path(self, name: str) -> str:
-        return f"{self._root.rstrip('/')}/{name}"
-
-    @contextlib.contextmanager
-    def _errors(self, path: str) -> Iterator[None]:
+    def _ask(self, name: str, ask: Callable[[str], Any], **otherwise: Any) -> Any:
+        """Call a function of the driver with a path; `absent`, if it is given, is the answer where there is no file."""
+        path = f"{self._root.rstrip('/')}/{name}"
         try:
-            yield
+            return ask(path)
         except (MemoryError, RecursionError):
             raise
         except Exception as error:  # drivers pass on any exception of their clients
+            if isinstance(error, FileNotFoundError) and "absent" in otherwise:
+                return otherwise["absent"]
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
             raise OutputError(f"cannot reach {path} ({reason}); check the address and your rights there.") from error
 

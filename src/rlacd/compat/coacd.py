@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 import numpy as np
@@ -95,8 +94,7 @@ def run_coacd(
     OptionError
         An option is out of range.
     """
-    given = locals()
-    warn_unused("run_coacd", given, _defaults(), _UNUSED)
+    warn_unused(run_coacd, locals(), _UNUSED)
     apx_mode = read(one_of(("ch", "box")), "apx_mode", apx_mode)
     threshold = read(number(above=0), "threshold", threshold)
     most_hulls = read(integer(-(2**31)), "max_convex_hull", max_convex_hull)
@@ -119,7 +117,3 @@ def run_coacd(
 
 def set_log_level(level: str) -> None:
     """Accept CoACD's log levels; rlacd logs nothing."""
-
-
-def _defaults() -> dict[str, Any]:
-    return {name: parameter.default for name, parameter in inspect.signature(run_coacd).parameters.items()}

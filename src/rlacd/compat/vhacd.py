@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 import numpy as np
@@ -74,9 +73,7 @@ def compute_vhacd(
     OptionError
         An option is out of range.
     """
-    given = locals()
-    defaults = {name: parameter.default for name, parameter in inspect.signature(compute_vhacd).parameters.items()}
-    warn_unused("compute_vhacd", given, defaults, _UNUSED)
+    warn_unused(compute_vhacd, locals(), _UNUSED)
     percent = read(number(0), "minimumVolumePercentErrorAllowed", minimumVolumePercentErrorAllowed)
     result = decompose(
         (np.asarray(points, dtype=np.float64), _triangles(faces)),

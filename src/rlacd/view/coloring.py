@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
 import numpy.typing as npt
 import trimesh
@@ -43,7 +44,7 @@ def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
     rank = np.full(len(hulls), -1, dtype=np.int64)
     used = np.zeros(HUES, dtype=np.int64)
     shade = np.zeros(len(hulls), dtype=np.int64)
-    for hull in _smallest_last(beside):
+    for hull in nx.coloring.strategy_smallest_last(nx.Graph(dict(enumerate(beside))), None):
         taken = np.bincount([rank[other] for other in beside[hull] if rank[other] >= 0], minlength=HUES)
         rank[hull] = np.lexsort((np.arange(HUES), used, taken))[0]
         shade[hull] = used[rank[hull]]
@@ -76,17 +77,3 @@ def _lies_above(one: trimesh.Trimesh, other: trimesh.Trimesh, near: float) -> bo
     normals = other.face_normals  # zero where a facet is too thin to have one
     heights = (normals @ one.vertices.T).min(axis=1) - (normals * other.triangles[:, 0]).sum(axis=1)
     return bool((heights > near).any())
-
-
-def _smallest_last(beside: list[set[int]]) -> list[int]:
-    """Smallest-last order: repeatedly move the hull with the fewest remaining neighbours to the end."""
-    left = [set(others) for others in beside]
-    waiting = set(range(len(beside)))
-    order = []
-    while waiting:
-        least = min(waiting, key=lambda hull: (len(left[hull]), -hull))
-        waiting.remove(least)
-        order.append(least)
-        for other in left[least]:
-            left[other].discard(least)
-    return order[::-1]

@@ -6,14 +6,15 @@ import io
 import tempfile
 import zipfile
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import cast
 
-from rlacd.errors import MissingExtraError, OptionError
+from rlacd.errors import OptionError
 from rlacd.io.write import FORMATS, MODELS, file_stem, save
 from rlacd.io.write.balls import save_balls
 from rlacd.io.write.target import WITH_MESHES
-from rlacd.io.write.usd import require_usd
+from rlacd.io.write.usd import NEEDS_EXTRA
 from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
 from rlacd.result import Result
@@ -81,7 +82,7 @@ def offered() -> list[Offer]:
                 f"The mesh with its hulls as collision shapes, for {_MODEL_NAMES[model][1]}"
                 f" (.{MODELS[model][0]}{' and its meshes, zipped' if model in WITH_MESHES else ''}).",
                 "Models",
-                _missing(model),
+                NEEDS_EXTRA if model == "usd" and find_spec("pxr") is None else None,
             )
             for model in MODELS
         ),
@@ -89,16 +90,6 @@ def offered() -> list[Offer]:
         Offer("report.json", "Numbers", "Everything that was measured, as JSON.", "More"),
         Offer("balls.csv", "Balls", "The balls that no hull touches: x, y, z and radius.", "More"),
     ]
-
-
-def _missing(model: str) -> str | None:
-    if model != "usd":
-        return None
-    try:
-        require_usd()
-    except MissingExtraError as error:
-        return str(error)
-    return None
 
 
 def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "") -> Download:

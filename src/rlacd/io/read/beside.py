@@ -12,8 +12,7 @@ from urllib.parse import unquote
 
 from trimesh.resolvers import Resolver
 
-from rlacd.errors import MeshFileError
-from rlacd.io.read.open_file import LARGEST_FILE, read_file
+from rlacd.io.read.open_file import LARGEST_FILE, read_file, read_named
 
 DATA = frozenset({".bin"})
 """To read triangles: no colours, and no images, whose decoders are the riskier part of any loader."""
@@ -87,11 +86,7 @@ def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:
     MeshFileError
         The mesh file cannot be opened.
     """
-    try:
-        content = read_file(path)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise MeshFileError(f"{name or path} cannot be opened ({reason}): check its name and permissions") from error
+    content = read_named(path, name=name)
     return {path.name: content, **_beside(path, content)}
 
 

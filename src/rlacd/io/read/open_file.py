@@ -9,6 +9,9 @@ import errno
 import os
 import re
 import stat
+from pathlib import Path
+
+from rlacd.errors import MeshFileError
 
 LARGEST_FILE = 2**30
 """Bytes of the largest file that is read. A binary STL of this length has 21 million triangles."""
@@ -43,6 +46,15 @@ def read_file(path: str | os.PathLike[str], most: int = LARGEST_FILE) -> bytes:
         raise
     with os.fdopen(handle, "rb") as file:
         return file.read(opened.st_size)
+
+
+def read_named(path: Path, most: int = LARGEST_FILE, name: str | None = None) -> bytes:
+    """Do the same for a file that a user or a file names; raises MeshFileError."""
+    try:
+        return read_file(path, most)
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        raise MeshFileError(f"{name or path} cannot be opened ({reason}): check its name and permissions") from error
 
 
 def _check(status: os.stat_result, path: str | os.PathLike[str], most: int) -> None:
