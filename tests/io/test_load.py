@@ -159,14 +159,6 @@ def test_off_that_is_not_read_is_refused_for_what_it_is(box, tmp_path):
             load_mesh(path)
 
 
-def test_points_at_infinity_of_a_4off_are_left_out(box, tmp_path):
-    path = tmp_path / "box.off"
-    path.write_text(off(box, "4").replace(" 2\n", " 0\n", 1))
-    loaded = load_mesh(path)
-    assert len(loaded.vertices) == 7
-    assert "NaN or infinite" in loaded.warnings[0]
-
-
 def test_polygons_of_an_off_file(tmp_path):
     path = tmp_path / "house.off"
     path.write_text("OFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n4 0 1 2 3 255 0 0\n3 0 1 4\n5 0 1 2 3 4 0 0 1\n")
@@ -357,7 +349,7 @@ def test_what_an_xml_parser_says_on_two_lines_is_one_sentence(box, tmp_path):
     """Found by the soak: a zero byte in a COLLADA file."""
     path = tmp_path / "box.dae"
     path.write_bytes(box.export(file_type="dae").replace(b"<library_geometries>", b"<library_geometries>\0", 1))
-    with pytest.raises(MeshFileError, match="holds XML that is damaged") as said:
+    with pytest.raises(MeshFileError, match="damaged or cut off") as said:
         load_mesh(path)
     assert "\n" not in str(said.value)
 

@@ -107,15 +107,11 @@ def flag() -> Kind:
     """True or False."""
 
     def read(value: Any) -> bool:
-        # numpy's own bool is no bool; it is not imported just to ask.
-        if not isinstance(value, bool) and (type(value).__module__, type(value).__name__) not in NUMPY_BOOLS:
+        if type(value).__name__ not in ("bool", "bool_"):  # numpy's own is no bool; it is not imported just to ask
             raise TypeError
         return bool(value)
 
     return Kind("True or False", "", read, bool)
-
-
-NUMPY_BOOLS = {("numpy", "bool"), ("numpy", "bool_")}
 
 
 def one_of(names: Any, *, rule: str | None = None) -> Kind:
@@ -124,15 +120,9 @@ def one_of(names: Any, *, rule: str | None = None) -> Kind:
     return custom(rule or f"one of {', '.join(words)}", lambda given: words[words.index(_text(given))], " ".join(words))
 
 
-def text(rule: str = "a string", *, least: int = 0) -> Kind:
-    """A string of at least this many characters."""
-
-    def read(value: Any) -> str:
-        if len(plain := _text(value)) < least:
-            raise ValueError
-        return plain
-
-    return custom(rule, read)
+def text(rule: str = "a string") -> Kind:
+    """A string."""
+    return custom(rule, _text)
 
 
 def path_like(rule: str = "a path") -> Kind:

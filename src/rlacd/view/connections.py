@@ -31,6 +31,12 @@ ANSWER_SECONDS = 120.0
 FULL = "too many connections to this viewer are open; close a page and reload this one."
 
 
+_BUSY = (
+    "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nCache-Control: no-store\r\n"
+    f"Retry-After: 5\r\nConnection: close\r\n\r\n{json.dumps({'error': FULL})}"
+).encode()
+
+
 class BoundedServer(ThreadingHTTPServer):
     """A server with a thread for each connection, at most `MOST_CONNECTIONS`, each with a deadline."""
 
@@ -99,7 +105,7 @@ class BoundedServer(ThreadingHTTPServer):
 
 
 class BoundedHandler(BaseHTTPRequestHandler):
-    """A handler that reads requests in bounded time, and reports errors as JSON.
+    """A handler that reads requests in bounded time.
 
     The base class bounds heads: to 100 lines of 64 KiB.
     """
@@ -115,13 +121,6 @@ class BoundedHandler(BaseHTTPRequestHandler):
             super().handle_one_request()
         except ConnectionError:
             self.close_connection = True
-
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer what the base class refuses (methods, versions, heads) with JSON, and close the connection."""
-        self.close_connection = True
-        reason = self.responses.get(code, ("refused", ""))[0]
-        with contextlib.suppress(OSError):
-            _send_refusal(self.connection, code, reason, f"{message or reason}.")
 
     def version_string(self) -> str:
         """Name the program, without the version of Python."""
@@ -146,13 +145,4 @@ def _turn_away(connection: socket.socket) -> None:
     with contextlib.suppress(OSError):
         connection.recv(1 << 16)  # closing a connection with unread input can destroy the answer
     with contextlib.suppress(OSError):
-        _send_refusal(connection, 503, "Service Unavailable", FULL)
-
-
-def _send_refusal(connection: socket.socket, code: int, reason: str, sentence: str) -> None:
-    body = json.dumps({"error": sentence}).encode()
-    head = (
-        f"HTTP/1.1 {code} {reason}\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n"
-        "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nRetry-After: 5\r\nConnection: close\r\n\r\n"
-    )
-    connection.sendall(head.encode() + body)
+        connection.sendall(_BUSY)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
-
-from trimesh.resolvers import Resolver
 
 from rlacd.io.read.open_file import LARGEST_FILE, read_file, read_named
 
@@ -24,7 +21,7 @@ PICTURES = frozenset({".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", "
 """Materials, and pictures that are decoded: read only for files that keep them."""
 
 
-class FolderFiles(Resolver):  # type: ignore[misc]
+class FolderFiles:
     """Serves files of one folder only.
 
     A name that leads out of the folder, by ``..``, an absolute path or a link, counts as missing; so does a file whose
@@ -57,18 +54,6 @@ class FolderFiles(Resolver):  # type: ignore[misc]
                 continue
             return self._read[path]
         raise FileNotFoundError(f"{name!r:.200} is not a data file beside the mesh")
-
-    def write(self, name: str, data: Any) -> None:
-        """Refuse: loading writes nothing."""
-        raise PermissionError(name)
-
-    def namespaced(self, namespace: str) -> FolderFiles:
-        """Stay in the same folder."""
-        raise FileNotFoundError(namespace)
-
-    def keys(self) -> Iterator[str]:
-        """List nothing: files are asked for by name."""
-        return iter(())
 
 
 def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:

@@ -20,7 +20,7 @@ from rlacd.io.read.conventions import COLLADA_HEAD, collada
 from rlacd.io.read.looks import opened_picture, painted
 from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles
 from rlacd.io.read.text import rows_of, whole
-from rlacd.io.read.xml import open_archive, parse_xml, unpack
+from rlacd.io.read.xml import open_archive, parse_xml
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
@@ -316,7 +316,7 @@ def _unpacked(path: Path, content: bytes) -> bytes:
         names = [name for name in archive.namelist() if name.lower().endswith(".dae") and "MACOSX" not in name]
         if not names:
             raise MeshFileError(f"{path} holds no .dae file: export it again")
-        content = unpack(path, archive, names[0])
+        content = archive.read(names[0])
     if is_zipfile(io.BytesIO(content)):
         raise MeshFileError(f"{path} is an archive, not XML: rename it to .zae, or export it again")
     return content

@@ -14,7 +14,6 @@ import trimesh
 
 from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.contents import Contents, one_shape
-from rlacd.io.read.looks import decoded
 from rlacd.io.read.polygons import strip_triangles, triangles_of
 from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, whole
 from rlacd.memory import BYTES_READ, require_memory
@@ -161,9 +160,8 @@ def scene_of_ply(path: Path, content: bytes) -> trimesh.Scene:
     beside = FolderFiles(path.parent, PICTURES)
     scene = trimesh.load_scene(io.BytesIO(content), "ply", resolver=beside, allow_remote=False, process=False)
     for shape in scene.geometry.values():
-        material: Any = getattr(shape.visual, "material", None)
-        if getattr(material, "image", None) is not None:
-            material.image = decoded(material.image)
+        if (picture := getattr(getattr(shape.visual, "material", None), "image", None)) is not None:
+            picture.load()  # now, when looks that cannot be decoded may still be left out
     return scene
 
 

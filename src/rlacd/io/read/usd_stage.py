@@ -5,21 +5,19 @@ A stage may name other files. They are read only from the folder of the file or 
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.apart import ToldNodes
+from rlacd.io.read.apart import Answered, ToldNodes, served
 from rlacd.io.read.contents import Triangles
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
-from rlacd.pool import Blobs, Shared, Values
+from rlacd.pool import Blobs, Values
 from rlacd.solid.arrays import FloatArray
 
 PRIMITIVES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
@@ -33,22 +31,10 @@ _LOOK = {"diffuseColor": 3, "emissiveColor": 3, "opacity": 1, "metallic": 1, "ro
 """The inputs of a UsdPreviewSurface that are read where they are no pictures, and their numbers."""
 
 
-class StageReader:
-    """The server of a process that reads stages (see `rlacd.pool.Server`)."""
-
-    def __init__(self, folder: Path) -> None:
-        os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there
-
-    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """Read the stage at `values`' path: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
-        path = Path(values["path"])
-        try:
-            return _stage(path)
-        except Tf.ErrorException as error:
-            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again") from error
-
-
-def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
+@served
+def read_stage(values: Values, blobs: Blobs) -> Answered:
+    """Read the stage at `values`' path: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
+    path = Path(values["path"])
     check_files(path)
     stage = Usd.Stage.Open(str(path))
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())

@@ -19,7 +19,7 @@ from rlacd.io.write.usd import require_usd
 ENDINGS = (".usd", ".usda", ".usdc")
 """Of stages that are rewritten."""
 
-SERVER = "rlacd.io.robots.usd_layer:StageRewriter"
+SERVER = "rlacd.io.robots.usd_layer:rewrite"
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,14 +103,12 @@ def _target(text: str, file_format: str | None) -> Target:
     place = Path(text)
     ending = place.suffix.lower().lstrip(".")
     wanted = None if file_format is None else file_format.lower().lstrip(".")
-    if wanted in MODEL_OF:
-        wanted = MODEL_OF[wanted]
-    if wanted in MODELS:
-        return _model_target(text, wanted)
-    if wanted is not None and wanted not in FORMATS:
-        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
     if wanted is None and ending in MODEL_OF and not text.endswith(SEPARATORS):
-        return _model_target(text, MODEL_OF[ending])
+        wanted = ending
+    if (wanted := MODEL_OF.get(str(wanted), wanted)) in MODELS:
+        return _model_target(text, str(wanted))
+    if wanted not in (None, *FORMATS):
+        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
 
     with output_errors(place):
         is_folder = text.endswith(SEPARATORS) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending)
@@ -120,10 +118,10 @@ def _target(text: str, file_format: str | None) -> Target:
 
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in (*FORMATS, *MODEL_OF))
-        said = (
-            f"{shown(str(place))}, whose ending is .{ending}" if ending else f"{shown(str(place))}, which has no ending"
+        said = f"whose ending is .{ending}" if ending else "which has no ending"
+        raise OptionError(
+            f"cannot write {shown(str(place))}, {said}; use one of {known}, or end the name with / for a folder."
         )
-        raise OptionError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
     if wanted not in (None, ending):
         raise OptionError(
             f"the format {wanted} contradicts the name {shown(str(place))}; give one of the two, or a folder."
