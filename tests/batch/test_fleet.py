@@ -23,9 +23,9 @@ from rlacd.batch.store import FolderStore, ResultStore, open_store
 from rlacd.cli.batch import COMMAND
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
-from rlacd.io.write import save_hulls
 from rlacd.options import Options
 from tests.batch.trouble import write_ell
+from tests.hulls import save_hulls
 
 NOT_OPTIONS = ("self", "path", "file_format", "scene")
 

@@ -18,11 +18,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rlacd.errors import OptionError, OutputError
-from rlacd.io.write import FORMATS, hull_target, save_hulls
+from rlacd.io.write import FORMATS, hull_target
 from rlacd.io.write.palette import hull_colors
 from rlacd.options.output import OutputOptions
 from tests.assets import read_glb
-from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
+from tests.hulls import assert_convex_hull, hull_of, moved, random_hull, save_hulls
 
 THREE = [moved(random_hull(seed), 0.3, (seed, 0.1, -0.7)) for seed in range(3)]
 NAMES = ["hull_000", "hull_001", "hull_002"]
@@ -357,7 +357,7 @@ def test_a_file_of_somebody_else_in_the_folder_is_never_replaced(tmp_path: Path,
 
 AT_ONCE = """
 import sys, pathlib, trimesh
-from rlacd.io.write import save_hulls
+from tests.hulls import save_hulls
 place, count, go = pathlib.Path(sys.argv[1]), int(sys.argv[2]), pathlib.Path(sys.argv[3])
 hulls = [trimesh.creation.box((count, 1, 1))] * count
 print(flush=True)

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from types import TracebackType
 from typing import Any, TypeAlias
 
-from rlacd.batch.store import ResultStore
+from rlacd.batch.store import Journal, ResultStore
 from rlacd.errors import OutputError
 
 Row: TypeAlias = dict[str, Any]
@@ -33,7 +33,7 @@ class Ledger:
     def __init__(self, store: ResultStore, name: str) -> None:
         self._store = store
         self._name = name
-        self._journal = store.journal(name)
+        self._journal = Journal(store, name)
         self._rows: dict[str, Row] = {}
         self._owner: dict[str, str] = {}
         for row in _read(name, (store.read(name) or b"").splitlines()):

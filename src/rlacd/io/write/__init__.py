@@ -32,7 +32,7 @@ from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.result import Result
 
-__all__ = ["FORMATS", "MODELS", "file_stem", "hull_target", "save", "save_hulls", "write_file"]
+__all__ = ["FORMATS", "MODELS", "file_stem", "hull_target", "save", "write_file"]
 
 SIMULATED = (*WITH_MESHES, "usd")
 """Formats whose readers take lengths to be in metres."""
@@ -118,39 +118,6 @@ def _save_with_meshes(result: Result, model: Model, target: Target, one_mesh: bo
     encode = function_of(f"write.simulators:encode_{target.file_format}")
     described = encode(model, shapes, visuals, folder.name)
     write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
-
-
-def save_hulls(
-    hulls: Sequence[trimesh.Trimesh],
-    path: str | os.PathLike[str],
-    *,
-    stem: str = "mesh",
-    file_format: str | None = None,
-) -> Path:
-    """Write convex hulls to a file or a folder; see `rlacd.Decomposition.save`.
-
-    Parameters
-    ----------
-    hulls : sequence of trimesh.Trimesh
-        Convex and closed; at least one.
-    path : path-like
-        A file ``*.glb``, ``*.obj``, ``*.ply``, ``*.stl``, or a folder.
-    stem : str
-        Files in a folder are named ``<stem>_000.obj``, ``<stem>_001.obj``, ...
-    file_format : str, optional
-        The format inside a folder.
-
-    Returns
-    -------
-    pathlib.Path
-        Where it was written.
-
-    Raises
-    ------
-    OutputError, OptionError
-        As for `hull_target`, and if the disk fails while writing.
-    """
-    return _save_hulls(hulls, hull_target(path, OutputOptions(file_format=file_format)), stem)
 
 
 def _save_hulls(hulls: Sequence[trimesh.Trimesh], target: Target, stem: str) -> Path:
