@@ -108,7 +108,7 @@ def test_the_page_comes_with_its_controls(viewer: ViewServer) -> None:
 
 def test_every_answer_is_hardened(viewer: ViewServer) -> None:
     settled(viewer, run=1)
-    for path in ("/", "/page/list.js", "/state", "/scene", "/download?format=glb", "/nothing"):
+    for path in ("/", "/page/list.js", "/scene", "/download?format=glb", "/nothing"):
         headers = ask(viewer, "GET", path).headers
         assert headers["X-Content-Type-Options"] == "nosniff"
         assert headers["X-Frame-Options"] == "DENY"

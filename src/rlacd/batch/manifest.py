@@ -49,10 +49,6 @@ class Ledger:
         """Whether a row names this file."""
         return output in self._owner
 
-    def rows(self) -> list[Row]:
-        """All rows, sorted by mesh."""
-        return [self._rows[mesh] for mesh in sorted(self._rows)]
-
     def add(self, row: Row) -> None:
         """Add a row, replacing an older one of the same mesh; files listed only in the old row are removed first."""
         old = self._rows.get(row["mesh"], {})
@@ -69,7 +65,7 @@ class Ledger:
         if error is not None:
             self._journal.close()
             return
-        content = b"".join(_line(row) for row in self.rows())
+        content = b"".join(_line(self._rows[mesh]) for mesh in sorted(self._rows))
         if content != (self._store.read(self._name) or b""):
             self._store.write(self._name, content)
         self._journal.remove()

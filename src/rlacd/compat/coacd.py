@@ -21,9 +21,10 @@ _UNUSED = {
     "preprocess_mode": "it repairs bodies that are not closed, and no others",
     "preprocess_resolution": "it does not remesh the input",
     "resolution": "it bounds distances instead of sampling them",
-    "mcts_nodes": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
-    "mcts_iterations": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
-    "mcts_max_depth": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
+    **dict.fromkeys(
+        ("mcts_nodes", "mcts_iterations", "mcts_max_depth"),
+        "it has no tree search; rlacd.decompose(quality='best') searches in another way",
+    ),
     "pca": "it tries planes along the principal axes anyway",
 }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import networkx as nx
 import numpy as np
@@ -19,26 +18,17 @@ TOO_CLOSE_TO_SEE = 2e-3
 """Hulls count as touching if closer than this share of their common extent, too close for the eye to separate."""
 
 
-@dataclass(frozen=True, eq=False)
-class Coloring:
-    """A colour for each hull.
-
-    Attributes
-    ----------
-    rgb : uint8 [N, 3]
-    rank : int64 [N]
-        Index of the hue; differs between hulls that touch, unless more than `HUES` of them all touch each other.
-    """
-
-    rgb: npt.NDArray[np.uint8]
-    rank: npt.NDArray[np.int64]
-
-
-def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
+def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
     """Choose colours by which hulls touch: neighbours differ in hue, and hulls that share a hue differ in shade.
 
     Hulls are coloured greedily in smallest-last order (Matula & Beck 1983): each gets the least used hue that its
     neighbours leave free.
+
+    Returns
+    -------
+    rgb : uint8 [N, 3]
+    rank : int64 [N]
+        Index of the hue; differs between hulls that touch, unless more than `HUES` of them all touch each other.
     """
     beside = neighbours(hulls)
     rank = np.full(len(hulls), -1, dtype=np.int64)
@@ -50,7 +40,7 @@ def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
         shade[hull] = used[rank[hull]]
         used[rank[hull]] += 1
     index = rank + HUES * shade
-    return Coloring(hull_colors(int(index.max(initial=-1)) + 1)[index], rank)
+    return hull_colors(int(index.max(initial=-1)) + 1)[index], rank
 
 
 def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:

@@ -19,9 +19,6 @@ from typing import Any
 MOST_CONNECTIONS = 48
 """Concurrent connections; a browser opens up to six."""
 
-MOST_STREAMS = 16
-"""Concurrent event streams, one per open page."""
-
 REQUEST_SECONDS = 10.0
 """Seconds to receive headers and body, from the first byte expected; also how long an idle connection is kept."""
 
@@ -46,7 +43,6 @@ class BoundedServer(ThreadingHTTPServer):
     def __init__(self, address: tuple[str, int], handler: type[BoundedHandler]) -> None:
         self._deadlines: dict[socket.socket, float] = {}
         self._changed = threading.Condition()
-        self.streams = threading.BoundedSemaphore(MOST_STREAMS)
         super().__init__(address, handler)
 
     @property

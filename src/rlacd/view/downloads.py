@@ -25,14 +25,6 @@ FOLDERS = ("obj", "stl")
 
 
 @dataclass(frozen=True)
-class Download:
-    """A file's name and bytes."""
-
-    name: str
-    content: bytes
-
-
-@dataclass(frozen=True)
 class Offer:
     """An entry of the download menu.
 
@@ -92,8 +84,8 @@ def offered() -> list[Offer]:
     ]
 
 
-def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "") -> Download:
-    """Make one of the files `offered`; several files are zipped.
+def download(decomposition: Result, wanted: str, *, up: str = "z") -> tuple[str, bytes]:
+    """Make one of the files `offered`: its name and content; several files are zipped.
 
     Parameters
     ----------
@@ -102,8 +94,6 @@ def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "
         The name of the offer.
     up : {"x", "y", "z"}
         The axis of the input that points up.
-    unit : str
-        The input's unit of length, for the report; empty if unknown.
 
     Raises
     ------
@@ -119,9 +109,9 @@ def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "
         raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
     stem = file_stem(decomposition.name)
     if wanted == "report.html":
-        return Download(f"{stem}_hulls.html", report_page(decomposition, up=up, unit=unit).encode())
+        return (f"{stem}_hulls.html", report_page(decomposition, up=up).encode())
     if wanted == "report.json":
-        return Download(f"{stem}_hulls.json", to_json(decomposition.report).encode())
+        return (f"{stem}_hulls.json", to_json(decomposition.report).encode())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if wanted == "balls.csv":
@@ -137,8 +127,8 @@ def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "
             save(decomposition, folder / f"{stem}_hulls.{wanted}")
         files = sorted(path for path in folder.rglob("*") if path.is_file())
         if len(files) == 1 and not wanted.endswith(".zip"):
-            return Download(files[0].name, files[0].read_bytes())
-        return Download(f"{stem}_hulls_{wanted.removesuffix('.zip')}.zip", _zipped(folder, files))
+            return (files[0].name, files[0].read_bytes())
+        return (f"{stem}_hulls_{wanted.removesuffix('.zip')}.zip", _zipped(folder, files))
 
 
 def _zipped(folder: Path, files: list[Path]) -> bytes:

@@ -184,7 +184,7 @@ def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:
     """The hulls, each further from the centre by the share `pull`."""
     corners = np.concatenate([hull.bounds for hull in decomposition])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    colors = linear_from_srgb(color_hulls(decomposition.hulls).rgb)
+    colors = linear_from_srgb(color_hulls(decomposition.hulls)[0])
     return [
         _body(hull.triangles + pull * (hull.bounds.mean(axis=0) - middle), color, up)
         for hull, color in zip(decomposition, colors, strict=True)

@@ -37,12 +37,10 @@ def report_page(
     *,
     up: str | None = None,
     picture: bool = True,
-    unit: str | None = None,
 ) -> str:
-    """Build the text of the report; see `save_report_page`. The unit is the input's, unless it is given."""
+    """Build the text of the report; see `save_report_page`."""
     up = decomposition.up_axis(up)
-    if unit is None:
-        unit = "" if decomposition.input is None else decomposition.input.unit
+    unit = "" if decomposition.input is None else decomposition.input.unit
     # The heat map gets that many triangles, up to a few times as many: about half a megabyte.
     data: dict[str, Any] = {
         **scene(decomposition, up, unit=unit),

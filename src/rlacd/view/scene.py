@@ -44,7 +44,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
     errors = _errors(report, len(decomposition))
-    colors = color_hulls(decomposition.hulls)
+    rgb, ranks = color_hulls(decomposition.hulls)
     balls = None
     if decomposition.balls is not None and len(decomposition.balls):
         some = apart(decomposition.balls)
@@ -67,7 +67,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
                 "volume": float(hull.volume) * frame.scale**3,
                 "primitive": hull.metadata.get(PRIMITIVE, {}).get("kind"),
             }
-            for hull, color, rank, error in zip(decomposition, colors.rgb, colors.rank, errors, strict=True)
+            for hull, color, rank, error in zip(decomposition, rgb, ranks, errors, strict=True)
         ],
         "balls": balls,
     }

@@ -3,7 +3,6 @@
 ====================================  ===========================================================================
 ``GET /``, ``GET /page/NAME.js``      the page and its scripts
 ``GET /events``                       the state, with every change (server-sent events)
-``GET /state``                        the current state
 ``GET /scene``, ``GET /heat``         the data to draw; see `rlacd.view.scene`
 ``GET /download?format=NAME``         a file
 ``POST /open?name=NAME``              open another mesh: the bytes of its file
@@ -225,8 +224,6 @@ class _Handler(BoundedHandler):
                 self._send(self.server.page, "text/html", {"Content-Security-Policy": self.server.policy})
             elif place.path == "/events":
                 self._send_events()
-            elif place.path == "/state":
-                self._send_json(asdict(self.server.session.state))
             elif place.path == "/scene":
                 with self.server.heavy:
                     content = self.server.scene()
@@ -332,29 +329,24 @@ class _Handler(BoundedHandler):
         return result
 
     def _send_events(self) -> None:
-        if not self.server.streams.acquire(blocking=False):
-            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
-        try:
-            self.close_connection = True
-            self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
-            # After 3 s of silence a sign of life, which shows whether the client still reads.
-            for state in self.server.session.changes(3.0):
-                event = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
-                self.wfile.write(f"{event}\n\n".encode())
-                self.wfile.flush()
-                if state is not None and state.state == "working":
-                    time.sleep(0.05)  # the eye follows no faster; changes in the meantime are combined
-        finally:
-            self.server.streams.release()
+        self.close_connection = True
+        self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
+        # After 3 s of silence a sign of life, which shows whether the client still reads.
+        for state in self.server.session.changes(3.0):
+            event = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
+            self.wfile.write(f"{event}\n\n".encode())
+            self.wfile.flush()
+            if state is not None and state.state == "working":
+                time.sleep(0.05)  # the eye follows no faster; changes in the meantime are combined
 
     def _send_file(self, wanted: str, up: str) -> None:
         check_up(up)
         with self.server.downloads:
-            file = download(self._result()[1], wanted, up=up, unit=self.server.subject.unit)
-        plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
-        exact = urllib.parse.quote(file.name.encode(errors="replace"))
+            name, content = download(self._result()[1], wanted, up=up)
+        plain = name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
+        exact = urllib.parse.quote(name.encode(errors="replace"))
         named = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{exact}"
-        self._send(file.content, "application/octet-stream", {"Content-Disposition": named})
+        self._send(content, "application/octet-stream", {"Content-Disposition": named})
 
     def _send_json(self, value: Any, status: HTTPStatus = HTTPStatus.OK) -> None:
         self._send(to_json(value, indent=None).encode(), "application/json", status=status)

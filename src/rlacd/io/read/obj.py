@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from itertools import compress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -37,14 +37,6 @@ _COMMON = np.array([b"v ", b"vt", b"vn", b"f ", b"s ", b""])
 
 MOST_PARTS = 2_000
 """Materials of all objects; with more, looks are left out: writing takes a millisecond for each."""
-
-
-class _Faces(NamedTuple):
-    """Triangles, by the numbers of their points, texture coordinates and normals, ``[F, 3]`` each; -1 for none."""
-
-    points: IntArray
-    texture: IntArray
-    normals: IntArray
 
 
 class _File:
@@ -96,7 +88,7 @@ class _File:
         if len(points) and points.max() >= len(self.points):
             raise ValueError(f"a face uses vertex {points.max() + 1}, but there are {len(self.points)}")
         places = places_of(self.points, self._counts, points)
-        self.faces = _Faces(*(one[places] for one in index))
+        self.faces = [one[places] for one in index]
 
     def _index(self, numbers: IntArray, word: bytes) -> IntArray:
         """Indices from 0; those of the file count from 1, or from the end of what stands before their line."""
@@ -150,11 +142,11 @@ def read_obj(path: Path, content: bytes) -> Contents:
     """
     file = _File(path, content)
     warnings = [f"{what} of {path.name} were left out" for what in file.unread]
-    if not len(file.faces.points):
+    if not len(file.faces[0]):
         return Contents(one_shape(path.stem, file.points), warnings)
     names, owner = file.objects()
     geometry = []
-    for one, faces in _split(file.faces.points, owner):
+    for one, faces in _split(file.faces[0], owner):
         some, local = np.unique(faces, return_inverse=True)
         node = SourceNode(names[one] or path.stem, names[one] or path.stem, np.eye(4))
         geometry.append((node, Triangles(file.points[some], local.reshape(-1, 3))))
