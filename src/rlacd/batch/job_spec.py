@@ -33,7 +33,7 @@ class JobSpec:
     Attributes
     ----------
     options
-        Arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields.
+        Keyword arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields.
     ending
         Ending of the output file, with its dot; empty for a folder with one file per hull.
     written
@@ -104,17 +104,13 @@ class JobSpec:
 
         The number of threads and the path of a policy's file do not affect the key.
         """
-        options = Options(**self.arguments()).as_plain()
+        options = Options(**self.options).as_plain()
         del options["threads"]
         if options["policy"].endswith(WEIGHTS_ENDING):
             options["policy"] = WEIGHTS_ENDING
         stem = PurePosixPath(name).stem  # models carry this name
         decides = [__version__, content, stem, self.weights, options, self.ending, self.written]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
-
-    def arguments(self) -> dict[str, Any]:
-        """Get the keyword arguments of `rlacd.decompose`."""
-        return dict(self.options)
 
     def with_policy(self, path: Path) -> JobSpec:
         """Return the same job with the network at another path."""

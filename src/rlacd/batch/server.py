@@ -65,7 +65,7 @@ def make(
             ending = mesh.suffix if stage is None else spec.ending
             facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)
             return facts, _files_in(Path(folder))
-        result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
+        result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.options)
         place = f"{folder}/{stem}{spec.ending or '/'}"
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always", ImplausibleBodyWarning)
@@ -84,7 +84,7 @@ def _files_in(folder: Path) -> dict[str, bytes]:
 
 def _robot(spec: JobSpec, robot: Path | usd.Colliders, place: Path, hull_only: bool) -> dict[str, Any]:
     """Rewrite a robot, or a stage as one file, with hulls in place of its collision meshes; returns facts."""
-    options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.arguments()
+    options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.options
     if isinstance(robot, Path):
         done = rewrite_robot(robot, place, **options)
     else:

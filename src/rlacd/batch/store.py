@@ -143,7 +143,7 @@ class FolderStore:
 
     def remove_appended(self, name: str) -> None:
         """Remove all lines that were appended."""
-        self.remove(name)
+        (self.folder / name).unlink(missing_ok=True)
 
     def open(self) -> None:
         """Lock the folder for this run, and remove files left incomplete by a killed one.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -112,7 +113,7 @@ def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
     with (
         graceful_stop("what is running will be finished") as stop,
         where.open(available_cpus()) as pool,
-        Screen(quiet=quiet) as screen,
+        closing(Screen(quiet=quiet)) as screen,
     ):
         summary = batch.run(pool, screen, stop)
     if not quiet:

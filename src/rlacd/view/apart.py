@@ -7,18 +7,18 @@ its plugins.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from rlacd.errors import OutputError
-from rlacd.pool import Blobs, ProcessLimits, Request, Shared, Values, WorkerDiedError
+from rlacd.io.read.apart import Answered, served
+from rlacd.pool import Blobs, ProcessLimits, Request, Values, WorkerDiedError
 from rlacd.pool.local import Worker
 from rlacd.view.render import Body, Spheres, render
 
-SERVER = "rlacd.view.apart:RenderServer"
+SERVER = "rlacd.view.apart:draw"
 
 
 def render_apart(
@@ -51,22 +51,16 @@ def render_apart(
     return drawn
 
 
-class RenderServer:
-    """Renders in a process of the pool, which leaves processors to whoever else needs them."""
-
-    def __init__(self, staging: Path) -> None:
-        if hasattr(os, "nice"):
-            os.nice(10)
-
-    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """Render one scene."""
-        arrays = {name: np.frombuffer(blob) for name, blob in blobs.items()}
-        count = values["bodies"]
-        bodies = [Body(arrays[f"{i} triangles"].reshape(-1, 3, 3), arrays[f"{i} color"]) for i in range(count)]
-        pixels = render(bodies, **values["how"])
-        if values["spheres"]:
-            balls = Spheres(*(arrays[f"{count} {name}"] for name in ("centres", "radii", "color")))
-            pixels = ((pixels.astype(np.uint16) + render(bodies, spheres=balls, **values["how"]) + 1) // 2).astype(
-                np.uint8
-            )
-        return {}, {"pixels": pixels.tobytes()}
+@served
+def draw(values: Values, blobs: Blobs) -> Answered:
+    """Render one scene, and leave processors to whoever else needs them."""
+    if hasattr(os, "nice") and os.nice(0) == 0:
+        os.nice(10)
+    arrays = {name: np.frombuffer(blob) for name, blob in blobs.items()}
+    count = values["bodies"]
+    bodies = [Body(arrays[f"{i} triangles"].reshape(-1, 3, 3), arrays[f"{i} color"]) for i in range(count)]
+    pixels = render(bodies, **values["how"])
+    if values["spheres"]:
+        balls = Spheres(*(arrays[f"{count} {name}"] for name in ("centres", "radii", "color")))
+        pixels = ((pixels.astype(np.uint16) + render(bodies, spheres=balls, **values["how"]) + 1) // 2).astype(np.uint8)
+    return {}, {"pixels": pixels.tobytes()}

@@ -70,12 +70,6 @@ class Session:
         self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
         self._thread.start()
 
-    def __enter__(self) -> Session:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
     @property
     def state(self) -> SessionState:
         """Current state."""

@@ -42,23 +42,15 @@ def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArr
         raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
     if (counts == 3).all():
         return np.arange(len(corners)).reshape(-1, 3)
-    places, owner = fans_of(counts)
-    begins = np.searchsorted(owner, np.arange(len(counts) + 1))
-    first = np.cumsum(counts) - counts
+    pieces, first = np.maximum(counts - 2, 0), np.cumsum(counts) - counts
+    owner, begins = np.repeat(np.arange(len(counts)), pieces), np.cumsum(pieces) - pieces
+    step = np.arange(len(owner)) - begins[owner]
+    places = np.stack([first[owner], first[owner] + step + 1, first[owner] + step + 2], axis=1)
     for polygon in _folded(points, corners[places], owner, len(counts)).tolist():
         ring = slice(first[polygon], first[polygon] + counts[polygon])
         if (apart := triangles_within(points[corners[ring]])) is not None:
-            places[begins[polygon] : begins[polygon + 1]] = first[polygon] + apart
+            places[begins[polygon] : begins[polygon] + pieces[polygon]] = first[polygon] + apart
     return places
-
-
-def fans_of(counts: IntArray) -> tuple[IntArray, IntArray]:
-    """A fan for each polygon, as places in all corners ``[F, 3]``, and the polygon of each triangle."""
-    pieces = np.maximum(counts - 2, 0)
-    owner = np.repeat(np.arange(len(counts)), pieces)
-    first = (np.cumsum(counts) - counts)[owner]
-    step = np.arange(len(first)) - (np.cumsum(pieces) - pieces)[owner]
-    return np.stack([first, first + step + 1, first + step + 2], axis=1), owner
 
 
 def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) -> IntArray:
