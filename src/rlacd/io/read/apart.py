@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES, Contents, Triangles
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.memory import memory_left
 from rlacd.pool import Answer, Blobs, MakeServer, ProcessLimits, Request, Server, Values, WorkerDiedError
 from rlacd.pool.local import Worker
@@ -86,13 +86,10 @@ class ToldNodes:
     def __init__(self, path: Path) -> None:
         self.values: list[Values] = []
         self.blobs: dict[str, bytes] = {}
-        self._path, self._names, self._count = path, set[str](), 0
+        self._path, self._names = path, set[str]()
 
     def add(self, names: Sequence[str], to_world: FloatArray, look: Values | None, shape: Triangles) -> None:
         """Add a node by the first of its names that no other has; raises MeshFileError if there are too many."""
-        self._count += len(shape.faces)
-        if self._count > MOST_TRIANGLES:
-            raise MeshFileError(f"{self._path} places more than {MOST_TRIANGLES} triangles: simplify it first")
         if len(self.values) >= MOST_PLACES:
             raise MeshFileError(f"{self._path} places more than {MOST_PLACES} meshes: join them first")
         index = len(self.values)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, ToldNodes, read_apart, served
-from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
+from rlacd.io.read.contents import Contents, Triangles
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Values
 
@@ -76,7 +76,7 @@ def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
     _KEPT.append(scene)
     said = dict.fromkeys(text.format(path.name) for name, text in _UNREAD.items() if len(getattr(scene, name)))
     said |= dict.fromkeys(f"{path.name}: {one.description}" for one in scene.metadata.warnings)
-    nodes, left_out = _shown(path, scene)
+    nodes, left_out = _shown(scene)
     said |= {f"{what} of {path.name} were left out: {count}": None for what, count in left_out.items() if count}
     told = ToldNodes(path)
     for index, (node, mesh) in enumerate(nodes):
@@ -95,7 +95,7 @@ def _is_plain(axes: np.ndarray[Any, Any]) -> bool:
     return bool(axes[1] % 2 == 0 and np.linalg.det(rows) > 0)
 
 
-def _shown(path: Path, scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int]]:
+def _shown(scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int]]:
     """The nodes that place a mesh, with it; and how many were left out, by the reason."""
     import ufbx
 
@@ -103,8 +103,6 @@ def _shown(path: Path, scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int
     for node in scene.nodes:  # a parent comes before its children
         mesh, parent, number = node.mesh, node.parent, node.typed_id
         _KEPT.append((node, mesh, parent))
-        if len(_KEPT) > 3 * MOST_PLACES:
-            raise MeshFileError(f"{path} has more than {MOST_PLACES} nodes: join its meshes first")
         if parent is not None and parent.typed_id in gone:
             gone[number] = gone[parent.typed_id]
         elif not node.visible:

@@ -25,7 +25,7 @@ from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
 from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import file_stem, write_file
-from rlacd.io.write.encode import encode_plain_obj
+from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.single_precision import Triangles
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
@@ -144,7 +144,8 @@ def rewrite_robot(
         hulls = {f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)}
         if kind == "mjcf" and not mujoco_reads(use.path):
             copies[use] = f"{stem}_{name}_visual.obj"
-            files[copies[use]] = _as_obj(result.source, use)
+            plain = Triangles(result.source.vertices / use.scale, _oriented(result.source.faces, use))
+            files[copies[use]] = encode_plain_obj(plain)  # without the scale, which is applied when it is read
         files |= hulls
         meshes[use] = RewrittenMesh(use.path, list(hulls), result)
         warnings += [*said, *(f"{use.path.name}: {warning}" for warning in result.report.get("warnings", []))]
@@ -165,10 +166,7 @@ def rewrite_stage(
     _check_options(options)
     data, done, warnings, files = usd.encode_layer(stage, place, lambda mesh: _coarse(mesh, options), flat=keep_input)
     warnings += _left_behind(files, stage.source.parent, place)
-    meshes = [
-        RewrittenMesh(Path(path), [f"hull_{i:03d}" for i in range(count)], result)
-        for path, (result, count) in done.items()
-    ]
+    meshes = [RewrittenMesh(Path(path), [*map(hull_name, range(len(hulls)))], hulls) for path, hulls in done.items()]
     if not meshes:
         warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
@@ -205,11 +203,6 @@ def _check_options(options: Mapping[str, Any]) -> None:
     for name in ("unit", "scale", "per_node"):
         if options.get(name):
             raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
-
-
-def _as_obj(source: trimesh.Trimesh, use: MeshUse) -> bytes:
-    """A copy of a mesh that the consumer cannot read, without the scale of its use."""
-    return encode_plain_obj(Triangles(source.vertices / use.scale, _oriented(source.faces, use)))
 
 
 def _plan(root: Element, kind: str, references: References, place: Path, folder: Path) -> tuple[Plan, list[str]]:
