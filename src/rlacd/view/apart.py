@@ -22,7 +22,7 @@ SERVER = "rlacd.view.apart:draw"
 
 
 def render_apart(
-    scenes: Sequence[tuple[Sequence[Body], Spheres | None]], width: int, height: int, samples: int, clear: bool
+    scenes: Sequence[tuple[Sequence[Body], Spheres | None]], width: int, height: int, samples: int
 ) -> list[npt.NDArray[np.uint8]]:
     """Do what `render` does for each scene; spheres are half transparent.
 
@@ -33,7 +33,7 @@ def render_apart(
     OutputError
         The process died.
     """
-    how = {"width": width, "height": height, "samples": samples, "clear": clear}
+    how = {"width": width, "height": height, "samples": samples}
     worker, drawn = Worker(), []
     try:
         for bodies, spheres in scenes:
@@ -43,7 +43,7 @@ def render_apart(
             }
             values = {"bodies": len(bodies), "spheres": spheres is not None, "how": how}
             pixels = worker.ask(Request(SERVER, values, blobs, limits=ProcessLimits(memory=0))).blobs["pixels"]
-            drawn.append(np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, -1))
+            drawn.append(np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 4))
     except WorkerDiedError as died:
         raise OutputError(f"the picture could not be drawn: {died}.") from died
     finally:

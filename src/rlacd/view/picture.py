@@ -134,12 +134,12 @@ def picture_bytes(
     unit = width / 1600
     header, footer = 0 if clear else round(104 * unit), round(44 * unit)
     size = width, header + rows * (panel_height + footer)
-    sheet = image.new("RGBA", size, (*PAPER, 0)) if clear else image.new("RGB", size, PAPER)
-    drawn = render_apart([(bodies, veil) for _, bodies, veil in panels], panel_width, panel_height, samples, clear)
+    sheet = image.new("RGBA", size, (*PAPER, 0 if clear else 255))
+    drawn = render_apart([(bodies, veil) for _, bodies, veil in panels], panel_width, panel_height, samples)
     for number, ((title, _, _), pixels) in enumerate(zip(panels, drawn, strict=True)):
         left = number % columns * panel_width
         top = header + number // columns * (panel_height + footer)
-        sheet.paste(image.fromarray(pixels), (left, top))
+        sheet.alpha_composite(image.fromarray(pixels), (left, top))
         middle = (left + panel_width // 2, top + panel_height + footer // 2)
         _write(sheet, title, middle, round(20 * unit), FADED, anchor="mm")
     if not clear:
@@ -148,7 +148,7 @@ def picture_bytes(
         _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
 
     encoded = io.BytesIO()
-    sheet.save(encoded, format="PNG")
+    (sheet if clear else sheet.convert("RGB")).save(encoded, format="PNG")
     return encoded.getvalue()
 
 

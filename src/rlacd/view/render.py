@@ -1,4 +1,4 @@
-"""Path-traced pictures of meshes on a white background, on any CPU.
+"""Path-traced pictures of meshes on a transparent background, on any CPU.
 
 Mitsuba 3 renders without a display, GPU or OpenGL library, so it also works in a bare container, where VTK's wheels
 find no OpenGL and abort the process.
@@ -56,9 +56,8 @@ def render(
     *,
     samples: int,
     spheres: Spheres | None = None,
-    clear: bool = False,
 ) -> npt.NDArray[np.uint8]:
-    """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3 or 4]; deterministic.
+    """Render `bodies`, framed to fit, as sRGB bytes and coverage [height, width, 4]; deterministic.
 
     Parameters
     ----------
@@ -70,8 +69,6 @@ def render(
         Light paths per pixel: more are slower and less grainy.
     spheres : Spheres, optional
         Drawn too, but ignored by the camera's framing.
-    clear : bool
-        Make the background transparent: the fourth channel holds the coverage.
 
     Raises
     ------
@@ -101,11 +98,9 @@ def render(
         for index, (centre, radius) in enumerate(zip(centres, (spheres.radii / size).tolist(), strict=True)):
             scene[f"sphere_{index}"] = {"type": "sphere", "center": centre, "radius": radius, "surface": surface}
     light = np.array(mi.render(mi.load_dict(scene), spp=samples))
-    if clear:
-        covered = np.clip(light[..., 3:], 0.0, 1.0)
-        colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
-        return np.concatenate([colors, np.rint(255.0 * covered).astype(np.uint8)], axis=2)
-    return srgb_from_linear(np.clip(light[..., :3] + (1.0 - light[..., 3:]), 0.0, 1.0))
+    covered = np.clip(light[..., 3:], 0.0, 1.0)
+    colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
+    return np.concatenate([colors, np.rint(255.0 * covered).astype(np.uint8)], axis=2)
 
 
 def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.float64]:
