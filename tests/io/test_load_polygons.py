@@ -291,9 +291,8 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
     broken = box.replace(
         b"<polygons", b'<polylist count="1"><input semantic="VERTEX" source="#none"/></polylist><polygons'
     )
-    whole, (warned_of,) = load(broken)
-    np.testing.assert_array_equal(whole.vertices, solid.vertices)
-    assert "were left out, as they are damaged" in warned_of
+    with pytest.raises(MeshError, match=r"damaged or cut off .*#none' is missing"):
+        load(broken)
 
     skin = b"""<library_controllers><controller id="c"><skin source="#g"><bind_shape_matrix>2 0 0 0 0 2 0 0 0 0 2 0
         0 0 0 1</bind_shape_matrix></skin></controller></library_controllers><library_visual_scenes>"""

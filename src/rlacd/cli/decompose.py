@@ -222,14 +222,10 @@ def _check_single(mesh: Path) -> None:
 
 def _check_input(mesh: Path) -> None:
     """Report a missing input before any problem with the output; loading reports everything else."""
-    try:
-        mesh.stat()
-    except FileNotFoundError as error:
-        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder") from error
-    except (OSError, ValueError):
-        return
-    if mesh.is_dir():
+    if os.path.isdir(mesh):
         raise MeshFileError(f"{mesh} is a folder; for all meshes in it run  rlacd batch {mesh} -o hulls/")
+    if not os.path.exists(mesh):
+        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder")
 
 
 def _check_output(mesh: Path, wanted: OutputOptions) -> None:

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from rlacd.fit import Fit
 from rlacd.result import Result
-from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
 from rlacd.view.coloring import color_hulls
@@ -56,7 +55,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
             "of": len(decomposition.balls),
         }
     return {
-        **_scene(decomposition.name, up, unit, frame, source.vertices, source.faces),
+        **input_scene(decomposition.name, source.vertices, source.faces, up, unit=unit, frame=frame),
         "report": report,
         "parts": [
             {
@@ -73,14 +72,12 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     }
 
 
-def input_scene(name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "") -> dict[str, Any]:
+def input_scene(
+    name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "", frame: Frame | None = None
+) -> dict[str, Any]:
     """Describe an input without hulls yet: as `scene`, without parts or report."""
     points, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
-    frame = Frame.of(points[np.unique(corners)] if len(corners) else points)
-    return _scene(name, up, unit, frame, points, corners)
-
-
-def _scene(name: str, up: str, unit: str, frame: Frame, points: FloatArray, corners: IntArray) -> dict[str, Any]:
+    frame = frame or Frame.of(points[np.unique(corners)] if len(corners) else points)
     return {
         "name": name,
         "up": up,

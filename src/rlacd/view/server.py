@@ -100,7 +100,7 @@ class ViewServer(BoundedServer):
         self._making = threading.Lock()
         self._opening = threading.Lock()
         self._folder: tempfile.TemporaryDirectory[str] | None = None
-        page = live_page(
+        page, policy = live_page(
             subject.name,
             {
                 "options": options,
@@ -110,9 +110,10 @@ class ViewServer(BoundedServer):
                 "version": __version__,
             },
         )
-        self.page, self.policy = page.text.encode(), f"{page.policy}; frame-ancestors 'none'"
+        self.page, self.policy = page.encode(), f"{policy}; frame-ancestors 'none'"
         self._bind(port)
         self._thread = threading.Thread(target=self.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
+        self._thread.start()
 
     @property
     def address(self) -> str:
@@ -128,10 +129,6 @@ class ViewServer(BoundedServer):
     def at_work(self) -> bool:
         """Whether work is still running, even after the viewer is closed: a kernel cannot be interrupted."""
         return not self.session.ended or self.connections > 0
-
-    def begin(self) -> None:
-        """Serve, on a thread of its own."""
-        self._thread.start()
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""
@@ -183,13 +180,10 @@ class ViewServer(BoundedServer):
             mesh = subject.mesh
             bare = input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, unit=subject.unit)
             return to_json(bare | guess, indent=None).encode()
-        return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit) | guess)
+        return self.once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit) | guess)
 
-    def heat(self, version: int, decomposition: Result) -> bytes:
-        """Return the error heat map as JSON; computed once per decomposition."""
-        return self._once("heat", version, lambda: heat_scene(heat_map(decomposition)))
-
-    def _once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
+    def once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
+        """Return values as JSON; computed once per version."""
         with self._making:
             made = self._made.get(what)
             if made is None or made[0] != version:
@@ -230,7 +224,8 @@ class _Handler(BoundedHandler):
                 self._send(content, "application/json")
             elif place.path == "/heat":
                 with self.server.heavy:
-                    content = self.server.heat(*self._result())
+                    version, hulls = self._result()
+                    content = self.server.once("heat", version, lambda: heat_scene(heat_map(hulls)))
                 self._send(content, "application/json")
             elif place.path == "/download":
                 self._send_file(query.get("format", [""])[0], query.get("up", [self.server.subject.up])[0])

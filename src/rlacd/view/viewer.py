@@ -70,7 +70,6 @@ def open_viewer(
     except BaseException:
         session.close()
         raise
-    server.begin()
     server.decompose(controls)
     try:
         yield server

@@ -70,7 +70,6 @@ class _Document:
         self._geometries: dict[str, list[_Primitive]] = {}
         self._sources: dict[str, FloatArray] = {}
         self._count = 0
-        self.damage: list[str] = []
         scene = self.at(self.root.find("{*}scene/{*}instance_visual_scene"))
         scene = self.root.find("{*}library_visual_scenes/{*}visual_scene") if scene is None else scene
         if scene is None:
@@ -124,8 +123,7 @@ class _Document:
 
     def _add(self, node: Any, instance: Any, geometry: Any, transform: FloatArray) -> None:
         if geometry is None:
-            self.damage.append(f"{instance.get('url')!r:.80}, which a node of {self._path.name} places, is missing")
-            return
+            raise LookupError(f"{instance.get('url')!r:.80}, which a node places, is missing")
         own = geometry.get("id", "")
         if own not in self._geometries:
             self._geometries[own] = self._read(geometry)
@@ -135,18 +133,10 @@ class _Document:
         self.placed[key] = _Placed(SourceNode(name, key, transform), self._geometries[own], meant)
 
     def _read(self, geometry: Any) -> list[_Primitive]:
-        found = []
-        for mesh in geometry.iterchildren("{*}mesh"):
-            for primitive in mesh.iterchildren(*(f"{{*}}{tag}" for tag in _RINGS)):
-                try:
-                    found.append(self._primitive(primitive))
-                except (ValueError, LookupError, TypeError, OverflowError) as error:
-                    name = geometry.get("name") or geometry.get("id")
-                    self.damage.append(
-                        f"faces of the geometry {name!r:.80} of {self._path.name} were left out, as they are damaged "
-                        f"({error!s:.100})"
-                    )
-        return found
+        primitives = (
+            mesh.iterchildren(*(f"{{*}}{tag}" for tag in _RINGS)) for mesh in geometry.iterchildren("{*}mesh")
+        )
+        return [self._primitive(primitive) for some in primitives for primitive in some]
 
     def _primitive(self, primitive: Any) -> _Primitive:
         arrays: dict[str, tuple[FloatArray, int]] = {}
@@ -303,10 +293,7 @@ def read_collada(path: Path, content: bytes) -> Contents:
             count += len(used)
         if count:
             geometry.append((one.node, Triangles(np.concatenate(vertices), np.concatenate(faces))))
-    if not geometry and document.damage:
-        raise ValueError(document.damage[0])
-    warnings = [*document.warnings, *document.damage]
-    return Contents(geometry, warnings, up, metres, Asset(content, path, "dae"))
+    return Contents(geometry, document.warnings, up, metres, Asset(content, path, "dae"))
 
 
 def _unpacked(path: Path, content: bytes) -> bytes:
