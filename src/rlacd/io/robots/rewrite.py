@@ -238,13 +238,14 @@ def _reference(old: str, hull: str, references: References, folder: Path) -> str
 
 
 def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) -> list[str]:
-    """Say that one length for the whole robot may do, where each mesh's own threshold made many hulls."""
+    """Say that one length for the whole robot may do, where meshes of other sizes each became many hulls."""
     hulls = sum(len(mesh.files) for mesh in meshes.values())
     reports = [mesh.result.report for mesh in meshes.values()]
+    scales = [report["scale"] for report in reports]
     stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout", "criterion"))
-    if stated or len(meshes) < 2 or hulls < MANY_HULLS * len(meshes):
+    if stated or max(scales) < 2 * min(scales) or hulls < MANY_HULLS * len(meshes):
         return []
-    length = reports[0]["options"]["threshold"] / min(report["scale"] for report in reports)
+    length = reports[0]["options"]["threshold"] / min(scales)
     return [
         f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; --threshold-abs "
         f"{float(f'{length:.1g}'):g}, that of the largest, gives fewer."
