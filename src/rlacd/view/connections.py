@@ -118,6 +118,11 @@ class BoundedHandler(BaseHTTPRequestHandler):
         except ConnectionError:
             self.close_connection = True
 
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Answer with a head also what is no HTTP, which the base class takes for a version without heads."""
+        self.request_version = self.protocol_version
+        super().send_error(code, message, explain)
+
     def version_string(self) -> str:
         """Name the program, without the version of Python."""
         return "rlacd"
