@@ -112,10 +112,6 @@ class JobSpec:
         decides = [__version__, content, stem, self.weights, options, self.ending, self.written]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
-    def with_policy(self, path: Path) -> JobSpec:
-        """Return the same job with the network at another path."""
-        return replace(self, options={**self.options, "policy": str(path)})
-
     def shared(self) -> dict[str, Shared]:
         """Return what every process needs for these decompositions: the network, if the policy is a file."""
         policy = str(self.options.get("policy", ""))

@@ -6,6 +6,7 @@ import contextlib
 import time
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -197,4 +198,4 @@ class MeshServer:
         network = self._staging / f"{shared[POLICY].key}.npz"  # kept, so that it is read only once
         if not network.exists():
             network.write_bytes(shared[POLICY].blobs["network"])
-        return spec.with_policy(network)
+        return replace(spec, options={**spec.options, "policy": str(network)})

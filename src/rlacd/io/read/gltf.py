@@ -123,7 +123,8 @@ class _Scene:
         self._header, self._arrays = header, arrays
         self._nodes: list[Json] = header.get("nodes", [])
         self._meshes: list[Json] = header.get("meshes", [])
-        self._jointed = [all("JOINTS_0" in part["attributes"] for part in _surfaces(mesh)) for mesh in self._meshes]
+        surfaces = ([p for p in mesh["primitives"] if p.get("mode", TRIANGLES) in SURFACES] for mesh in self._meshes)
+        self._jointed = [all("JOINTS_0" in part["attributes"] for part in parts) for parts in surfaces]
         self._worlds = _worlds(self._nodes)
         self._shapes: dict[Any, Triangles] = {}
         self._unjointed: set[int] = set()
@@ -270,10 +271,6 @@ class _Scene:
 
 UNMOVED = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
 """Translation, rotation and scale of a node that gives none."""
-
-
-def _surfaces(mesh: Json) -> list[Json]:
-    return [part for part in mesh["primitives"] if part.get("mode", TRIANGLES) in SURFACES]
 
 
 def _worlds(nodes: Sequence[Json]) -> FloatArray:

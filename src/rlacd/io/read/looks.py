@@ -32,8 +32,8 @@ BETWEEN = "\n"
 """In the name of a node in a scene of looks: between that of the node in the file, and that of its material."""
 
 
-def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None:
-    """Parse a file again, with everything that its parser reads; None where that fails.
+def looks_of(path: Path, content: bytes, extension: str) -> Any:
+    """Parse a file again as a scene with everything that its parser reads; None, with a warning, where that fails.
 
     Parameters
     ----------
@@ -45,10 +45,10 @@ def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None
         ``obj``, ``ply``, ``dae`` or ``3mf``.
     """
     try:
-        scene: trimesh.Scene = function_of(_READERS[extension])(path, content)
+        return function_of(_READERS[extension])(path, content)
     except Exception:  # parsers may raise anything on damaged files; the triangles have been read without looks
+        warnings.warn(f"the looks of {path.name} could not be read, so it is grey", UserWarning, stacklevel=3)
         return None
-    return scene
 
 
 def painted(arrays: Mapping[str, tuple[FloatArray, IntArray]], material: Any) -> trimesh.Trimesh:
