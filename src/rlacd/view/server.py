@@ -67,17 +67,9 @@ HARDENING = {
 
 
 class ViewServer(BoundedServer):
-    """Serves one session.
+    """Serves one session: a subject, with the first values of the page's controls.
 
-    Parameters
-    ----------
-    session : Session
-    subject : Subject
-        The input shown first.
-    port : int, optional
-        Port to listen on; by default the usual port, or any free one.
-    options : dict
-        Initial values of the page's controls.
+    It listens on `port`; by default on the usual one, or any that is free.
 
     Raises
     ------
