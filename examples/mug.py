@@ -96,7 +96,8 @@ def draw(outcomes: list[Outcome], path: Path, width: int = 1400) -> None:
     for outcome in outcomes:
         bodies = [Body(triangles, color) for triangles, color in outcome.geoms]
         panels.append(render(bodies, width // len(outcomes), width // len(outcomes), samples=64))
-    Image.fromarray(np.concatenate(panels, axis=1)).save(path)
+    drawn = Image.fromarray(np.concatenate(panels, axis=1))
+    Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB").save(path)
 
 
 def _simulate(spec: Any, held_by: str) -> Outcome:

@@ -29,7 +29,6 @@ from sample import sample
 
 import rlacd
 from rlacd.result import Result
-from rlacd.view.apart import renderer
 from rlacd.view.picture import picture_bytes
 from rlacd.view.viewer import open_viewer
 
@@ -68,8 +67,7 @@ def step(what: str) -> Iterator[None]:
 
 def panels(result: Result, up: str = "z") -> Image.Image:
     """The input, its hulls, and the hulls pulled apart, on white."""
-    with renderer() as render:
-        drawn = Image.open(io.BytesIO(picture_bytes(result, width=900, up=up, clear=True, render=render)))
+    drawn = Image.open(io.BytesIO(picture_bytes(result, width=900, up=up, clear=True)))
     return Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB")
 
 

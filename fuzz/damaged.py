@@ -74,7 +74,7 @@ MJCF_PARTS = (
     "</worldbody>\n</mujoco>\n"
 )
 
-OFF_LETTERS = {"4": " 1", "N": " 0 0 1", "C": " 255 128 0 255", "ST": " 0.5 0.25"}
+OFF_LETTERS = {"N": " 0 0 1", "C": " 255 128 0 255", "ST": " 0.5 0.25"}
 """Numbers that each letter before ``OFF`` adds to a vertex's line, in this order."""
 
 WELL = ("loaded", "refused")
@@ -107,7 +107,7 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     scene.add_geometry(mesh, node_name="first", geom_name="mesh")
     scene.graph.update("second", "first", matrix=trimesh.transformations.translation_matrix([3, 0, 0]), geometry="mesh")
     yield "obj", Seed(mesh.export(file_type="obj").encode())
-    yield from (("off", Seed(off_variant(mesh, letters))) for letters in ("", "N", "STCN", "4", "n"))
+    yield from (("off", Seed(off_variant(mesh, letters))) for letters in ("", "N", "STCN"))
     yield "stl", Seed(mesh.export(file_type="stl"))
     yield "stl", Seed(mesh.export(file_type="stl_ascii").encode())
     yield "ply", Seed(mesh.export(file_type="ply"))
@@ -158,7 +158,7 @@ def written_by_extras(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
 def off_variant(mesh: trimesh.Trimesh, letters: str) -> bytes:
     """Write a mesh as an OFF file, with the vertex data that the letters before its keyword announce."""
     behind = "".join(text for letter, text in OFF_LETTERS.items() if letter in letters)
-    lines = [f"{letters}OFF{' 3' * ('n' in letters)} # {mesh.extents}", f"{len(mesh.vertices)} {len(mesh.faces)} 0"]
+    lines = [f"{letters}OFF # {mesh.extents}", f"{len(mesh.vertices)} {len(mesh.faces)} 0"]
     lines += [f"{x} {y} {z}{behind}" for x, y, z in mesh.vertices.tolist()]
     lines += [f"3 {a} {b} {c}{' 255 0 0' * ('C' in letters)}" for a, b, c in mesh.faces.tolist()]
     return "\n".join(lines).encode()

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
 
 from rlacd._native import convex_hull
+from rlacd.decomposition import Decomposition
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.hull import Hull
 
@@ -19,6 +22,17 @@ def hull_of(points: npt.ArrayLike) -> trimesh.Trimesh:
     indices, faces, rank = convex_hull(array)
     assert rank == 3
     return trimesh.Trimesh(array[indices], faces, process=False)
+
+
+def save_hulls(
+    hulls: Sequence[trimesh.Trimesh],
+    path: str | os.PathLike[str],
+    *,
+    stem: str = "mesh",
+    file_format: str | None = None,
+) -> Path:
+    """Write hulls without the mesh they come from."""
+    return Decomposition(list(hulls), {"name": stem}, trimesh.Trimesh()).save(path, file_format=file_format)
 
 
 def random_hull(seed: int, count: int = 24) -> trimesh.Trimesh:

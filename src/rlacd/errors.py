@@ -49,3 +49,13 @@ class WeightsError(RlacdError, ValueError):
 
 class ImplausibleBodyWarning(UserWarning):
     """A simulator's file describes a body whose size or mass suggests another unit, or a hollow shell."""
+
+
+def sentence_of(error: BaseException) -> str:
+    """Say in one sentence why something failed; what is no error of this package is told as a bug."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this mesh; simplify it or use a larger machine."
+    said = (str(error).strip().splitlines() or ["no message"])[0]
+    return (
+        said if isinstance(error, RlacdError) else f"a bug in rlacd ({type(error).__name__}: {said}); please report it."
+    )

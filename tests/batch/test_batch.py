@@ -241,17 +241,6 @@ def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> Non
     assert not (tmp_path / "out").exists()
 
 
-def test_large_meshes_are_named_before_anything_is_done(
-    assets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    small = batch(assets, "-o", tmp_path / "out", "--dry-run")
-    assert "large" not in small.stderr
-    monkeypatch.setattr("rlacd.batch.batch.LARGE", (assets / "a.stl").stat().st_size - 1)
-    run = batch(assets, "-o", tmp_path / "out", "--dry-run")
-    (line,) = [line for line in run.stderr.splitlines() if "large" in line]
-    assert "a.stl" in line
-
-
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [

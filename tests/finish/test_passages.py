@@ -115,7 +115,7 @@ def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     (slot,) = report["passages"]
     assert (slot["radius_abs"], slot["left_abs"]) == pytest.approx((0.5, 0.0), abs=0.01)
     assert any(
-        "1 passage narrows by" in said and "1 to nothing" in said and "of radius 0.4997 fits" in said
+        "1 passage narrows by" in said and "1 to nothing" in said and "from a radius of 0.4997 to 0;" in said
         for said in report["warnings"]
     )
     assert rlacd.decompose(mesh_of(block), threshold_abs=0.3, quality="fast", threads=1).report["passages"] == []

@@ -18,10 +18,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rlacd.errors import OptionError, OutputError
-from rlacd.io.write import FORMATS, hull_target, save_hulls
+from rlacd.io.write import FORMATS, hull_target
 from rlacd.io.write.palette import hull_colors
+from rlacd.options.output import OutputOptions
 from tests.assets import read_glb
-from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
+from tests.hulls import assert_convex_hull, hull_of, moved, random_hull, save_hulls
 
 THREE = [moved(random_hull(seed), 0.3, (seed, 0.1, -0.7)) for seed in range(3)]
 NAMES = ["hull_000", "hull_001", "hull_002"]
@@ -230,9 +231,9 @@ def test_a_folder_without_permission_is_refused_before_work(tmp_path: Path) -> N
 
 def test_contradicting_formats_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="contradicts"):
-        hull_target(tmp_path / "out.glb", "obj")
+        hull_target(tmp_path / "out.glb", OutputOptions(file_format="obj"))
     with pytest.raises(OptionError, match="unknown format"):
-        hull_target(f"{tmp_path}/out/", "fbx")
+        hull_target(f"{tmp_path}/out/", OutputOptions(file_format="fbx"))
 
 
 # --- whole or not at all ----------------------------------------------------------------------------------------------
@@ -356,7 +357,7 @@ def test_a_file_of_somebody_else_in_the_folder_is_never_replaced(tmp_path: Path,
 
 AT_ONCE = """
 import sys, pathlib, trimesh
-from rlacd.io.write import save_hulls
+from tests.hulls import save_hulls
 place, count, go = pathlib.Path(sys.argv[1]), int(sys.argv[2]), pathlib.Path(sys.argv[3])
 hulls = [trimesh.creation.box((count, 1, 1))] * count
 print(flush=True)

@@ -252,46 +252,33 @@ def test_strips_of_a_ply_file_are_triangles_of_alternating_turn(tmp_path: Path, 
         load_mesh(tmp_path / "box.ply")
 
 
-SQUARES = [[0, 3, 2, 1], [4, 5, 6, 7]], [[8, 11, 10, 9], [12, 13, 14, 15]]
-"""Bottom and top of a frame, whose corners run outward; and those of its hole."""
-
-
-def frame() -> bytes:
-    """A frame whose ends are polygons with a hole, one of which runs the same way as its outline."""
-    ring = np.array([[0, 0], [3, 0], [3, 3], [0, 3]], dtype=float)
-    points = np.concatenate([np.c_[np.concatenate([one, one]), [0] * 4 + [1] * 4] for one in (ring, ring / 3 + 1)])
-    sides = [[i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)]
-    sides += [[8 + i for i in side[::-1]] for side in sides]
-    content = dae((points, sides), one_list=False)
-    holed = ""
-    for outline, hole in zip(*SQUARES, strict=True):
-        outline, hole = (" ".join(f"0 {corner}" for corner in one) for one in (outline, hole))
-        holed += f"<ph><p>{outline}</p><h>{hole}</h></ph>"
-    return content.replace(b"</polygons>", holed.encode() + b"</polygons>")
+BOX = [(0, 0), (2, 0), (2, 2), (0, 2)]
 
 
 @pytest.mark.parametrize("prefix", [b"", b"c:"])
 def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
-    """Holes, skews, the layout of accessors, and controllers, whatever the prefix of the tags."""
+    """The layout of accessors and controllers, whatever the prefix of the tags; what is not read is refused."""
 
     def load(content: bytes) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
         content = content.replace(b"Z_UP", b"Y_UP")
         if prefix:
             content = re.sub(rb"<(/?)(?=[A-Za-z])", rb"<\1" + prefix, content).replace(b"xmlns=", b"xmlns:c=")
-        (tmp_path / "frame.dae").write_bytes(content)
-        mesh = load_mesh(tmp_path / "frame.dae")
+        (tmp_path / "box.dae").write_bytes(content)
+        mesh = load_mesh(tmp_path / "box.dae")
         assert mesh.up == "y"
         return trimesh.Trimesh(mesh.vertices, mesh.faces), mesh.warnings
 
-    solid, warned = load(frame())
+    box = dae(prism(BOX), one_list=False)
+    solid, warned = load(box)
     assert warned == ()
-    assert solid.is_volume
-    assert solid.volume == pytest.approx(8)
-    skewed, warned = load(frame().replace(b"<node>", b"<node><skew>45 1 0 0 0 2 0</skew>"))
-    assert warned == ()
-    np.testing.assert_allclose(skewed.vertices, solid.vertices + np.outer(solid.vertices[:, 0], [0, 1, 0]), atol=1e-6)
+    assert solid.volume == pytest.approx(4)
+    for instead in (b"<skew>45 1 0 0 0 2 0</skew>", b"<ph><p>0 0</p><h>0 0</h></ph>"):
+        with pytest.raises(MeshError, match=r"box\.dae has (skewed parts|polygons with holes).*export it again"):
+            load(box.replace(b"<node>", b"<node>" + instead))
+    with pytest.raises(MeshError, match="NaN"):
+        load(box.replace(b"<node>", b"<node><lookat>0 0 0 1 0 0 0 0 1</lookat>"))
 
-    spread = frame().replace(b'count="16" stride="3">', b'count="16" stride="4" offset="2"><param type="float"/>', 1)
+    spread = box.replace(b'count="8" stride="3">', b'count="8" stride="4" offset="2"><param type="float"/>', 1)
     numbers = re.search(rb'<float_array id="p-a"[^>]*>([^<]*)', spread)
     assert numbers is not None
     rows = np.array(numbers[1].split()).reshape(-1, 3).tolist()
@@ -301,17 +288,16 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
     with pytest.raises(MeshError, match="leads out of its array"):
         load(spread)
 
-    broken = frame().replace(
+    broken = box.replace(
         b"<polygons", b'<polylist count="1"><input semantic="VERTEX" source="#none"/></polylist><polygons'
     )
-    whole, (warned_of,) = load(broken)
-    np.testing.assert_array_equal(whole.vertices, solid.vertices)
-    assert "were left out, as they are damaged" in warned_of
+    with pytest.raises(MeshError, match=r"damaged or cut off .*#none' is missing"):
+        load(broken)
 
     skin = b"""<library_controllers><controller id="c"><skin source="#g"><bind_shape_matrix>2 0 0 0 0 2 0 0 0 0 2 0
         0 0 0 1</bind_shape_matrix></skin></controller></library_controllers><library_visual_scenes>"""
-    bent = frame().replace(b"<library_visual_scenes>", skin)
+    bent = box.replace(b"<library_visual_scenes>", skin)
     bent = bent.replace(b'<instance_geometry url="#g"/>', b'<instance_controller url="#c"/>')
     twice, (warned_of,) = load(bent)
-    assert twice.volume == pytest.approx(8 * 8)
+    assert twice.volume == pytest.approx(4 * 8)
     assert "as bound, at their nodes" in warned_of

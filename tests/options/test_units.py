@@ -170,25 +170,6 @@ def test_a_scene_has_a_floor_to_land_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_robot_of_meshes_of_one_size_is_told_of_a_larger_threshold(tmp_path: Path) -> None:
-    ring = trimesh.creation.torus(0.05, 0.015, major_sections=32, minor_sections=12)
-    ring.export(tmp_path / "a.stl")
-    ring.apply_scale(0.98).export(tmp_path / "b.stl")
-    mesh = '<link name="{0}"><collision><geometry><mesh filename="{0}.stl"/></geometry></collision></link>'
-    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
-    (tmp_path / "robot.urdf").write_text(f'<robot name="r">{mesh.format("a")}{mesh.format("b")}{joint}</robot>')
-    options = {"quality": "fast", "threads": 1}
-    done = rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "acd.urdf", threshold=0.012, **options)
-    said = next(warning for warning in done.warnings if "--threshold-abs" in warning)
-    length, _, promised = said.partition("--threshold-abs ")[2].partition(" gives ")
-    assert float(length) > 1.5 * 0.012 * 0.065  # half the longest side
-    followed = rlacd.rewrite_robot(
-        tmp_path / "robot.urdf", tmp_path / "few.urdf", threshold_abs=float(length), **options
-    )
-    assert sum(len(mesh.files) for mesh in followed.meshes) <= int(promised.split()[0])
-
-
-@pytest.mark.slow
 def test_a_robot_of_many_hulls_is_told_of_a_threshold_for_all(tmp_path: Path) -> None:
     """A large plain box and small rings that are cut finely: the suggestion holds when it is followed."""
     trimesh.creation.box((2, 0.3, 0.3)).export(tmp_path / "arm.stl")
@@ -205,11 +186,11 @@ def test_a_robot_of_many_hulls_is_told_of_a_threshold_for_all(tmp_path: Path) ->
     assert hulls > 20
     said = next(warning for warning in done.warnings if "--threshold-abs" in warning)
     assert said.startswith(f"2 meshes became {hulls} hulls")
-    length, _, promised = said.partition("--threshold-abs ")[2].partition(" gives ")
+    length = said.partition("--threshold-abs ")[2].partition(",")[0]
     followed = rlacd.rewrite_robot(
         tmp_path / "robot.urdf", tmp_path / "few.urdf", threshold_abs=float(length), threads=1
     )
-    assert sum(len(mesh.files) for mesh in followed.meshes) <= int(promised.split()[0]) < hulls
+    assert sum(len(mesh.files) for mesh in followed.meshes) < hulls
     assert not any("--threshold-abs" in warning for warning in followed.warnings)
     with pytest.raises(OptionError, match="unit"):
         rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "mm.urdf", unit="mm")

@@ -14,8 +14,7 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.view.apart import renderer
-from rlacd.view.picture import caption, check_picture, draw_picture, picture_bytes
+from rlacd.view.picture import caption, check_picture, draw_picture
 from tests.hulls import hull_of, moved
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
@@ -132,20 +131,3 @@ def test_drawing_leaves_stdout_and_stderr_alone(tmp_path: Path) -> None:
     command = [sys.executable, "-c", code, str(tmp_path / "out.png")]
     run = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "drawn\n")
-
-
-def test_the_callers_own_choice_of_renderer_comes_back(tmp_path: Path) -> None:
-    import mitsuba
-
-    mitsuba.set_variant("scalar_spectral")
-    draw_picture(towers(), tmp_path / "out.png", width=WIDTH, samples=1)
-    assert mitsuba.variant() == "scalar_spectral"
-
-
-@pytest.mark.slow
-def test_a_process_of_its_own_draws_the_same() -> None:
-    """So that the viewer's report holds up no decomposition."""
-    drawn = towers()
-    with renderer() as apart:
-        there = picture_bytes(drawn, width=WIDTH, samples=1, clear=True, render=apart)
-    assert there == picture_bytes(drawn, width=WIDTH, samples=1, clear=True)

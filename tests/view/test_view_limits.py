@@ -19,7 +19,7 @@ import pytest
 import trimesh
 
 from rlacd.view import connections
-from rlacd.view.connections import MOST_CONNECTIONS, MOST_STREAMS
+from rlacd.view.connections import MOST_CONNECTIONS
 from rlacd.view.server import UPLOADS, ViewServer
 from tests.view.viewing import open_viewer
 
@@ -76,8 +76,8 @@ def test_sixty_streams_hold_no_more_than_their_threads(viewer: ViewServer) -> No
         for stream in streams:
             stream.sendall(head("/events"))
         answers = [status_of(stream.recv(100)) for stream in streams]
-        assert answers.count(200) == MOST_STREAMS
-        assert answers.count(503) == 60 - MOST_STREAMS
+        assert answers.count(200) == MOST_CONNECTIONS
+        assert answers.count(503) == 60 - MOST_CONNECTIONS
         assert threading.active_count() - before <= MOST_CONNECTIONS
     wait_until(lambda: viewer.connections == 0)
     with connected(viewer) as again:
@@ -171,7 +171,7 @@ def test_what_is_too_long_or_no_request_is_refused(viewer: ViewServer, request_:
         connection.sendall(request_)
         assert status_of(all_of(connection)) == status
     with connected(viewer) as connection:
-        connection.sendall(head("/state", "Connection: close"))
+        connection.sendall(head("/scene", "Connection: close"))
         assert status_of(all_of(connection)) == 200, "others are served"
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import contextlib
 import hashlib
 import http.client
 import io
@@ -30,7 +29,7 @@ from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace
-from rlacd.view.controls import ViewerControls, read_controls
+from rlacd.view.controls import read_controls
 from rlacd.view.downloads import offered
 from rlacd.view.server import ViewServer
 from tests.view.viewing import open_viewer
@@ -109,7 +108,7 @@ def test_the_page_comes_with_its_controls(viewer: ViewServer) -> None:
 
 def test_every_answer_is_hardened(viewer: ViewServer) -> None:
     settled(viewer, run=1)
-    for path in ("/", "/page/list.js", "/state", "/scene", "/download?format=glb", "/nothing"):
+    for path in ("/", "/page/list.js", "/scene", "/download?format=glb", "/nothing"):
         headers = ask(viewer, "GET", path).headers
         assert headers["X-Content-Type-Options"] == "nosniff"
         assert headers["X-Frame-Options"] == "DENY"
@@ -217,14 +216,12 @@ def test_a_report_under_way_holds_up_no_decomposition(viewer: ViewServer, monkey
     settled(viewer, run=1)
     begun, done = threading.Event(), threading.Event()
 
-    @contextlib.contextmanager
-    def slow() -> Iterator[Any]:
+    def slow(*_: Any, **__: Any) -> bytes:
         begun.set()
         assert done.wait(PATIENCE)
         raise OutputError("the picture could not be drawn: its process died of SIGKILL.")
-        yield
 
-    monkeypatch.setattr("rlacd.view.downloads.renderer", slow)
+    monkeypatch.setattr("rlacd.view.report.picture_bytes", slow)
     answers: list[Answer] = []
     reports = [
         threading.Thread(target=lambda: answers.append(ask(viewer, "GET", "/download?format=report.html")))
@@ -584,9 +581,8 @@ def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
 
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
-    controls, usual, space = ViewerControls(), Options(), NavigableSpace()
+    controls, usual, space = read_controls({}), Options(), NavigableSpace()
     for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap", "open"):
-        assert getattr(controls, name) == getattr(usual, name)
-    assert bool(controls.primitives) == bool(usual.primitives)
-    assert (controls.radius, controls.tolerance) == (space.radius, space.tolerance)
-    assert read_controls({}) == controls
+        assert controls[name] == getattr(usual, name)
+    assert bool(controls["primitives"]) == bool(usual.primitives)
+    assert (controls["radius"], controls["tolerance"]) == (space.radius, space.tolerance)

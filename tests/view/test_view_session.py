@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -53,7 +54,7 @@ def work() -> Work:
 
 @pytest.fixture
 def session(work: Work) -> Iterator[Session]:
-    with Session(work) as session:
+    with contextlib.closing(Session(work)) as session:
         yield session
         work.go_on(100)
 

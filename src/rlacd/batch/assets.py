@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from typing import Literal
-from xml.parsers import expat
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import mesh_files
@@ -171,14 +170,15 @@ def _is_asset(path: Path) -> bool:
     return ending in (*ENDINGS, ".urdf") or (ending == ".xml" and _root(path) == "mujoco")
 
 
+_COMMENT, _TAG = re.compile(rb"<!--.*?-->", re.DOTALL), re.compile(rb"<([A-Za-z_][\w.:-]*)")
+
+
 def _root(path: Path) -> str:
     """The name of an XML file's root element; empty if none begins within its first 64 kB."""
-    found: list[str] = []
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = lambda tag, _: found.append(tag)
-    with contextlib.suppress(OSError, expat.ExpatError, ValueError), path.open("rb") as file:
-        parser.Parse(file.read(2**16), False)
-    return found[0] if found else ""
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        found = _TAG.search(_COMMENT.sub(b"", file.read(2**16)))
+        return found[1].decode() if found else ""
+    return ""
 
 
 def _written_hulls(folder: Path, files: Sequence[str]) -> set[str]:

@@ -29,9 +29,6 @@ REDO: tuple[Redo, ...] = ("none", "failed", "all")
 WRITERS = 4
 """Results written concurrently; each waits for the disk, not for a processor."""
 
-LARGE = 5_000_000
-"""Bytes of 100,000 triangles in a binary STL file; larger meshes may take much longer than the rest."""
-
 
 class Watcher(Protocol):
     """Receives the progress of a batch."""
@@ -152,17 +149,6 @@ class Batch:
     fallback: bool = True
     glob: str = EVERYTHING
     redo: Redo = "none"
-
-    def large(self) -> list[tuple[Asset, int]]:
-        """List the pending meshes whose files exceed `LARGE` bytes, with their sizes, largest first.
-
-        Raises
-        ------
-        RlacdError
-            As for `run`.
-        """
-        sizes = [(asset, asset.path.stat().st_size) for asset in self._find() if asset.path.exists()]
-        return sorted((entry for entry in sizes if entry[1] > LARGE), key=lambda entry: (-entry[1], entry[0].name))
 
     def plan(self) -> list[tuple[Asset, bool]]:
         """List all meshes, and whether the result of each exists; writes nothing.

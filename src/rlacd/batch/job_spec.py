@@ -12,16 +12,15 @@ from typing import Any
 from rlacd._version import __version__
 from rlacd.errors import OptionError, WeightsError
 from rlacd.io.read.open_file import read_file
-from rlacd.io.write import FORMATS, MODELS, hull_target
+from rlacd.io.write.target import FOLDER_FORMAT, FORMATS, file_kind, hull_target
 from rlacd.options import Options
 from rlacd.options.names import WEIGHTS_ENDING
-from rlacd.options.output import DENSITY, OutputOptions
-from rlacd.options.presets import find_preset
+from rlacd.options.output import OutputOptions
 from rlacd.policies import make_policy
 from rlacd.pool import Shared
 
-DEFAULT_FORMAT = "glb"
-FOLDER_FORMAT = "obj"
+WRITTEN = ("file_format", "density", "mass", "up", "one_mesh", "keep_input")
+"""Options of the output that a batch takes."""
 
 POLICY = "policy"
 """Name of the network that requests share, if the policy is a file."""
@@ -34,7 +33,7 @@ class JobSpec:
     Attributes
     ----------
     options
-        Arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields.
+        Keyword arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields.
     ending
         Ending of the output file, with its dot; empty for a folder with one file per hull.
     written
@@ -44,7 +43,7 @@ class JobSpec:
     """
 
     options: dict[str, Any] = field(default_factory=dict)
-    ending: str = f".{DEFAULT_FORMAT}"
+    ending: str = ".glb"
     written: dict[str, Any] = field(default_factory=dict)
     weights: str = ""
 
@@ -78,16 +77,21 @@ class JobSpec:
             )
         make_policy(checked.first_policy)
         asked = OutputOptions(**written)
-        ending, file_format = _file_kind(asked.file_format, folders, checked.preset)
-        flags = {name: bool(getattr(asked, name)) for name in ("one_mesh", "keep_input")}
+        if folders and (asked.file_format or FOLDER_FORMAT) not in FORMATS:
+            raise OptionError(
+                f"{asked.file_format} cannot be written as a folder per mesh; use one of {', '.join(FORMATS)}."
+            )
+        ending, file_format = file_kind(asked.file_format, checked.preset)
+        if folders:
+            ending, file_format = "", asked.file_format or FOLDER_FORMAT
+        asked = replace(asked, file_format=file_format)
         with TemporaryDirectory() as folder:
-            hull_target(f"{folder}/mesh{ending or '/'}", file_format, keep_input=flags["keep_input"])
-        if flags["one_mesh"] and ending != ".urdf":
-            raise OptionError("one_mesh (--one-mesh) works for .urdf files only: leave it out.")
+            hull_target(f"{folder}/mesh{ending or '/'}", asked)
         plain = {"threads": 1, **options}
         plain["criterion"] = checked.as_plain()["criterion"]
-        density = DENSITY if asked.density is None else asked.density
-        saved = {"file_format": file_format, "density": density, "mass": asked.mass, "up": asked.up, **flags}
+        saved = {name: getattr(asked, name) for name in WRITTEN}
+        if ending == f".{file_format}":
+            saved["file_format"] = None  # the same as not given
         return cls(plain, ending, saved, _weights(checked.first_policy))
 
     @property
@@ -100,21 +104,13 @@ class JobSpec:
 
         The number of threads and the path of a policy's file do not affect the key.
         """
-        options = Options(**self.arguments()).as_plain()
+        options = Options(**self.options).as_plain()
         del options["threads"]
         if options["policy"].endswith(WEIGHTS_ENDING):
             options["policy"] = WEIGHTS_ENDING
         stem = PurePosixPath(name).stem  # models carry this name
         decides = [__version__, content, stem, self.weights, options, self.ending, self.written]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
-
-    def arguments(self) -> dict[str, Any]:
-        """Get the keyword arguments of `rlacd.decompose`."""
-        return dict(self.options)
-
-    def with_policy(self, path: Path) -> JobSpec:
-        """Return the same job with the network at another path."""
-        return replace(self, options={**self.options, "policy": str(path)})
 
     def shared(self) -> dict[str, Shared]:
         """Return what every process needs for these decompositions: the network, if the policy is a file."""
@@ -126,24 +122,6 @@ class JobSpec:
     def as_plain(self) -> dict[str, Any]:
         """Convert to plain values; ``JobSpec(**plain)`` restores the job."""
         return asdict(self)
-
-
-def _file_kind(file_format: str | None, folders: bool, preset: str | None) -> tuple[str, str | None]:
-    """Ending and format of the output: no ending for a folder, no format where the ending determines it."""
-    wanted = None if file_format is None else file_format.lower().lstrip(".")
-    endings = [ending for of_model in MODELS.values() for ending in of_model]
-    if wanted is not None and wanted not in (*FORMATS, *MODELS, *endings):
-        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
-    if folders:
-        if wanted not in (None, *FORMATS):
-            raise OptionError(f"{file_format} cannot be written as a folder per mesh; use one of {', '.join(FORMATS)}.")
-        return "", wanted or FOLDER_FORMAT
-    if wanted is None and preset is not None:
-        engine = find_preset(preset)
-        return engine.ending, engine.file_format
-    if wanted in MODELS:
-        return f".{MODELS[wanted][0]}", wanted
-    return f".{wanted or DEFAULT_FORMAT}", None
 
 
 def _weights(policy: str) -> str:

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from types import TracebackType
 from typing import Any, TypeAlias
 
-from rlacd.batch.store import ResultStore
+from rlacd.batch.store import Journal, ResultStore
 from rlacd.errors import OutputError
 
 Row: TypeAlias = dict[str, Any]
@@ -33,7 +33,7 @@ class Ledger:
     def __init__(self, store: ResultStore, name: str) -> None:
         self._store = store
         self._name = name
-        self._journal = store.journal(name)
+        self._journal = Journal(store, name)
         self._rows: dict[str, Row] = {}
         self._owner: dict[str, str] = {}
         for row in _read(name, (store.read(name) or b"").splitlines()):
@@ -48,10 +48,6 @@ class Ledger:
     def owns(self, output: str) -> bool:
         """Whether a row names this file."""
         return output in self._owner
-
-    def rows(self) -> list[Row]:
-        """All rows, sorted by mesh."""
-        return [self._rows[mesh] for mesh in sorted(self._rows)]
 
     def add(self, row: Row) -> None:
         """Add a row, replacing an older one of the same mesh; files listed only in the old row are removed first."""
@@ -69,7 +65,7 @@ class Ledger:
         if error is not None:
             self._journal.close()
             return
-        content = b"".join(_line(row) for row in self.rows())
+        content = b"".join(_line(self._rows[mesh]) for mesh in sorted(self._rows))
         if content != (self._store.read(self._name) or b""):
             self._store.write(self._name, content)
         self._journal.remove()

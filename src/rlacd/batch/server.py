@@ -6,6 +6,7 @@ import contextlib
 import time
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,7 +18,7 @@ from rlacd.batch.job_spec import POLICY, JobSpec
 from rlacd.batch.store import open_store, put_files, under
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, RlacdError
+from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, sentence_of
 from rlacd.fit import LENGTHS, Fit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
@@ -65,7 +66,7 @@ def make(
             ending = mesh.suffix if stage is None else spec.ending
             facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)
             return facts, _files_in(Path(folder))
-        result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.arguments())
+        result = _hull(spec, mesh) if hull_only else decompose(mesh, **spec.options)
         place = f"{folder}/{stem}{spec.ending or '/'}"
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always", ImplausibleBodyWarning)
@@ -84,7 +85,7 @@ def _files_in(folder: Path) -> dict[str, bytes]:
 
 def _robot(spec: JobSpec, robot: Path | usd.Colliders, place: Path, hull_only: bool) -> dict[str, Any]:
     """Rewrite a robot, or a stage as one file, with hulls in place of its collision meshes; returns facts."""
-    options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.arguments()
+    options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.options
     if isinstance(robot, Path):
         done = rewrite_robot(robot, place, **options)
     else:
@@ -177,15 +178,9 @@ class MeshServer:
                 spec = self._spec(values["spec"], shared)
                 report, files = make(spec, path, values["stem"], self._staging, values["hull_only"])
                 answer: dict[str, Any] = {"report": report}
-            except MeshError as error:
-                answer = {"error": self._sentence(error, path, values["name"]), "unusable": True}
-            except RlacdError as error:
-                answer = {"error": self._sentence(error, path, values["name"])}
-            except MemoryError:
-                answer = {"error": "there is not enough memory for it"}
             except Exception as error:
-                sentence = self._sentence(error, path, values["name"])
-                answer = {"error": f"a bug in rlacd ({type(error).__name__}: {sentence})"}
+                said = sentence_of(error).replace(str(path), values["name"]).replace(str(self._staging), "")
+                answer = {"error": said, "unusable": isinstance(error, MeshError)}
         if values["out"] is not None:
             with contextlib.suppress(OutputNameError):  # left to the batch, which knows what it owns
                 there = under(values["parent"], files)
@@ -203,9 +198,4 @@ class MeshServer:
         network = self._staging / f"{shared[POLICY].key}.npz"  # kept, so that it is read only once
         if not network.exists():
             network.write_bytes(shared[POLICY].blobs["network"])
-        return spec.with_policy(network)
-
-    def _sentence(self, error: Exception, path: Path, name: str) -> str:
-        """First line of a message, with this machine's path replaced by the mesh's name."""
-        line = (str(error).strip().splitlines() or ["no message"])[0]
-        return line.replace(str(path), name).replace(str(self._staging), "")
+        return replace(spec, options={**spec.options, "policy": str(network)})

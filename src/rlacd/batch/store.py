@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 
@@ -20,8 +20,8 @@ from rlacd.io.write.atomic import lock_folder, output_errors, write_file
 PRIVATE = ".rlacd"
 """Folder inside the results for files that only the next run needs."""
 
-SEGMENT_SECONDS = 10.0
-"""Seconds between journal objects: an object store cannot append, so each object holds the lines since the last."""
+APPEND_SECONDS = 10.0
+"""Seconds between objects that hold a journal's lines at an address."""
 
 
 def open_store(place: str) -> ResultStore:
@@ -73,9 +73,12 @@ class FolderStore:
     ----------
     shared : bool
         Whether every machine can reach the store under the same address.
+    append_every : float
+        Seconds that lines of a journal may wait.
     """
 
     shared = False
+    append_every = 0.0
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -120,9 +123,27 @@ class FolderStore:
                     break
                 parent.rmdir()
 
-    def journal(self, name: str) -> Journal:
-        """Open a journal: lines that survive a kill of the process that writes them."""
-        return _FileJournal(self.folder / PRIVATE / name)
+    def append(self, name: str, data: bytes) -> None:
+        """Append lines to a file, and flush them to disk."""
+        path = self.folder / name
+        with output_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("ab") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+
+    def appended(self, name: str) -> bytes:
+        """Return all complete lines that were appended; an incomplete one is left by a kill and dropped."""
+        content = self.read(name) or b""
+        whole = content[: content.rfind(b"\n") + 1]
+        if whole != content:
+            self.write(name, whole)
+        return whole
+
+    def remove_appended(self, name: str) -> None:
+        """Remove all lines that were appended."""
+        (self.folder / name).unlink(missing_ok=True)
 
     def open(self) -> None:
         """Lock the folder for this run, and remove files left incomplete by a killed one.
@@ -147,44 +168,11 @@ class FolderStore:
             self._lock.release()
 
 
-class _FileJournal:
-    """Lines appended to a file, each flushed to disk before the next."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._file: io.BufferedWriter | None = None
-
-    def lines(self) -> Iterator[bytes]:
-        with output_errors(self._path):
-            content = read_file(self._path, sys.maxsize) if self._path.exists() else b""
-        whole = content.rfind(b"\n") + 1
-        if whole < len(content):
-            os.truncate(self._path, whole)  # drops an incomplete last line left by a kill
-        yield from content[:whole].splitlines()
-
-    def add(self, line: bytes) -> None:
-        with output_errors(self._path):
-            if self._file is None:
-                self._path.parent.mkdir(parents=True, exist_ok=True)
-                self._file = self._path.open("ab")
-            self._file.write(line)
-            self._file.flush()
-            os.fsync(self._file.fileno())
-
-    def remove(self) -> None:
-        self.close()
-        self._path.unlink(missing_ok=True)
-
-    def close(self) -> None:
-        if self._file is not None:
-            self._file.close()
-            self._file = None
-
-
 class AddressStore:
     """Any address that fsspec has a driver for; the driver finds credentials its usual way (environment, files)."""
 
     shared = True
+    append_every = APPEND_SECONDS
 
     def __init__(self, address: str) -> None:
         try:
@@ -203,45 +191,46 @@ class AddressStore:
 
     def write(self, name: str, data: bytes) -> None:
         """See `FolderStore`; atomic where the system writes objects atomically, as all object stores do."""
-        path = self._path(name)
-        with self._errors(path):
+
+        def put(path: str) -> None:
             self._system.makedirs(path.rpartition("/")[0], exist_ok=True)
             self._system.pipe_file(path, data)
 
+        self._ask(name, put)
+
     def read(self, name: str) -> bytes | None:
         """See `FolderStore`."""
-        with self._errors(self._path(name)):
-            try:
-                return bytes(self._system.cat_file(self._path(name)))
-            except FileNotFoundError:
-                return None
+        found = self._ask(name, self._system.cat_file, absent=None)
+        return None if found is None else bytes(found)
 
     def size(self, name: str) -> int | None:
         """See `FolderStore`."""
-        with self._errors(self._path(name)):
-            try:
-                return int(self._system.size(self._path(name)))
-            except FileNotFoundError:
-                return None
+        found = self._ask(name, self._system.size, absent=None)
+        return None if found is None else int(found)
 
     def remove(self, name: str) -> None:
         """See `FolderStore`."""
-        with self._errors(self._path(name)), contextlib.suppress(FileNotFoundError):
-            self._system.rm_file(self._path(name))
+        self._ask(name, self._system.rm_file, absent=None)
 
     def names(self, folder: str) -> list[str]:
         """List the files of a folder, sorted."""
-        with self._errors(self._path(folder)):
-            self._system.invalidate_cache()
-            try:
-                found: list[Any] = self._system.ls(self._path(folder), detail=False)
-            except FileNotFoundError:
-                return []
+        self._system.invalidate_cache()
+        found = self._ask(folder, partial(self._system.ls, detail=False), absent=())
         return sorted(f"{folder}/{str(path).rstrip('/').rpartition('/')[2]}" for path in found)
 
-    def journal(self, name: str) -> Journal:
+    def append(self, name: str, data: bytes) -> None:
+        """See `FolderStore`; an object store cannot append, so the lines of each call are an object."""
+        folder = f"{name}.parts"
+        self.write(f"{folder}/{len(self.names(folder)):08d}.jsonl", data)
+
+    def appended(self, name: str) -> bytes:
         """See `FolderStore`."""
-        return _SegmentJournal(self, f"{PRIVATE}/{name}.parts")
+        return b"".join(self.read(part) or b"" for part in self.names(f"{name}.parts"))
+
+    def remove_appended(self, name: str) -> None:
+        """See `FolderStore`."""
+        for part in self.names(f"{name}.parts"):
+            self.remove(part)
 
     def open(self) -> None:
         """Do nothing: an object store has no locks, so two runs must not write to one address at the same time."""
@@ -249,54 +238,49 @@ class AddressStore:
     def close(self) -> None:
         """Do nothing."""
 
-    def _path(self, name: str) -> str:
-        return f"{self._root.rstrip('/')}/{name}"
-
-    @contextlib.contextmanager
-    def _errors(self, path: str) -> Iterator[None]:
+    def _ask(self, name: str, ask: Callable[[str], Any], **otherwise: Any) -> Any:
+        """Call a function of the driver with a path; `absent`, if it is given, is the answer where there is no file."""
+        path = f"{self._root.rstrip('/')}/{name}"
         try:
-            yield
+            return ask(path)
         except (MemoryError, RecursionError):
             raise
         except Exception as error:  # drivers pass on any exception of their clients
+            if isinstance(error, FileNotFoundError) and "absent" in otherwise:
+                return otherwise["absent"]
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
             raise OutputError(f"cannot reach {path} ({reason}); check the address and your rights there.") from error
 
 
-class _SegmentJournal:
-    """Lines in numbered objects, one every few seconds; a kill may lose the lines of the last few seconds."""
+ResultStore: TypeAlias = FolderStore | AddressStore
 
-    def __init__(self, store: AddressStore, folder: str) -> None:
-        self._store = store
-        self._folder = folder
+
+class Journal:
+    """Lines that survive a kill of the process that writes them, but at an address those of the last few seconds."""
+
+    def __init__(self, store: ResultStore, name: str) -> None:
+        self._store, self._name = store, f"{PRIVATE}/{name}"
         self._waiting: list[bytes] = []
-        self._number = len(store.names(folder))
         self._written = time.monotonic()
 
-    def lines(self) -> Iterator[bytes]:
-        for name in self._store.names(self._folder):
-            yield from (self._store.read(name) or b"").splitlines()
+    def lines(self) -> list[bytes]:
+        """All lines that are there."""
+        return self._store.appended(self._name).splitlines()
 
     def add(self, line: bytes) -> None:
+        """Add a line."""
         self._waiting.append(line)
-        if time.monotonic() - self._written > SEGMENT_SECONDS:
-            self._flush()
-
-    def remove(self) -> None:
-        self._waiting.clear()
-        for name in self._store.names(self._folder):
-            self._store.remove(name)
+        if time.monotonic() - self._written >= self._store.append_every:
+            self.close()
 
     def close(self) -> None:
-        self._flush()
-
-    def _flush(self) -> None:
+        """Write the lines that wait."""
         if self._waiting:
-            self._store.write(f"{self._folder}/{self._number:08d}.jsonl", b"".join(self._waiting))
-            self._waiting.clear()
-            self._number += 1
+            self._store.append(self._name, b"".join(self._waiting))
+        self._waiting.clear()
         self._written = time.monotonic()
 
-
-ResultStore: TypeAlias = FolderStore | AddressStore
-Journal: TypeAlias = _FileJournal | _SegmentJournal
+    def remove(self) -> None:
+        """Remove all lines."""
+        self._waiting.clear()
+        self._store.remove_appended(self._name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -85,24 +86,10 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     options = decompose_options({**given, "threads": own.threads}, metres=given["unit"] is not None)
     spec = JobSpec.of(options, folders=own.folders, **written)
     work = Batch(assets, own.output, spec, where.limits(), own.fallback, own.glob, own.redo)
-    if not quiet:
-        _print_large(work)
     if own.dry_run:
         _print_plan(work)
     else:
         _run(work, where, quiet=bool(quiet))
-
-
-def _print_large(batch: Batch) -> None:
-    """Print one line that lists the large meshes, before any work."""
-    from rlacd.cli.batch_screen import LISTED
-
-    large = batch.large()
-    if large:
-        named = [f"{printable(asset.name)} ({size / 1e6:.0f} MB)" for asset, size in large[:LISTED]]
-        more = [f"{len(large) - LISTED} more"] if len(large) > LISTED else []
-        count = "1 mesh is" if len(large) == 1 else f"{len(large)} meshes are"
-        say(f"{count} large and may take minutes and gigabytes each: {', '.join([*named, *more])}")
 
 
 def _print_plan(batch: Batch) -> None:
@@ -126,7 +113,7 @@ def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
     with (
         graceful_stop("what is running will be finished") as stop,
         where.open(available_cpus()) as pool,
-        Screen(quiet=quiet) as screen,
+        closing(Screen(quiet=quiet)) as screen,
     ):
         summary = batch.run(pool, screen, stop)
     if not quiet:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from rlacd.cli.exit_codes import say
@@ -36,10 +35,8 @@ class Screen:
         self._status: Counter[str] = Counter()
         self._running: dict[str, None] = {}  # in the order of their turns
 
-    def __enter__(self) -> Screen:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def close(self) -> None:
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.stop()
 

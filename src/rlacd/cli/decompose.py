@@ -6,6 +6,7 @@ import dataclasses
 import os
 import sys
 import warnings
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -104,17 +105,18 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
         say(summary(result, "stdout" if place == STDIO else place, unit))
     for doubt in doubts:
         say(f"  warning: {doubt.message}")
-    if wanted.report is not None and is_html(wanted.report):
-        with writing("report", wanted.report, quiet=quiet):
-            result.save_report(wanted.report, up=up)
-    else:
+    extras: dict[str, tuple[str | None, Callable[[str], object]]] = {
+        "report": (wanted.report, partial(result.save_report, up=up)),
+        "balls": (wanted.balls, result.save_balls),
+        "picture": (wanted.picture, partial(result.picture, up=up)),
+    }
+    if wanted.report is None or not is_html(wanted.report):
         _write_report(wanted, to_json(result.report))
-    if wanted.balls is not None:
-        with writing("balls", wanted.balls, quiet=quiet):
-            result.save_balls(wanted.balls)
-    if wanted.picture is not None:
-        with writing("picture", wanted.picture, quiet=quiet):
-            result.picture(wanted.picture, up=up)
+        del extras["report"]
+    for what, (path, write) in extras.items():
+        if path is not None:
+            with writing(what, path, quiet=quiet):
+                write(path)
     return bool(result.report.get("complete", True))
 
 
@@ -164,22 +166,15 @@ def _stage(mesh: Path, wanted: OutputOptions) -> Any:
 
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:
     """Fill in the output path and format that the preset or the input determines."""
-    from rlacd.io.write import MODELS
-    from rlacd.io.write.target import ending_of
-    from rlacd.options.presets import find_preset
+    from rlacd.io.write.target import MODELS, file_kind
 
-    output, file_format = asked.output, asked.file_format
-    engine = None if preset is None else find_preset(preset)
-    if output is None:
-        ending = ".glb" if engine is None else engine.ending
-        if mesh.suffix.lower() in ROBOTS:
-            ending = mesh.suffix
-        elif file_format is not None:
-            ending = f".{ending_of(file_format)}"
-        output = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
-    if engine is not None and engine.file_format is not None and file_format is None:
-        fits = Path(output).suffix.lower().lstrip(".") in MODELS[engine.file_format]
-        file_format = engine.file_format if fits else None
+    ending, file_format = file_kind(asked.file_format, preset)
+    if mesh.suffix.lower() in ROBOTS:
+        ending = mesh.suffix
+    beside = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
+    output = beside if asked.output is None else asked.output
+    if asked.file_format is None and Path(output).suffix.lower().lstrip(".") not in MODELS.get(str(file_format), ()):
+        file_format = None
     return dataclasses.replace(asked, output=output, file_format=file_format)
 
 
@@ -188,17 +183,13 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     from rlacd.io.write import file_stem, hull_target
     from rlacd.io.write.balls import check_balls
     from rlacd.io.write.folder import check_names
-    from rlacd.io.write.target import check_file
 
-    flags = {"one_mesh": bool(wanted.one_mesh), "keep_input": bool(wanted.keep_input), "scene": bool(wanted.scene)}
-    target = hull_target(stdout_name(str(wanted.output), wanted.file_format), wanted.file_format, **flags)
+    target = hull_target(stdout_name(str(wanted.output), wanted.file_format), wanted)
     if target.is_folder:
         stem = file_stem(mesh.stem)
         check_names(target.path, stem, [f"{stem}_000.{target.file_format}"])  # the one that every result has
     if wanted.package_dirs:
         raise OptionError("--package-dir is for robots, a .urdf or .xml file as input.")
-    if wanted.report not in (None, STDIO):
-        check_file(Path(wanted.report))
     if wanted.picture is not None:
         from rlacd.view.picture import check_picture
 
@@ -208,9 +199,7 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
 
 
 def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
-    """Reject options for single meshes, and check that the report can be written."""
-    from rlacd.io.write.target import check_file
-
+    """Reject options for single meshes."""
     if wanted.output == STDIO:
         raise OptionError("a robot is several files, which do not fit into stdout: give -o a file name.")
     if wanted.report is not None and is_html(wanted.report):
@@ -219,8 +208,6 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")
             raise OptionError(f"--{spelled} is for a single mesh; leave it out for a robot.")
-    if wanted.report not in (None, STDIO):
-        check_file(Path(wanted.report))
 
 
 def _check_single(mesh: Path) -> None:
@@ -235,18 +222,16 @@ def _check_single(mesh: Path) -> None:
 
 def _check_input(mesh: Path) -> None:
     """Report a missing input before any problem with the output; loading reports everything else."""
-    try:
-        mesh.stat()
-    except FileNotFoundError as error:
-        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder") from error
-    except (OSError, ValueError):
-        return
-    if mesh.is_dir():
+    if os.path.isdir(mesh):
         raise MeshFileError(f"{mesh} is a folder; for all meshes in it run  rlacd batch {mesh} -o hulls/")
+    if not os.path.exists(mesh):
+        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder")
 
 
 def _check_output(mesh: Path, wanted: OutputOptions) -> None:
-    """Check that no file is written twice, and that the input is never overwritten."""
+    """Check that no file is written twice, that the input is never overwritten, and that the report can be written."""
+    from rlacd.io.write.target import check_file
+
     seen = {_same(mesh): "the input"}
     for name, flag in (("output", "-o"), ("report", "--report"), ("picture", "--picture"), ("balls", "--balls")):
         path = getattr(wanted, name)
@@ -255,6 +240,8 @@ def _check_output(mesh: Path, wanted: OutputOptions) -> None:
         place = path if path == STDIO else _same(path)
         if place in seen:
             raise OptionError(f"{flag} {path} would overwrite {seen[place]}; choose another name.")
+        if name == "report" and path != STDIO:
+            check_file(Path(path))
         seen[place] = "the hulls" if name == "output" else f"what {flag} writes"
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 from typing import NoReturn
 
-from rlacd.errors import OutputError, RlacdError
+from rlacd.errors import OutputError, RlacdError, sentence_of
 
 
 class ExitCode(IntEnum):
@@ -49,13 +49,10 @@ def exit_codes() -> Iterator[None]:
         raise SystemExit(ExitCode.CANNOT_WRITE) from None
     except OutputError as error:
         _fail(error, ExitCode.CANNOT_WRITE)
-    except RlacdError as error:
-        _fail(error, ExitCode.BAD_INPUT)
-    except MemoryError:
-        _fail("there is not enough memory for this mesh; simplify it or use a larger machine.", ExitCode.BAD_INPUT)
+    except (RlacdError, MemoryError) as error:
+        _fail(sentence_of(error), ExitCode.BAD_INPUT)
     except Exception as error:
-        message = f"a bug in rlacd ({type(error).__name__}: {_first_line(error)}); "
-        _fail(message + "run again with RLACD_DEBUG=1 for the traceback, and please report it.", ExitCode.BUG)
+        _fail(f"{sentence_of(error)[:-1]}; RLACD_DEBUG=1 shows the traceback.", ExitCode.BUG)
 
 
 def give(content: str | bytes) -> None:
@@ -105,7 +102,3 @@ def _fail(message: object, code: ExitCode) -> None:
         raise
     say(f"rlacd: {message}")
     raise SystemExit(code)
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or ["no message"])[0]

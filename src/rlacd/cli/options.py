@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
+from rlacd.io.read.conventions import UNITS as METRES
 from rlacd.options import OPTION_NAMES, Options, with_criterion
 from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, stated
 from rlacd.options.navigable import NavigableSpace
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 _ABSOLUTE = {*OPTION_NAMES, *(field.name for field in dataclasses.fields(NavigableSpace))}
 
 _LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 @stated(panel="Processes")

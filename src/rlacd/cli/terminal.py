@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
-from rlacd.cli.options import METRES
 from rlacd.fit import Fit
+from rlacd.io.read.conventions import UNITS as METRES
 from rlacd.run import Progress, ProgressCallback
 
 if TYPE_CHECKING:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,21 +33,14 @@ def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> 
     options = TrainOptions.preset(preset, **chosen(given))
     if run.exists() and not run.is_dir():
         raise OptionError(f"--run {run} is a file; give a folder.")
-    learn = _learn("rlacd.learn.train", "train")
-    with where.open(1) as pool:
-        learn(meshes, run, options, resume=resume, say=click.echo, pool=pool, limits=where.limits())
-
-
-def _learn(module: str, name: str) -> Callable[..., Path]:
     try:
-        run: Callable[..., Path] = getattr(importlib.import_module(module), name)
+        from rlacd.learn.train import train
     except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] == "torch":
-            raise MissingExtraError(
-                "training needs an extra: run  pip install 'rlacd[train]'  and try again."
-            ) from error
-        raise
-    return run
+        if (error.name or "").split(".")[0] != "torch":
+            raise
+        raise MissingExtraError("training needs an extra: run  pip install 'rlacd[train]'  and try again.") from error
+    with where.open(1) as pool:
+        train(meshes, run, options, resume=resume, say=click.echo, pool=pool, limits=where.limits())
 
 
 COMMAND = Command(

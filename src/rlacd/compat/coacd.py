@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 import numpy as np
@@ -22,9 +21,10 @@ _UNUSED = {
     "preprocess_mode": "it repairs bodies that are not closed, and no others",
     "preprocess_resolution": "it does not remesh the input",
     "resolution": "it bounds distances instead of sampling them",
-    "mcts_nodes": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
-    "mcts_iterations": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
-    "mcts_max_depth": "it has no tree search; rlacd.decompose(quality='best') searches in another way",
+    **dict.fromkeys(
+        ("mcts_nodes", "mcts_iterations", "mcts_max_depth"),
+        "it has no tree search; rlacd.decompose(quality='best') searches in another way",
+    ),
     "pca": "it tries planes along the principal axes anyway",
 }
 
@@ -95,8 +95,7 @@ def run_coacd(
     OptionError
         An option is out of range.
     """
-    given = locals()
-    warn_unused("run_coacd", given, _defaults(), _UNUSED)
+    warn_unused(run_coacd, locals(), _UNUSED)
     apx_mode = read(one_of(("ch", "box")), "apx_mode", apx_mode)
     threshold = read(number(above=0), "threshold", threshold)
     most_hulls = read(integer(-(2**31)), "max_convex_hull", max_convex_hull)
@@ -119,7 +118,3 @@ def run_coacd(
 
 def set_log_level(level: str) -> None:
     """Accept CoACD's log levels; rlacd logs nothing."""
-
-
-def _defaults() -> dict[str, Any]:
-    return {name: parameter.default for name, parameter in inspect.signature(run_coacd).parameters.items()}

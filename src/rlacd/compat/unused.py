@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 _WARNED: set[tuple[str, str]] = set()
@@ -13,14 +14,13 @@ class UnusedOptionWarning(UserWarning):
     """An option of the other tool that has no meaning in rlacd."""
 
 
-def warn_unused(
-    function: str, given: Mapping[str, Any], defaults: Mapping[str, Any], reasons: Mapping[str, str]
-) -> None:
+def warn_unused(function: Callable[..., Any], given: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
     """Warn about the options in `reasons` that differ from their default, each once per process."""
     for name, reason in reasons.items():
-        if not _same(given[name], defaults[name]) and (function, name) not in _WARNED:
-            _WARNED.add((function, name))
-            warnings.warn(f"{function}: rlacd ignores {name}: {reason}.", UnusedOptionWarning, stacklevel=3)
+        default, known = inspect.signature(function).parameters[name].default, (function.__name__, name)
+        if not _same(given[name], default) and known not in _WARNED:
+            _WARNED.add(known)
+            warnings.warn(f"{function.__name__}: rlacd ignores {name}: {reason}.", UnusedOptionWarning, stacklevel=3)
 
 
 def _same(given: Any, default: Any) -> bool:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 import numpy as np
@@ -74,9 +73,7 @@ def compute_vhacd(
     OptionError
         An option is out of range.
     """
-    given = locals()
-    defaults = {name: parameter.default for name, parameter in inspect.signature(compute_vhacd).parameters.items()}
-    warn_unused("compute_vhacd", given, defaults, _UNUSED)
+    warn_unused(compute_vhacd, locals(), _UNUSED)
     percent = read(number(0), "minimumVolumePercentErrorAllowed", minimumVolumePercentErrorAllowed)
     result = decompose(
         (np.asarray(points, dtype=np.float64), _triangles(faces)),
@@ -93,10 +90,8 @@ def _triangles(faces: Any) -> npt.NDArray[np.int64]:
     array = np.asarray(faces)
     if array.ndim == 1 and len(array) % 4 == 0 and (array[::4] == 3).all():
         array = array.reshape(-1, 4)[:, 1:]
-    elif array.ndim == 1 and len(array) % 3 == 0:
-        array = array.reshape(-1, 3)
-    elif array.ndim == 1:
+    if array.ndim == 1 and len(array) % 3:
         raise MeshDataError(
             "flat faces are neither 3, a, b, c, 3, ... nor a, b, c, a, ...: triangulate the polygons first."
         )
-    return array.astype(np.int64)
+    return (array if array.ndim > 1 else array.reshape(-1, 3)).astype(np.int64)

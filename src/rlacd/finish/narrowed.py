@@ -147,7 +147,7 @@ def too_narrow(found: Sequence[dict[str, Any]], reached: Reached, is_stopped: bo
         _narrows(lost, by, cure)
         for lost, by, cure in (
             (asked, "more than --keep-open allows", reason),
-            (others, share, "--keep-open with a length, or a smaller threshold, keeps more open"),
+            (others, share, "--keep-open with a length keeps more open"),
         )
         if lost
     ]
@@ -158,7 +158,6 @@ def _narrows(lost: list[tuple[list[float], float, float]], share: str, cure: str
     at, radius, left = min(lost, key=lambda one: (max(one[2] / one[1], ACCURACY), -one[1]))
     return (
         f"{len(lost)} passage{'s narrow' if len(lost) > 1 else ' narrows'} by {share}"
-        f"{f', {closed} to nothing' if closed else ''}: "
-        f"near ({', '.join(f'{x:.4g}' for x in at)}) a ball of radius {radius:.4g} fits in the input, of {left:.4g} "
-        f"between the hulls (see `passages`); {cure}."
+        f"{f', {closed} to nothing' if closed else ''}, such as that near ({', '.join(f'{x:.4g}' for x in at)}) from a "
+        f"radius of {radius:.4g} to {left:.4g}; {cure}."
     )

@@ -91,7 +91,7 @@ def _within(value: Any, taken: type, plain_type: type, least: float, most: float
 
 def _interval(what: str, least: float, most: float) -> tuple[str, str]:
     """Say in a sentence and in a table what is taken."""
-    low, high = (_plain(bound) for bound in (least, most))
+    low, high = (str(bound) if isinstance(bound, int) else f"{bound:g}" for bound in (least, most))
     if math.isinf(most):
         return (what, "") if math.isinf(least) else (f"{what}, at least {low}", f"≥ {low}")
     if math.isinf(least):
@@ -99,23 +99,15 @@ def _interval(what: str, least: float, most: float) -> tuple[str, str]:
     return f"{what} between {low} and {high}", f"{low} to {high}"
 
 
-def _plain(bound: float) -> str:
-    return "2**63 - 1" if bound == LARGEST_INTEGER else str(bound) if isinstance(bound, int) else f"{bound:g}"
-
-
 def flag() -> Kind:
     """True or False."""
 
     def read(value: Any) -> bool:
-        # numpy's own bool is no bool; it is not imported just to ask.
-        if not isinstance(value, bool) and (type(value).__module__, type(value).__name__) not in NUMPY_BOOLS:
+        if type(value).__name__ not in ("bool", "bool_"):  # numpy's own is no bool; it is not imported just to ask
             raise TypeError
         return bool(value)
 
     return Kind("True or False", "", read, bool)
-
-
-NUMPY_BOOLS = {("numpy", "bool"), ("numpy", "bool_")}
 
 
 def one_of(names: Any, *, rule: str | None = None) -> Kind:
@@ -124,15 +116,9 @@ def one_of(names: Any, *, rule: str | None = None) -> Kind:
     return custom(rule or f"one of {', '.join(words)}", lambda given: words[words.index(_text(given))], " ".join(words))
 
 
-def text(rule: str = "a string", *, least: int = 0) -> Kind:
-    """A string of at least this many characters."""
-
-    def read(value: Any) -> str:
-        if len(plain := _text(value)) < least:
-            raise ValueError
-        return plain
-
-    return custom(rule, read)
+def text(rule: str = "a string") -> Kind:
+    """A string."""
+    return custom(rule, _text)
 
 
 def path_like(rule: str = "a path") -> Kind:
@@ -215,16 +201,14 @@ def option(
     return dataclasses.field(default=default, kw_only=keyword, metadata={"option": known})
 
 
-def _kind_of(default: Any, least: float | None = None, most: float | None = None, one_of: Any = ()) -> Kind:
+def _kind_of(default: Any, one_of: Any = (), **bounds: Any) -> Kind:
     if one_of:
         return _one_of(one_of)
     if isinstance(default, bool):
         return flag()
     if isinstance(default, float):
-        return number(-math.inf if least is None else least, math.inf if most is None else most)
-    if isinstance(default, int) or least is not None:
-        return integer(None if least is None else int(least), None if most is None else int(most))
-    return text()
+        return number(**bounds)
+    return integer(**bounds) if isinstance(default, int) or bounds else text()
 
 
 _one_of = one_of

@@ -21,7 +21,7 @@ def _folders(given: Any) -> list[str]:
 
 _DENSITY = number(above=0, rule="a positive mass per cubic unit, such as 1000 for water")
 _MASS = number(above=0, rule="a positive mass")
-_FORMAT = text("the name of a format, such as obj", least=1)
+_FORMAT = text("the name of a format, such as obj")
 _PACKAGES = custom("a list of strings, NAME=FOLDER or FOLDER", _folders)
 _AXIS = one_of(Axis, rule="x, y or z")
 

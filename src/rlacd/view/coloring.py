@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
 import numpy.typing as npt
 import trimesh
@@ -18,38 +18,29 @@ TOO_CLOSE_TO_SEE = 2e-3
 """Hulls count as touching if closer than this share of their common extent, too close for the eye to separate."""
 
 
-@dataclass(frozen=True, eq=False)
-class Coloring:
-    """A colour for each hull.
-
-    Attributes
-    ----------
-    rgb : uint8 [N, 3]
-    rank : int64 [N]
-        Index of the hue; differs between hulls that touch, unless more than `HUES` of them all touch each other.
-    """
-
-    rgb: npt.NDArray[np.uint8]
-    rank: npt.NDArray[np.int64]
-
-
-def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> Coloring:
+def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
     """Choose colours by which hulls touch: neighbours differ in hue, and hulls that share a hue differ in shade.
 
     Hulls are coloured greedily in smallest-last order (Matula & Beck 1983): each gets the least used hue that its
     neighbours leave free.
+
+    Returns
+    -------
+    rgb : uint8 [N, 3]
+    rank : int64 [N]
+        Index of the hue; differs between hulls that touch, unless more than `HUES` of them all touch each other.
     """
     beside = neighbours(hulls)
     rank = np.full(len(hulls), -1, dtype=np.int64)
     used = np.zeros(HUES, dtype=np.int64)
     shade = np.zeros(len(hulls), dtype=np.int64)
-    for hull in _smallest_last(beside):
+    for hull in nx.coloring.strategy_smallest_last(nx.Graph(dict(enumerate(beside))), None):
         taken = np.bincount([rank[other] for other in beside[hull] if rank[other] >= 0], minlength=HUES)
         rank[hull] = np.lexsort((np.arange(HUES), used, taken))[0]
         shade[hull] = used[rank[hull]]
         used[rank[hull]] += 1
     index = rank + HUES * shade
-    return Coloring(hull_colors(int(index.max(initial=-1)) + 1)[index], rank)
+    return hull_colors(int(index.max(initial=-1)) + 1)[index], rank
 
 
 def neighbours(hulls: Sequence[trimesh.Trimesh]) -> list[set[int]]:
@@ -76,17 +67,3 @@ def _lies_above(one: trimesh.Trimesh, other: trimesh.Trimesh, near: float) -> bo
     normals = other.face_normals  # zero where a facet is too thin to have one
     heights = (normals @ one.vertices.T).min(axis=1) - (normals * other.triangles[:, 0]).sum(axis=1)
     return bool((heights > near).any())
-
-
-def _smallest_last(beside: list[set[int]]) -> list[int]:
-    """Smallest-last order: repeatedly move the hull with the fewest remaining neighbours to the end."""
-    left = [set(others) for others in beside]
-    waiting = set(range(len(beside)))
-    order = []
-    while waiting:
-        least = min(waiting, key=lambda hull: (len(left[hull]), -hull))
-        waiting.remove(least)
-        order.append(least)
-        for other in left[least]:
-            left[other].discard(least)
-    return order[::-1]

@@ -19,9 +19,6 @@ from typing import Any
 MOST_CONNECTIONS = 48
 """Concurrent connections; a browser opens up to six."""
 
-MOST_STREAMS = 16
-"""Concurrent event streams, one per open page."""
-
 REQUEST_SECONDS = 10.0
 """Seconds to receive headers and body, from the first byte expected; also how long an idle connection is kept."""
 
@@ -29,6 +26,12 @@ ANSWER_SECONDS = 120.0
 """Seconds to send an answer of any size."""
 
 FULL = "too many connections to this viewer are open; close a page and reload this one."
+
+
+_BUSY = (
+    "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nCache-Control: no-store\r\n"
+    f"Retry-After: 5\r\nConnection: close\r\n\r\n{json.dumps({'error': FULL})}"
+).encode()
 
 
 class BoundedServer(ThreadingHTTPServer):
@@ -40,7 +43,6 @@ class BoundedServer(ThreadingHTTPServer):
     def __init__(self, address: tuple[str, int], handler: type[BoundedHandler]) -> None:
         self._deadlines: dict[socket.socket, float] = {}
         self._changed = threading.Condition()
-        self.streams = threading.BoundedSemaphore(MOST_STREAMS)
         super().__init__(address, handler)
 
     @property
@@ -99,7 +101,7 @@ class BoundedServer(ThreadingHTTPServer):
 
 
 class BoundedHandler(BaseHTTPRequestHandler):
-    """A handler that reads requests in bounded time, and reports errors as JSON.
+    """A handler that reads requests in bounded time.
 
     The base class bounds heads: to 100 lines of 64 KiB.
     """
@@ -117,11 +119,9 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer what the base class refuses (methods, versions, heads) with JSON, and close the connection."""
-        self.close_connection = True
-        reason = self.responses.get(code, ("refused", ""))[0]
-        with contextlib.suppress(OSError):
-            _send_refusal(self.connection, code, reason, f"{message or reason}.")
+        """Answer with a head also what is no HTTP, which the base class takes for a version without heads."""
+        self.request_version = self.protocol_version
+        super().send_error(code, message, explain)
 
     def version_string(self) -> str:
         """Name the program, without the version of Python."""
@@ -146,13 +146,4 @@ def _turn_away(connection: socket.socket) -> None:
     with contextlib.suppress(OSError):
         connection.recv(1 << 16)  # closing a connection with unread input can destroy the answer
     with contextlib.suppress(OSError):
-        _send_refusal(connection, 503, "Service Unavailable", FULL)
-
-
-def _send_refusal(connection: socket.socket, code: int, reason: str, sentence: str) -> None:
-    body = json.dumps({"error": sentence}).encode()
-    head = (
-        f"HTTP/1.1 {code} {reason}\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n"
-        "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nRetry-After: 5\r\nConnection: close\r\n\r\n"
-    )
-    connection.sendall(head.encode() + body)
+        connection.sendall(_BUSY)

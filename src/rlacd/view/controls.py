@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import os
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,49 +14,48 @@ from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write import file_stem
 from rlacd.options import CRITERIA, FAST, Options, with_criterion
-from rlacd.options.names import PrimitiveKind
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.solid.input_mesh import InputMesh
 
-_DEFAULTS, _SPACE = Options(), NavigableSpace()
+_NAMES = (
+    *("criterion", "threshold", "radius", "tolerance", "volume_tolerance", "quality", "primitives"),
+    *("overlap", "keep_open", "open", "max_hulls", "max_vertices", "preset"),
+)
+_USUAL, _SPACE = Options(), NavigableSpace()
 _NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
 
+CONTROLS: dict[str, Any] = {name: getattr(_SPACE if hasattr(_SPACE, name) else _USUAL, name) for name in _NAMES} | {
+    "primitives": False
+}
+"""The page's controls, by the names of options, with their first values."""
 
-@dataclasses.dataclass(frozen=True)
-class ViewerControls:
-    """Values of the page's controls; see `rlacd.decompose` for their meaning."""
 
-    criterion: str = str(_DEFAULTS.criterion)
-    threshold: float = _DEFAULTS.threshold
-    radius: float = _SPACE.radius or 0.0
-    tolerance: float = _SPACE.tolerance or 0.0
-    volume_tolerance: float = _DEFAULTS.volume_tolerance
-    quality: str = _DEFAULTS.quality or FAST
-    primitives: bool | Sequence[PrimitiveKind] = False
-    overlap: float = _DEFAULTS.overlap
-    keep_open: float | None = None
-    open: str = _DEFAULTS.open
-    max_hulls: int | None = None
-    max_vertices: int | None = None
-    preset: str | None = None
+def read_controls(given: dict[str, Any]) -> dict[str, Any]:
+    """Check the options given by a page or a command line; returns the values of all controls.
 
-    def options(self) -> dict[str, Any]:
-        """Get the options of `rlacd.decompose`.
+    Raises
+    ------
+    OptionError
+        An option is unknown, of the wrong type or out of range.
+    """
+    for name in given:
+        if name not in CONTROLS:
+            raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(CONTROLS))}.")
+    controls = {**CONTROLS, **given}
+    Options(**options_of(controls))
+    return controls
 
-        Raises
-        ------
-        OptionError
-            A value is out of range.
-        """
-        others = _NUMBERS - {*CRITERIA.get(self.criterion, ())}
-        options = with_criterion({key: value for key, value in vars(self).items() if key not in others})
-        Options(**options)
-        return options
 
-    def draft(self) -> dict[str, Any] | None:
-        """Get the options of a quick first pass; None if the requested options are already quick."""
-        return None if self.quality == FAST else {**self.options(), "quality": FAST}
+def options_of(controls: dict[str, Any]) -> dict[str, Any]:
+    """Get the options of `rlacd.decompose`."""
+    others = _NUMBERS - {*CRITERIA.get(controls["criterion"], ())}
+    return with_criterion({name: value for name, value in controls.items() if name not in others})
+
+
+def draft_of(controls: dict[str, Any]) -> dict[str, Any] | None:
+    """Get the options of a quick first pass; None if the requested options are already quick."""
+    return None if controls["quality"] == FAST else options_of({**controls, "quality": FAST})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,21 +100,6 @@ def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject
     return Subject(Path(mesh), Path(read.name).stem, axis, read.unit, read, up_is_guess=guess)
 
 
-def read_controls(given: dict[str, Any]) -> ViewerControls:
-    """Check the options given by a page or a command line.
-
-    Raises
-    ------
-    OptionError
-        An option is unknown or of the wrong type.
-    """
-    known = {field.name for field in dataclasses.fields(ViewerControls)}
-    for name in given:
-        if name not in known:
-            raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(known))}.")
-    return ViewerControls(**given)
-
-
 SAY_NOTHING = (".obj", ".stl", ".ply", ".off", ".xyz")
 """Formats that say nothing of directions: programs for drawing write y up, programs for machines z."""
 
@@ -132,29 +115,13 @@ def guessed_up(mesh: InputMesh) -> Axis:
     return "y" if stands[1] and not stands[2] else "z"
 
 
-def as_command(mesh: str | os.PathLike[str], given: dict[str, Any], usual: Any) -> str:
-    """Write ``rlacd decompose`` with the options set on the page.
-
-    Parameters
-    ----------
-    mesh : path-like
-    given : dict
-        Values of the controls, by the field names of `usual`.
-    usual : dataclass instance
-        Default values of the controls; options at their default are left out.
-
-    Returns
-    -------
-    str
-        One line, quoted for a POSIX shell.
-    """
-    own = CRITERIA.get(str(given.get("criterion")), Options().numbers)
-    others = _NUMBERS - {*own}
+def as_command(mesh: str | os.PathLike[str], controls: dict[str, Any]) -> str:
+    """Write ``rlacd decompose`` with the options set on the page: one line, quoted for a POSIX shell."""
+    others = _NUMBERS - {*CRITERIA[controls["criterion"]]}
     words = ["rlacd", "decompose", os.fspath(mesh)]
-    for field in dataclasses.fields(usual):
-        value = given.get(field.name)
-        if field.name not in others and value is not None and value != getattr(usual, field.name):
-            words += [f"--{field.name.removeprefix('volume_').replace('_', '-')}", _word(value)]
+    for name, value in controls.items():
+        if name not in others and value not in (None, CONTROLS[name]):
+            words += [f"--{name.removeprefix('volume_').replace('_', '-')}", _word(value)]
     return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls.glb"])
 
 

@@ -6,30 +6,22 @@ import io
 import tempfile
 import zipfile
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import cast
 
-from rlacd.errors import MissingExtraError, OptionError
+from rlacd.errors import OptionError
 from rlacd.io.write import FORMATS, MODELS, file_stem, save
 from rlacd.io.write.balls import save_balls
 from rlacd.io.write.target import WITH_MESHES
-from rlacd.io.write.usd import require_usd
+from rlacd.io.write.usd import NEEDS_EXTRA
 from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.apart import renderer
 from rlacd.view.report import report_page
 
 FOLDERS = ("obj", "stl")
 """Formats also offered with one file per hull."""
-
-
-@dataclass(frozen=True)
-class Download:
-    """A file's name and bytes."""
-
-    name: str
-    content: bytes
 
 
 @dataclass(frozen=True)
@@ -82,7 +74,7 @@ def offered() -> list[Offer]:
                 f"The mesh with its hulls as collision shapes, for {_MODEL_NAMES[model][1]}"
                 f" (.{MODELS[model][0]}{' and its meshes, zipped' if model in WITH_MESHES else ''}).",
                 "Models",
-                _missing(model),
+                NEEDS_EXTRA if model == "usd" and find_spec("pxr") is None else None,
             )
             for model in MODELS
         ),
@@ -92,18 +84,8 @@ def offered() -> list[Offer]:
     ]
 
 
-def _missing(model: str) -> str | None:
-    if model != "usd":
-        return None
-    try:
-        require_usd()
-    except MissingExtraError as error:
-        return str(error)
-    return None
-
-
-def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "") -> Download:
-    """Make one of the files `offered`; several files are zipped.
+def download(decomposition: Result, wanted: str, *, up: str = "z") -> tuple[str, bytes]:
+    """Make one of the files `offered`: its name and content; several files are zipped.
 
     Parameters
     ----------
@@ -112,8 +94,6 @@ def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "
         The name of the offer.
     up : {"x", "y", "z"}
         The axis of the input that points up.
-    unit : str
-        The input's unit of length, for the report; empty if unknown.
 
     Raises
     ------
@@ -129,11 +109,9 @@ def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "
         raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
     stem = file_stem(decomposition.name)
     if wanted == "report.html":
-        with renderer() as render:
-            page = report_page(decomposition, up=up, unit=unit, render=render)
-        return Download(f"{stem}_hulls.html", page.encode())
+        return (f"{stem}_hulls.html", report_page(decomposition, up=up).encode())
     if wanted == "report.json":
-        return Download(f"{stem}_hulls.json", to_json(decomposition.report).encode())
+        return (f"{stem}_hulls.json", to_json(decomposition.report).encode())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if wanted == "balls.csv":
@@ -149,8 +127,8 @@ def download(decomposition: Result, wanted: str, *, up: str = "z", unit: str = "
             save(decomposition, folder / f"{stem}_hulls.{wanted}")
         files = sorted(path for path in folder.rglob("*") if path.is_file())
         if len(files) == 1 and not wanted.endswith(".zip"):
-            return Download(files[0].name, files[0].read_bytes())
-        return Download(f"{stem}_hulls_{wanted.removesuffix('.zip')}.zip", _zipped(folder, files))
+            return (files[0].name, files[0].read_bytes())
+        return (f"{stem}_hulls_{wanted.removesuffix('.zip')}.zip", _zipped(folder, files))
 
 
 def _zipped(folder: Path, files: list[Path]) -> bytes:

@@ -13,7 +13,6 @@ import gzip
 import hashlib
 import html
 import re
-from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
@@ -28,16 +27,8 @@ POLICY = (
 )
 
 
-@dataclass(frozen=True)
-class Page:
-    """An HTML text and its content security policy, which the text includes."""
-
-    text: str
-    policy: str
-
-
-def live_page(title: str, config: dict[str, Any]) -> Page:
-    """Build the viewer's page, which loads the scripts of `module` and its data from its server.
+def live_page(title: str, config: dict[str, Any]) -> tuple[str, str]:
+    """Build the viewer's page, which loads the scripts of `module` and its data from its server; and its policy.
 
     Parameters
     ----------
@@ -66,7 +57,7 @@ def still_page(title: str, config: dict[str, Any], scene: dict[str, Any]) -> str
         The result of `rlacd.view.scene.scene`, with ``heat`` and ``picture`` if available.
     """
     imports = {f"page/{name}": _data_address(_asset(f"{name}.js")) for name in MODULES}
-    return _page(title, {"live": False, **config}, scene, imports, modules="data:", connect="'none'").text
+    return _page(title, {"live": False, **config}, scene, imports, modules="data:", connect="'none'")[0]
 
 
 def _page(
@@ -77,7 +68,7 @@ def _page(
     *,
     modules: str,
     connect: str,
-) -> Page:
+) -> tuple[str, str]:
     # No time stamp in the gzip header, so that the same data gives the same bytes.
     packed = b"" if data is None else gzip.compress(to_json(data, indent=None).encode(), mtime=0)
     style = _asset("style.css")
@@ -98,7 +89,7 @@ def _page(
         "data": base64.b64encode(packed).decode("ascii"),
     }
     # All in one pass, so that no inserted value is searched for placeholders.
-    return Page(re.sub(r"\{\{(\w+)\}\}", lambda match: values[match[1]], _asset("page.html")), policy)
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: values[match[1]], _asset("page.html")), policy
 
 
 def _hash(text: str) -> str:

@@ -20,9 +20,9 @@ from rlacd.options.fields import checked, integer, read
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.primitive import Balls
-from rlacd.view.apart import renderer
+from rlacd.view.apart import render_apart
 from rlacd.view.coloring import color_hulls
-from rlacd.view.render import Body, Render, Spheres, render, require_extra
+from rlacd.view.render import Body, Spheres, require_extra
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
@@ -96,9 +96,7 @@ def draw_picture(
         The name does not end in ``.png``, or `width`, `samples` or `up` is out of range.
     """
     place = check_picture(path, up=up)
-    # In a process of its own, since other libraries disturb Mitsuba: CoACD hides its plugins.
-    with renderer() as render_apart:
-        write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up, render=render_apart))
+    write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))
     return place
 
 
@@ -109,7 +107,6 @@ def picture_bytes(
     samples: int = 16,
     up: str | None = None,
     clear: bool = False,
-    render: Render = render,
 ) -> bytes:
     """Draw the picture as the bytes of a PNG file; see `draw_picture`.
 
@@ -119,6 +116,7 @@ def picture_bytes(
     samples = read(integer(1, 10_000), "samples", samples)
 
     image = require_extra("PIL.Image")
+    require_extra("mitsuba")  # before a process is started that needs it
     up = decomposition.up_axis(up)
     panels: list[tuple[str, list[Body], Spheres | None]] = [
         ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)], None),
@@ -136,15 +134,12 @@ def picture_bytes(
     unit = width / 1600
     header, footer = 0 if clear else round(104 * unit), round(44 * unit)
     size = width, header + rows * (panel_height + footer)
-    sheet = image.new("RGBA", size, (*PAPER, 0)) if clear else image.new("RGB", size, PAPER)
-    for number, (title, bodies, veil) in enumerate(panels):
+    sheet = image.new("RGBA", size, (*PAPER, 0 if clear else 255))
+    drawn = render_apart([(bodies, veil) for _, bodies, veil in panels], panel_width, panel_height, samples)
+    for number, ((title, _, _), pixels) in enumerate(zip(panels, drawn, strict=True)):
         left = number % columns * panel_width
         top = header + number // columns * (panel_height + footer)
-        pixels = render(bodies, panel_width, panel_height, samples=samples, clear=clear)
-        if veil is not None:  # the spheres are half transparent
-            veiled = render(bodies, panel_width, panel_height, samples=samples, spheres=veil, clear=clear)
-            pixels = ((pixels.astype(np.uint16) + veiled + 1) // 2).astype(np.uint8)
-        sheet.paste(image.fromarray(pixels), (left, top))
+        sheet.alpha_composite(image.fromarray(pixels), (left, top))
         middle = (left + panel_width // 2, top + panel_height + footer // 2)
         _write(sheet, title, middle, round(20 * unit), FADED, anchor="mm")
     if not clear:
@@ -153,7 +148,7 @@ def picture_bytes(
         _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
 
     encoded = io.BytesIO()
-    sheet.save(encoded, format="PNG")
+    (sheet if clear else sheet.convert("RGB")).save(encoded, format="PNG")
     return encoded.getvalue()
 
 
@@ -189,7 +184,7 @@ def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:
     """The hulls, each further from the centre by the share `pull`."""
     corners = np.concatenate([hull.bounds for hull in decomposition])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    colors = linear_from_srgb(color_hulls(decomposition.hulls).rgb)
+    colors = linear_from_srgb(color_hulls(decomposition.hulls)[0])
     return [
         _body(hull.triangles + pull * (hull.bounds.mean(axis=0) - middle), color, up)
         for hull, color in zip(decomposition, colors, strict=True)

@@ -1,4 +1,4 @@
-"""Path-traced pictures of meshes on a white background, on any CPU.
+"""Path-traced pictures of meshes on a transparent background, on any CPU.
 
 Mitsuba 3 renders without a display, GPU or OpenGL library, so it also works in a bare container, where VTK's wheels
 find no OpenGL and abort the process.
@@ -6,11 +6,10 @@ find no OpenGL and abort the process.
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,10 +38,6 @@ class Spheres:
     color: npt.NDArray[np.float64]
 
 
-Render: TypeAlias = Callable[..., npt.NDArray[np.uint8]]
-"""`render`, here or in another process."""
-
-
 def require_extra(module: str) -> Any:
     """Import a module of the extra ``view``, or raise an error that says how to get it."""
     try:
@@ -61,9 +56,8 @@ def render(
     *,
     samples: int,
     spheres: Spheres | None = None,
-    clear: bool = False,
 ) -> npt.NDArray[np.uint8]:
-    """Render `bodies`, framed to fit, as sRGB bytes [height, width, 3 or 4]; deterministic.
+    """Render `bodies`, framed to fit, as sRGB bytes and coverage [height, width, 4]; deterministic.
 
     Parameters
     ----------
@@ -75,8 +69,6 @@ def render(
         Light paths per pixel: more are slower and less grainy.
     spheres : Spheres, optional
         Drawn too, but ignored by the camera's framing.
-    clear : bool
-        Make the background transparent: the fourth channel holds the coverage.
 
     Raises
     ------
@@ -84,33 +76,31 @@ def render(
         Mitsuba is not installed.
     """
     mi = require_extra("mitsuba")
+    mi.set_variant("scalar_rgb")  # needs no compiler at run time
     points = np.concatenate([body.triangles.reshape(-1, 3) for body in bodies])
     low, high = points.min(axis=0), points.max(axis=0)
     view = _view(points - (low + high) / 2.0, width / height)
     # The scene is centred and scaled, since the renderer computes in float32.
     size = float(np.linalg.norm(high - low)) or 1.0
-    with _scalar_variant(mi):
-        scene: dict[str, Any] = {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 3, "hide_emitters": True},
-            "sensor": _sensor(mi, view / size, width, height),
-            "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.42}},
-            "key": _lamp(mi),
-        }
-        for index, body in enumerate(bodies):
-            placed = (body.triangles - (low + high) / 2.0) / size
-            scene[f"body_{index}"] = _mesh(mi, placed, body.color)
-        if spheres is not None:
-            surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": spheres.color.tolist()}}
-            centres = ((spheres.centres - (low + high) / 2.0) / size).tolist()
-            for index, (centre, radius) in enumerate(zip(centres, (spheres.radii / size).tolist(), strict=True)):
-                scene[f"sphere_{index}"] = {"type": "sphere", "center": centre, "radius": radius, "surface": surface}
-        light = np.array(mi.render(mi.load_dict(scene), spp=samples))
-    if clear:
-        covered = np.clip(light[..., 3:], 0.0, 1.0)
-        colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
-        return np.concatenate([colors, np.rint(255.0 * covered).astype(np.uint8)], axis=2)
-    return srgb_from_linear(np.clip(light[..., :3] + (1.0 - light[..., 3:]), 0.0, 1.0))
+    scene: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 3, "hide_emitters": True},
+        "sensor": _sensor(mi, view / size, width, height),
+        "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.42}},
+        "key": _lamp(mi),
+    }
+    for index, body in enumerate(bodies):
+        placed = (body.triangles - (low + high) / 2.0) / size
+        scene[f"body_{index}"] = _mesh(mi, placed, body.color)
+    if spheres is not None:
+        surface = {"type": "diffuse", "reflectance": {"type": "rgb", "value": spheres.color.tolist()}}
+        centres = ((spheres.centres.reshape(-1, 3) - (low + high) / 2.0) / size).tolist()
+        for index, (centre, radius) in enumerate(zip(centres, (spheres.radii / size).tolist(), strict=True)):
+            scene[f"sphere_{index}"] = {"type": "sphere", "center": centre, "radius": radius, "surface": surface}
+    light = np.array(mi.render(mi.load_dict(scene), spp=samples))
+    covered = np.clip(light[..., 3:], 0.0, 1.0)
+    colors = srgb_from_linear(np.clip(light[..., :3] / np.maximum(covered, 1e-6), 0.0, 1.0))
+    return np.concatenate([colors, np.rint(255.0 * covered).astype(np.uint8)], axis=2)
 
 
 def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.float64]:
@@ -168,15 +158,3 @@ def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.flo
     arrays["faces"] = np.arange(3 * len(triangles), dtype=np.uint32)
     arrays.update()
     return mesh
-
-
-@contextlib.contextmanager
-def _scalar_variant(mi: Any) -> Iterator[None]:
-    """Select Mitsuba's scalar variant, which needs no compiler at run time; the caller's choice is restored after."""
-    before = mi.variant()
-    mi.set_variant("scalar_rgb")
-    try:
-        yield
-    finally:
-        if before is not None:
-            mi.set_variant(before)

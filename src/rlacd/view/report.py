@@ -15,7 +15,6 @@ from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page
 from rlacd.view.picture import check_up, picture_bytes
-from rlacd.view.render import Render, render
 from rlacd.view.scene import heat_scene, scene
 
 
@@ -38,26 +37,23 @@ def report_page(
     *,
     up: str | None = None,
     picture: bool = True,
-    unit: str | None = None,
-    render: Render = render,
 ) -> str:
-    """Build the text of the report; see `save_report_page`. The unit is the input's, unless it is given."""
+    """Build the text of the report; see `save_report_page`."""
     up = decomposition.up_axis(up)
-    if unit is None:
-        unit = "" if decomposition.input is None else decomposition.input.unit
+    unit = "" if decomposition.input is None else decomposition.input.unit
     # The heat map gets that many triangles, up to a few times as many: about half a megabyte.
     data: dict[str, Any] = {
         **scene(decomposition, up, unit=unit),
         "heat": heat_scene(heat_map(decomposition, triangles=16_000)),
-        **(_picture(decomposition, up, render) if picture else {}),
+        **(_picture(decomposition, up) if picture else {}),
     }
     return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)
 
 
-def _picture(decomposition: Result, up: str, render: Render) -> dict[str, str]:
+def _picture(decomposition: Result, up: str) -> dict[str, str]:
     """The picture as a data URL, or a note that explains its absence."""
     try:
-        png = picture_bytes(decomposition, width=1500, up=up, clear=True, render=render)
+        png = picture_bytes(decomposition, width=1500, up=up, clear=True)
     except MissingExtraError as error:
         return {"note": f"The picture is left out: {error}"}
     return {"picture": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}

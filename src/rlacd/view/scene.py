@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from rlacd.fit import Fit
 from rlacd.result import Result
-from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
 from rlacd.view.coloring import color_hulls
@@ -44,7 +43,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
     errors = _errors(report, len(decomposition))
-    colors = color_hulls(decomposition.hulls)
+    rgb, ranks = color_hulls(decomposition.hulls)
     balls = None
     if decomposition.balls is not None and len(decomposition.balls):
         some = apart(decomposition.balls)
@@ -56,7 +55,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
             "of": len(decomposition.balls),
         }
     return {
-        **_scene(decomposition.name, up, unit, frame, source.vertices, source.faces),
+        **input_scene(decomposition.name, source.vertices, source.faces, up, unit=unit, frame=frame),
         "report": report,
         "parts": [
             {
@@ -67,20 +66,18 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
                 "volume": float(hull.volume) * frame.scale**3,
                 "primitive": hull.metadata.get(PRIMITIVE, {}).get("kind"),
             }
-            for hull, color, rank, error in zip(decomposition, colors.rgb, colors.rank, errors, strict=True)
+            for hull, color, rank, error in zip(decomposition, rgb, ranks, errors, strict=True)
         ],
         "balls": balls,
     }
 
 
-def input_scene(name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "") -> dict[str, Any]:
+def input_scene(
+    name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "", frame: Frame | None = None
+) -> dict[str, Any]:
     """Describe an input without hulls yet: as `scene`, without parts or report."""
     points, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
-    frame = Frame.of(points[np.unique(corners)] if len(corners) else points)
-    return _scene(name, up, unit, frame, points, corners)
-
-
-def _scene(name: str, up: str, unit: str, frame: Frame, points: FloatArray, corners: IntArray) -> dict[str, Any]:
+    frame = frame or Frame.of(points[np.unique(corners)] if len(corners) else points)
     return {
         "name": name,
         "up": up,

@@ -3,7 +3,6 @@
 ====================================  ===========================================================================
 ``GET /``, ``GET /page/NAME.js``      the page and its scripts
 ``GET /events``                       the state, with every change (server-sent events)
-``GET /state``                        the current state
 ``GET /scene``, ``GET /heat``         the data to draw; see `rlacd.view.scene`
 ``GET /download?format=NAME``         a file
 ``POST /open?name=NAME``              open another mesh: the bytes of its file
@@ -34,20 +33,20 @@ from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.errors import OptionError, RlacdError
+from rlacd.errors import OptionError, RlacdError, sentence_of
 from rlacd.io.read.load import FORMATS as READ
 from rlacd.io.write import MODELS
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
 from rlacd.view.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
-from rlacd.view.controls import Subject, ViewerControls, as_command, read_controls, read_subject
+from rlacd.view.controls import Subject, as_command, draft_of, options_of, read_controls, read_subject
 from rlacd.view.downloads import download, offered
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
 from rlacd.view.picture import check_up
 from rlacd.view.scene import heat_scene, input_scene, scene
-from rlacd.view.session import Session, SessionState
+from rlacd.view.session import Session
 
 ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765
@@ -68,17 +67,9 @@ HARDENING = {
 
 
 class ViewServer(BoundedServer):
-    """Serves one session.
+    """Serves one session: a subject, with the first values of the page's controls.
 
-    Parameters
-    ----------
-    session : Session
-    subject : Subject
-        The input shown first.
-    port : int, optional
-        Port to listen on; by default the usual port, or any free one.
-    options : ViewerControls
-        Initial values of the page's controls.
+    It listens on `port`; by default on the usual one, or any that is free.
 
     Raises
     ------
@@ -92,7 +83,7 @@ class ViewServer(BoundedServer):
         subject: Subject,
         *,
         port: int | None,
-        options: ViewerControls,
+        options: dict[str, Any],
     ) -> None:
         self.session, self.subject = session, subject
         self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
@@ -101,19 +92,20 @@ class ViewServer(BoundedServer):
         self._making = threading.Lock()
         self._opening = threading.Lock()
         self._folder: tempfile.TemporaryDirectory[str] | None = None
-        page = live_page(
+        page, policy = live_page(
             subject.name,
             {
-                "options": asdict(options),
+                "options": options,
                 "downloads": [asdict(offer) for offer in offered()],
                 "presets": [{"name": name, **preset_words(name)} for name in PRESETS],
                 "formats": list(READ),
                 "version": __version__,
             },
         )
-        self.page, self.policy = page.text.encode(), f"{page.policy}; frame-ancestors 'none'"
+        self.page, self.policy = page.encode(), f"{policy}; frame-ancestors 'none'"
         self._bind(port)
         self._thread = threading.Thread(target=self.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
+        self._thread.start()
 
     @property
     def address(self) -> str:
@@ -130,25 +122,21 @@ class ViewServer(BoundedServer):
         """Whether work is still running, even after the viewer is closed: a kernel cannot be interrupted."""
         return not self.session.ended or self.connections > 0
 
-    def begin(self) -> None:
-        """Serve, on a thread of its own."""
-        self._thread.start()
-
     def wait(self) -> None:
         """Serve until Ctrl-C."""
         with contextlib.suppress(KeyboardInterrupt):
             while self._thread.is_alive():  # a wait without timeout would not notice Ctrl-C on Windows
                 self._thread.join(0.5)
 
-    def decompose(self, controls: ViewerControls, *, other_input: bool = False) -> None:
+    def decompose(self, controls: dict[str, Any], *, other_input: bool = False) -> None:
         """Decompose the subject next: first a draft, then with the requested options."""
         mesh = {"mesh": self.subject.path}
-        draft = controls.draft()
+        draft = draft_of(controls)
         self.session.decompose(
-            {**mesh, **controls.options()}, None if draft is None else {**mesh, **draft}, other_input=other_input
+            {**mesh, **options_of(controls)}, None if draft is None else {**mesh, **draft}, other_input=other_input
         )
 
-    def open_mesh(self, name: str, content: bytes, controls: ViewerControls) -> None:
+    def open_mesh(self, name: str, content: bytes, controls: dict[str, Any]) -> None:
         """Replace the subject by an uploaded file.
 
         Raises
@@ -184,13 +172,10 @@ class ViewServer(BoundedServer):
             mesh = subject.mesh
             bare = input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, unit=subject.unit)
             return to_json(bare | guess, indent=None).encode()
-        return self._once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit) | guess)
+        return self.once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit) | guess)
 
-    def heat(self, version: int, decomposition: Result) -> bytes:
-        """Return the error heat map as JSON; computed once per decomposition."""
-        return self._once("heat", version, lambda: heat_scene(heat_map(decomposition)))
-
-    def _once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
+    def once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
+        """Return values as JSON; computed once per version."""
         with self._making:
             made = self._made.get(what)
             if made is None or made[0] != version:
@@ -225,15 +210,14 @@ class _Handler(BoundedHandler):
                 self._send(self.server.page, "text/html", {"Content-Security-Policy": self.server.policy})
             elif place.path == "/events":
                 self._send_events()
-            elif place.path == "/state":
-                self._send_json(asdict(self.server.session.state))
             elif place.path == "/scene":
                 with self.server.heavy:
                     content = self.server.scene()
                 self._send(content, "application/json")
             elif place.path == "/heat":
                 with self.server.heavy:
-                    content = self.server.heat(*self._result())
+                    version, hulls = self._result()
+                    content = self.server.once("heat", version, lambda: heat_scene(heat_map(hulls)))
                 self._send(content, "application/json")
             elif place.path == "/download":
                 self._send_file(query.get("format", [""])[0], query.get("up", [self.server.subject.up])[0])
@@ -264,7 +248,6 @@ class _Handler(BoundedHandler):
         if self.headers.get_content_type() != "application/octet-stream":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
         controls = read_controls(_object(query.get("options", ["{}"])[0]))
-        controls.options()
         if not self.server.uploads.acquire(blocking=False):
             raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
         try:
@@ -276,10 +259,9 @@ class _Handler(BoundedHandler):
 
     def _command(self, given: dict[str, Any]) -> str:
         controls = read_controls(given)
-        controls.options()
         # An uploaded mesh has no place but the copy kept here, which goes with the viewer.
         path = self.server.subject.path
-        return as_command(path if self.server.folder is None else path.name, asdict(controls), ViewerControls())
+        return as_command(path if self.server.folder is None else path.name, controls)
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
@@ -292,11 +274,10 @@ class _Handler(BoundedHandler):
         except _Refused as error:
             self.close_connection = True  # the rest of the request stays unread
             self._send_json({"error": str(error)}, error.status)
-        except RlacdError as error:
-            self._send_json({"error": str(error)}, HTTPStatus.BAD_REQUEST)
         except Exception as error:
-            sentence = f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
-            self._send_json({"error": sentence}, HTTPStatus.INTERNAL_SERVER_ERROR)
+            known = isinstance(error, RlacdError)
+            status = HTTPStatus.BAD_REQUEST if known else HTTPStatus.INTERNAL_SERVER_ERROR
+            self._send_json({"error": sentence_of(error)}, status)
 
     def _check_sender(self) -> None:
         """Refuse requests for another host, and those from pages of other origins."""
@@ -335,27 +316,24 @@ class _Handler(BoundedHandler):
         return result
 
     def _send_events(self) -> None:
-        if not self.server.streams.acquire(blocking=False):
-            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
-        try:
-            self.close_connection = True
-            self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
-            # After 3 s of silence a sign of life, which shows whether the client still reads.
-            for state in _throttled(self.server.session.changes(3.0)):
-                event = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
-                self.wfile.write(f"{event}\n\n".encode())
-                self.wfile.flush()
-        finally:
-            self.server.streams.release()
+        self.close_connection = True
+        self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
+        # After 3 s of silence a sign of life, which shows whether the client still reads.
+        for state in self.server.session.changes(3.0):
+            event = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
+            self.wfile.write(f"{event}\n\n".encode())
+            self.wfile.flush()
+            if state is not None and state.state == "working":
+                time.sleep(0.05)  # the eye follows no faster; changes in the meantime are combined
 
     def _send_file(self, wanted: str, up: str) -> None:
         check_up(up)
         with self.server.downloads:
-            file = download(self._result()[1], wanted, up=up, unit=self.server.subject.unit)
-        plain = file.name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
-        exact = urllib.parse.quote(file.name.encode(errors="replace"))
+            name, content = download(self._result()[1], wanted, up=up)
+        plain = name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
+        exact = urllib.parse.quote(name.encode(errors="replace"))
         named = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{exact}"
-        self._send(file.content, "application/octet-stream", {"Content-Disposition": named})
+        self._send(content, "application/octet-stream", {"Content-Disposition": named})
 
     def _send_json(self, value: Any, status: HTTPStatus = HTTPStatus.OK) -> None:
         self._send(to_json(value, indent=None).encode(), "application/json", status=status)
@@ -415,17 +393,6 @@ def preset_words(name: str) -> dict[str, Any]:
     preset = PRESETS[name]
     ending = preset.ending.lstrip(".")
     model = next((model for model, endings in MODELS.items() if ending in endings), ending)
-    limits = [
-        f"{limit} {what}"
-        for limit, what in ((preset.max_vertices, "vertices"), (preset.max_faces, "triangles"))
-        if limit
-    ]
+    stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
+    limits = [f"{limit} {what}" for what, limit in stated.items() if limit]
     return {"engine": preset.engine, "format": preset.file_format or model, "limits": " and ".join(limits)}
-
-
-def _throttled(changes: Iterator[SessionState | None]) -> Iterator[SessionState | None]:
-    """Limit the rate of progress to what the eye can follow; the last state of every kind is always sent."""
-    for state in changes:
-        yield state
-        if state is not None and state.state == "working":
-            time.sleep(0.05)  # changes in the meantime are combined

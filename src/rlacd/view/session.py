@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rlacd.errors import RlacdError
+from rlacd.errors import sentence_of
 from rlacd.result import Result
 from rlacd.run import Progress
 
@@ -69,12 +69,6 @@ class Session:
         self._result: Result | None = None
         self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Session:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     @property
     def state(self) -> SessionState:
@@ -177,12 +171,8 @@ class Session:
     def _attempt(self, options: dict[str, Any]) -> tuple[Result | None, str | None]:
         try:
             return self._run(progress=self._follow, **options), None
-        except RlacdError as error:
-            return None, str(error)
-        except MemoryError:
-            return None, "there is not enough memory for this mesh; simplify it or use a larger machine."
         except Exception as error:  # the viewer stays up and shows the error
-            return None, f"a bug in rlacd ({type(error).__name__}: {error}); please report it."
+            return None, sentence_of(error)
 
     def _follow(self, progress: Progress) -> bool:
         with self._changed:

@@ -40,7 +40,7 @@ def open_viewer(
     decompose : callable
         `rlacd.decompose`.
     options : dict, optional
-        Initial values of the page's controls: fields of `ViewerControls`.
+        Initial values of the page's controls, by their names.
     up : {"x", "y", "z"}, optional
         The axis of the mesh that points up; by default what the file or its format says, else a guess.
     port : int, optional
@@ -62,7 +62,6 @@ def open_viewer(
     """
     check_up(up)
     controls = read_controls(options or {})
-    controls.options()
     Options(threads=threads)
     subject = read_subject(mesh, up)
     session = Session(lambda **given: decompose(**given, threads=threads))
@@ -71,7 +70,6 @@ def open_viewer(
     except BaseException:
         session.close()
         raise
-    server.begin()
     server.decompose(controls)
     try:
         yield server

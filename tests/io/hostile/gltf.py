@@ -52,13 +52,13 @@ def accessors(*changes: dict[str, Any]) -> list[dict[str, Any]]:
     return [{**accessor, **change} for accessor, change in zip(gltf_tree()["accessors"], changes, strict=True)]
 
 
-@refused("a billion vertices without data.gltf", "asks for")
+@refused("a billion vertices without data.gltf", "decodes to more")
 def _() -> bytes:
     nothing = [{"componentType": 5126, "count": 10**9, "type": "VEC3"}]
     return gltf(accessors=nothing, meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}])
 
 
-@refused("a billion vertices in 96 bytes.gltf", "declares")
+@refused("a billion vertices in 96 bytes.gltf", "decodes to more")
 def _() -> bytes:
     return gltf(accessors=accessors({"count": 10**9}, {}))
 
@@ -73,7 +73,7 @@ def _() -> bytes:
     return gltf(accessors=accessors({"count": 1e300}, {}))
 
 
-@refused("rows on top of each other.gltf", "declares|stride")
+@refused("rows on top of each other.gltf", "decodes to more")
 def _() -> bytes:
     tree = gltf_tree(accessors=accessors({"count": 10**9}, {}))
     tree["bufferViews"][0]["byteStride"] = 1
@@ -98,24 +98,7 @@ def many(count: int, what: dict[str, Any]) -> list[dict[str, Any]]:
     return [what] * count
 
 
-@refused("a hundred thousand views of one megabyte.glb", "asks for")
-def _() -> bytes:
-    tree = gltf_tree(
-        bufferViews=many(99_000, {"buffer": 0, "byteOffset": 4, "byteLength": 10**6 - 4}),
-        buffers=[{"byteLength": 10**6}],
-    )
-    return glb(tree, b"\0" * 10**6)
-
-
-@refused("ten thousand accessors of one megabyte.glb", "asks for")
-def _() -> bytes:
-    tree = gltf_tree(bufferViews=[{"buffer": 0, "byteLength": 12 * 10**5}], buffers=[{"byteLength": 12 * 10**5}])
-    few = {"bufferView": 0, "byteOffset": 12, "componentType": 5126, "count": 99_999, "type": "VEC3"}
-    tree["accessors"] = many(10_000, few)
-    return glb(tree, b"\0" * 12 * 10**5)
-
-
-@refused("ten thousand primitives of one megabyte.glb", "asks for")
+@refused("ten thousand primitives of one megabyte.glb", "decodes to more")
 def _() -> bytes:
     tree = gltf_tree(bufferViews=[{"buffer": 0, "byteLength": 12 * 10**5}], buffers=[{"byteLength": 12 * 10**5}])
     tree["accessors"] = [{"bufferView": 0, "componentType": 5126, "count": 99_999, "type": "VEC3"}]

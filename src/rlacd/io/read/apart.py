@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeAlias
 
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import MOST_PLACES, MOST_TRIANGLES, Contents, Triangles
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.memory import memory_left
-from rlacd.pool import Answer, Blobs, ProcessLimits, Request, Values, WorkerDiedError
+from rlacd.pool import Answer, Blobs, MakeServer, ProcessLimits, Request, Server, Values, WorkerDiedError
 from rlacd.pool.local import Worker
 from rlacd.solid.arrays import FloatArray
 
@@ -19,12 +21,25 @@ LIMITS = ProcessLimits(seconds=600.0, memory=8 * 2**30)
 """Of one file."""
 
 EXTRAS = {
-    "rlacd.io.read.cad:CadReader": ("cascadio", "cad"),
-    "rlacd.io.read.draco:DracoDecoder": ("DracoPy", "draco"),
-    "rlacd.io.read.fbx:FbxReader": ("ufbx", "fbx"),
-    "rlacd.io.read.usd_stage:StageReader": ("pxr", "usd"),
+    "rlacd.io.read.cad:triangulate": ("cascadio", "cad"),
+    "rlacd.io.read.draco:decode": ("DracoPy", "draco"),
+    "rlacd.io.read.fbx:read_scene": ("ufbx", "fbx"),
+    "rlacd.io.read.usd_stage:read_stage": ("pxr", "usd"),
 }
 """The servers: the package that each needs, and the extra that installs it."""
+
+
+Answered: TypeAlias = "tuple[Values, dict[str, bytes]]"
+
+
+def served(answer: Callable[[Values, Blobs], Answered]) -> MakeServer:
+    """Make a server of a function; what its libraries write, such as reports of crashes, goes with its process."""
+
+    def make(folder: Path) -> Server:
+        os.environ["TMPDIR"] = str(folder)
+        return lambda values, blobs, shared: answer(values, blobs)
+
+    return make
 
 
 def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) -> Answer:
@@ -71,13 +86,10 @@ class ToldNodes:
     def __init__(self, path: Path) -> None:
         self.values: list[Values] = []
         self.blobs: dict[str, bytes] = {}
-        self._path, self._names, self._count = path, set[str](), 0
+        self._path, self._names = path, set[str]()
 
     def add(self, names: Sequence[str], to_world: FloatArray, look: Values | None, shape: Triangles) -> None:
         """Add a node by the first of its names that no other has; raises MeshFileError if there are too many."""
-        self._count += len(shape.faces)
-        if self._count > MOST_TRIANGLES:
-            raise MeshFileError(f"{self._path} places more than {MOST_TRIANGLES} triangles: simplify it first")
         if len(self.values) >= MOST_PLACES:
             raise MeshFileError(f"{self._path} places more than {MOST_PLACES} meshes: join them first")
         index = len(self.values)

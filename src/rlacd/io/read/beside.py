@@ -5,15 +5,11 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
-from trimesh.resolvers import Resolver
-
-from rlacd.errors import MeshFileError
-from rlacd.io.read.open_file import LARGEST_FILE, read_file
+from rlacd.io.read.open_file import LARGEST_FILE, read_file, read_named
 
 DATA = frozenset({".bin"})
 """To read triangles: no colours, and no images, whose decoders are the riskier part of any loader."""
@@ -25,7 +21,7 @@ PICTURES = frozenset({".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", "
 """Materials, and pictures that are decoded: read only for files that keep them."""
 
 
-class FolderFiles(Resolver):  # type: ignore[misc]
+class FolderFiles:
     """Serves files of one folder only.
 
     A name that leads out of the folder, by ``..``, an absolute path or a link, counts as missing; so does a file whose
@@ -59,18 +55,6 @@ class FolderFiles(Resolver):  # type: ignore[misc]
             return self._read[path]
         raise FileNotFoundError(f"{name!r:.200} is not a data file beside the mesh")
 
-    def write(self, name: str, data: Any) -> None:
-        """Refuse: loading writes nothing."""
-        raise PermissionError(name)
-
-    def namespaced(self, namespace: str) -> FolderFiles:
-        """Stay in the same folder."""
-        raise FileNotFoundError(namespace)
-
-    def keys(self) -> Iterator[str]:
-        """List nothing: files are asked for by name."""
-        return iter(())
-
 
 def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:
     """Read all files that make up a mesh, by name relative to its folder; the mesh file itself comes first.
@@ -87,11 +71,7 @@ def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:
     MeshFileError
         The mesh file cannot be opened.
     """
-    try:
-        content = read_file(path)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise MeshFileError(f"{name or path} cannot be opened ({reason}): check its name and permissions") from error
+    content = read_named(path, name=name)
     return {path.name: content, **_beside(path, content)}
 
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.apart import answer_of
+from rlacd.io.read.apart import Answered, answer_of, served
 from rlacd.io.read.contents import Contents
 from rlacd.io.read.gltf import JSON_CHUNK, MAGIC, read_gltf, split
-from rlacd.pool import Blobs, Shared, Values
+from rlacd.pool import Blobs, Values
 
-SERVER = "rlacd.io.read.cad:CadReader"
+SERVER = "rlacd.io.read.cad:triangulate"
 
 DEVIATION = 1e-3
 """How far triangles may be from the surface, as a share of the longest side: a fifth of a threshold of 0.01."""
@@ -51,30 +50,25 @@ def read_cad(path: Path, content: bytes) -> Contents:
     return contents._replace(warnings=(*contents.warnings, *([said] if empty else [])), up="z")
 
 
-class CadReader:
-    """The server of a process that makes triangles of surfaces (see `rlacd.pool.Server`)."""
+@served
+def triangulate(values: Values, blobs: Blobs) -> Answered:
+    """Convert a ``file`` of a ``kind`` to a ``glb`` in metres: twice, the first time to see how large it is."""
+    import cascadio
 
-    def __init__(self, folder: Path) -> None:
-        pass
+    def converted(**tolerance: float | bool) -> bytes:
+        how = {"file_type": values["kind"], "tol_angular": ANGLE, "use_parallel": False, **tolerance}
+        if glb := cascadio.load(blobs["file"], **how):
+            return bytes(glb)
+        raise MeshFileError(
+            f"{values['path']} cannot be read as {values['kind'].upper()}: it is damaged or cut off, or holds no "
+            "surfaces; export it again"
+        )
 
-    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """Convert a ``file`` of a ``kind`` to a ``glb`` in metres: twice, the first time to see how large it is."""
-        import cascadio
-
-        def converted(**tolerance: float | bool) -> bytes:
-            how = {"file_type": values["kind"], "tol_angular": ANGLE, "use_parallel": False, **tolerance}
-            if glb := cascadio.load(blobs["file"], **how):
-                return bytes(glb)
-            raise MeshFileError(
-                f"{values['path']} cannot be read as {values['kind'].upper()}: it is damaged or cut off, or holds no "
-                "surfaces; export it again"
-            )
-
-        glb = converted(tol_linear=ROUGH, tol_relative=True)
-        if size := _size(read_gltf(Path(values["path"]), glb)):
-            unit = 1.0 if values["kind"] == "iges" else MILLIMETRE  # STEP is written in metres, and IGES as it is
-            glb = converted(tol_linear=DEVIATION * size / unit)
-        return {}, {"glb": _scaled(glb, MILLIMETRE) if values["kind"] == "iges" else glb}
+    glb = converted(tol_linear=ROUGH, tol_relative=True)
+    if size := _size(read_gltf(Path(values["path"]), glb)):
+        unit = 1.0 if values["kind"] == "iges" else MILLIMETRE  # STEP is written in metres, and IGES as it is
+        glb = converted(tol_linear=DEVIATION * size / unit)
+    return {}, {"glb": _scaled(glb, MILLIMETRE) if values["kind"] == "iges" else glb}
 
 
 def _size(contents: Contents) -> float:

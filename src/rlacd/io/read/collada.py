@@ -18,12 +18,14 @@ from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
 from rlacd.io.read.conventions import COLLADA_HEAD, collada
 from rlacd.io.read.looks import opened_picture, painted
-from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles, triangles_within
+from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles
 from rlacd.io.read.text import rows_of, whole
-from rlacd.io.read.xml import open_archive, parse_xml, unpack
+from rlacd.io.read.xml import open_archive, parse_xml
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
+
+_REFUSED = {"ph": "polygons with holes, which are not read: triangulate them", "skew": "skewed parts: apply transforms"}
 
 _UNREAD = {
     "lines": "lines of {} were left out",
@@ -60,13 +62,14 @@ class _Document:
             element.get("id"): element for element in self.root.iter("{*}*") if element.get("id")
         }
         tags = {etree.QName(element).localname for element in self.root.iter("{*}*")}
+        for tag in _REFUSED.keys() & tags:
+            raise MeshFileError(f"{path} has {_REFUSED[tag]}, and export it again")
         self.warnings = list(dict.fromkeys(said.format(path.name) for tag, said in _UNREAD.items() if tag in tags))
         self.placed: dict[str, _Placed] = {}
         self._keys: Counter[str | None] = Counter()
         self._geometries: dict[str, list[_Primitive]] = {}
         self._sources: dict[str, FloatArray] = {}
         self._count = 0
-        self.damage: list[str] = []
         scene = self.at(self.root.find("{*}scene/{*}instance_visual_scene"))
         scene = self.root.find("{*}library_visual_scenes/{*}visual_scene") if scene is None else scene
         if scene is None:
@@ -120,8 +123,7 @@ class _Document:
 
     def _add(self, node: Any, instance: Any, geometry: Any, transform: FloatArray) -> None:
         if geometry is None:
-            self.damage.append(f"{instance.get('url')!r:.80}, which a node of {self._path.name} places, is missing")
-            return
+            raise LookupError(f"{instance.get('url')!r:.80}, which a node places, is missing")
         own = geometry.get("id", "")
         if own not in self._geometries:
             self._geometries[own] = self._read(geometry)
@@ -131,18 +133,10 @@ class _Document:
         self.placed[key] = _Placed(SourceNode(name, key, transform), self._geometries[own], meant)
 
     def _read(self, geometry: Any) -> list[_Primitive]:
-        found = []
-        for mesh in geometry.iterchildren("{*}mesh"):
-            for primitive in mesh.iterchildren(*(f"{{*}}{tag}" for tag in _RINGS)):
-                try:
-                    found.append(self._primitive(primitive))
-                except (ValueError, LookupError, TypeError, OverflowError) as error:
-                    name = geometry.get("name") or geometry.get("id")
-                    self.damage.append(
-                        f"faces of the geometry {name!r:.80} of {self._path.name} were left out, as they are damaged "
-                        f"({error!s:.100})"
-                    )
-        return found
+        primitives = (
+            mesh.iterchildren(*(f"{{*}}{tag}" for tag in _RINGS)) for mesh in geometry.iterchildren("{*}mesh")
+        )
+        return [self._primitive(primitive) for some in primitives for primitive in some]
 
     def _primitive(self, primitive: Any) -> _Primitive:
         arrays: dict[str, tuple[FloatArray, int]] = {}
@@ -229,16 +223,9 @@ def _corners(primitive: Any, points: FloatArray, offset: int, width: int) -> Int
     rings = [_integers(p.text, width) for p in primitive.iterchildren("{*}p")]
     rows = np.concatenate([np.empty((0, width), dtype=np.int64), *rings])
     counts = np.array([len(ring) for ring in rings], dtype=np.int64)
-    more = []
-    for holed in primitive.iterchildren("{*}ph"):
-        outline, *holes = (_integers(ring.text, width) for ring in holed.iterchildren("{*}p", "{*}h"))
-        own = np.concatenate([outline, *holes])
-        _check(own[:, offset], points)
-        places = triangles_within(points[outline[:, offset]], [points[hole[:, offset]] for hole in holes])
-        if places is None:
-            raise ValueError("a polygon with holes that cross it")
-        more.append(own[places])
-    _check(rows[:, offset], points)
+    corners = rows[:, offset]
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
     match tag:
         case "triangles":
             places = np.arange(len(rows)).reshape(-1, 3)
@@ -249,13 +236,8 @@ def _corners(primitive: Any, points: FloatArray, offset: int, width: int) -> Int
             counts = _integers(primitive.findtext("{*}vcount"), 1)[:, 0] if tag == "polylist" else counts
             if (counts < 0).any() or counts.sum() != len(rows):
                 raise ValueError(f"polygons of {counts.sum()} corners, but {len(rows)} are there")
-            places = places_of(points, counts, rows[:, offset])
-    return np.concatenate([rows[places], *more])
-
-
-def _check(corners: IntArray, points: FloatArray) -> None:
-    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
+            places = places_of(points, counts, corners)
+    return np.asarray(rows[places])
 
 
 def _numbers(text: str | None) -> FloatArray:
@@ -281,36 +263,12 @@ def _rotation(values: FloatArray) -> FloatArray:
     return np.asarray(trimesh.transformations.rotation_matrix(np.radians(angle), axis))
 
 
-def _skew(values: FloatArray) -> FloatArray:
-    """By RenderMan, to which COLLADA refers: turn one axis to the other, along which all points move."""
-    angle, (turned, along) = np.radians(values[0]), values[1:].reshape(2, 3)
-    turned, along = turned / np.linalg.norm(turned), along / np.linalg.norm(along)
-    between = np.arccos(np.clip(turned @ along, -1, 1))
-    if not between - np.pi < angle < between:
-        raise ValueError("a skew that is none")
-    across = (turned - turned @ along * along) / np.sin(between)
-    matrix = np.eye(4)
-    matrix[:3, :3] += (1 / np.tan(between - angle) - 1 / np.tan(between)) * np.outer(along, across)
-    return matrix
-
-
-def _lookat(values: FloatArray) -> FloatArray:
-    """A view from one point to another."""
-    eye, aim, up = values.reshape(3, 3)
-    back = (eye - aim) / np.linalg.norm(eye - aim)
-    right = np.cross(up, back) / np.linalg.norm(np.cross(up, back))
-    matrix = np.eye(4)
-    matrix[:3] = np.stack([right, np.cross(back, right), back, eye], axis=1)
-    return matrix
-
-
 _MOVES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "matrix": lambda values: values.reshape(4, 4),
     "translate": lambda values: np.asarray(trimesh.transformations.translation_matrix(values)),
     "rotate": _rotation,
     "scale": lambda values: np.diag([*values.reshape(3), 1.0]),
-    "skew": _skew,
-    "lookat": _lookat,
+    "lookat": lambda _: np.full((4, 4), np.nan),  # of cameras and lights; a mesh there is left out, with a warning
 }
 
 
@@ -335,10 +293,7 @@ def read_collada(path: Path, content: bytes) -> Contents:
             count += len(used)
         if count:
             geometry.append((one.node, Triangles(np.concatenate(vertices), np.concatenate(faces))))
-    if not geometry and document.damage:
-        raise ValueError(document.damage[0])
-    warnings = [*document.warnings, *document.damage]
-    return Contents(geometry, warnings, up, metres, Asset(content, path, "dae"))
+    return Contents(geometry, document.warnings, up, metres, Asset(content, path, "dae"))
 
 
 def _unpacked(path: Path, content: bytes) -> bytes:
@@ -348,7 +303,7 @@ def _unpacked(path: Path, content: bytes) -> bytes:
         names = [name for name in archive.namelist() if name.lower().endswith(".dae") and "MACOSX" not in name]
         if not names:
             raise MeshFileError(f"{path} holds no .dae file: export it again")
-        content = unpack(path, archive, names[0])
+        content = archive.read(names[0])
     if is_zipfile(io.BytesIO(content)):
         raise MeshFileError(f"{path} is an archive, not XML: rename it to .zae, or export it again")
     return content

@@ -5,20 +5,20 @@ Draco is decoded by DracoPy (extra ``draco``) in a process of its own: a damaged
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.apart import answer_of
+from rlacd.io.read.apart import Answered, answer_of, served
 from rlacd.io.read.contents import MOST_TRIANGLES
 from rlacd.io.read.gltf_arrays import ITEMS, Arrays, Json, as_floats
-from rlacd.pool import Blobs, Shared, Values
+from rlacd.pool import Blobs, Values
 
 DRACO = "KHR_draco_mesh_compression"
 
-DECODER = "rlacd.io.read.draco:DracoDecoder"
+DECODER = "rlacd.io.read.draco:decode"
 
 
 def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays: Arrays) -> bool:
@@ -77,35 +77,30 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
     return True
 
 
-class DracoDecoder:
-    """The server of a process that decodes Draco's streams (see `rlacd.pool.Server`)."""
+@served
+def decode(values: Values, blobs: Blobs) -> Answered:
+    """Decode each stream: an attribute as ``NAME.points``, and ``NAME.corners``.
 
-    def __init__(self, folder: Path) -> None:
-        pass
+    What is ``asked`` of a stream are the attribute, whether its integers are normalised, and its width.
+    """
+    import DracoPy
 
-    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """Decode each stream: an attribute as ``NAME.points``, and ``NAME.corners``.
-
-        What is ``asked`` of a stream are the attribute, whether its integers are normalised, and its width.
-        """
-        import DracoPy
-
-        arrays: dict[str, bytes] = {}
-        for name, stream in blobs.items():
-            attribute, normalized, width = values["asked"][name]
-            try:
-                mesh = DracoPy.decode(stream)
-                points = np.asarray(mesh.get_attribute_by_unique_id(attribute)["data"])
-                corners = np.asarray(mesh.faces).reshape(-1, 3)
-            except Exception as error:
-                raise MeshFileError(
-                    f"{values['path']} holds triangles that Draco cannot decode ({error!s:.100}): it is damaged; "
-                    "export it again"
-                ) from error
-            if points.shape != (len(points), width) or (len(corners) and corners.max() >= len(points)):
-                raise MeshFileError(f"{values['path']} holds triangles without points: export it again")
-            if len(corners) > MOST_TRIANGLES:
-                raise MeshFileError(f"{values['path']} holds more than {MOST_TRIANGLES} triangles: simplify it first")
-            arrays[f"{name}.points"] = as_floats(points, normalized).astype("<f4").tobytes()
-            arrays[f"{name}.corners"] = corners.astype("<u4").tobytes()
-        return {}, arrays
+    arrays: dict[str, bytes] = {}
+    for name, stream in blobs.items():
+        attribute, normalized, width = values["asked"][name]
+        try:
+            mesh = DracoPy.decode(stream)
+            points = np.asarray(mesh.get_attribute_by_unique_id(attribute)["data"])
+            corners = np.asarray(mesh.faces).reshape(-1, 3)
+        except Exception as error:
+            raise MeshFileError(
+                f"{values['path']} holds triangles that Draco cannot decode ({error!s:.100}): it is damaged; "
+                "export it again"
+            ) from error
+        if points.shape != (len(points), width) or (len(corners) and corners.max() >= len(points)):
+            raise MeshFileError(f"{values['path']} holds triangles without points: export it again")
+        if len(corners) > MOST_TRIANGLES:
+            raise MeshFileError(f"{values['path']} holds more than {MOST_TRIANGLES} triangles: simplify it first")
+        arrays[f"{name}.points"] = as_floats(points, normalized).astype("<f4").tobytes()
+        arrays[f"{name}.corners"] = corners.astype("<u4").tobytes()
+    return {}, arrays

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.apart import ToldNodes, read_apart
-from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
+from rlacd.io.read.apart import Answered, ToldNodes, read_apart, served
+from rlacd.io.read.contents import Contents, Triangles
 from rlacd.io.read.polygons import triangles_of
-from rlacd.pool import Blobs, Shared, Values
+from rlacd.pool import Blobs, Values
 
-SERVER = "rlacd.io.read.fbx:FbxReader"
+SERVER = "rlacd.io.read.fbx:read_scene"
 
 _UNREAD = {
     "skin_deformers": "skinned meshes of {} are read as bound, at their nodes",
@@ -44,23 +43,19 @@ def read_fbx(path: Path, content: bytes) -> Contents:
     return read_apart(SERVER, path, "FBX", {"file": content})
 
 
-class FbxReader:
-    """The server of a process that reads FBX files (see `rlacd.pool.Server`)."""
-
-    def __init__(self, folder: Path) -> None:
-        gc.disable()  # it would follow what `_KEPT` is for
-
-    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """Read a ``file``: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
-        path = Path(values["path"])
-        try:
-            return _scene(path, blobs["file"])
-        except MeshFileError:
-            raise
-        except Exception as error:  # of ufbx, or of a description that does not fit its arrays
-            raise MeshFileError(
-                f"{path} cannot be read as FBX: it is damaged or cut off ({error!s:.100}); export it again"
-            ) from error
+@served
+def read_scene(values: Values, blobs: Blobs) -> Answered:
+    """Read a ``file``: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
+    gc.disable()  # it would follow what `_KEPT` is for
+    path = Path(values["path"])
+    try:
+        return _scene(path, blobs["file"])
+    except MeshFileError:
+        raise
+    except Exception as error:  # of ufbx, or of a description that does not fit its arrays
+        raise MeshFileError(
+            f"{path} cannot be read as FBX: it is damaged or cut off ({error!s:.100}); export it again"
+        ) from error
 
 
 def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
@@ -81,7 +76,7 @@ def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
     _KEPT.append(scene)
     said = dict.fromkeys(text.format(path.name) for name, text in _UNREAD.items() if len(getattr(scene, name)))
     said |= dict.fromkeys(f"{path.name}: {one.description}" for one in scene.metadata.warnings)
-    nodes, left_out = _shown(path, scene)
+    nodes, left_out = _shown(scene)
     said |= {f"{what} of {path.name} were left out: {count}": None for what, count in left_out.items() if count}
     told = ToldNodes(path)
     for index, (node, mesh) in enumerate(nodes):
@@ -100,7 +95,7 @@ def _is_plain(axes: np.ndarray[Any, Any]) -> bool:
     return bool(axes[1] % 2 == 0 and np.linalg.det(rows) > 0)
 
 
-def _shown(path: Path, scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int]]:
+def _shown(scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int]]:
     """The nodes that place a mesh, with it; and how many were left out, by the reason."""
     import ufbx
 
@@ -108,8 +103,6 @@ def _shown(path: Path, scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int
     for node in scene.nodes:  # a parent comes before its children
         mesh, parent, number = node.mesh, node.parent, node.typed_id
         _KEPT.append((node, mesh, parent))
-        if len(_KEPT) > 3 * MOST_PLACES:
-            raise MeshFileError(f"{path} has more than {MOST_PLACES} nodes: join its meshes first")
         if parent is not None and parent.typed_id in gone:
             gone[number] = gone[parent.typed_id]
         elif not node.visible:

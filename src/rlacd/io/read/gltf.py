@@ -123,7 +123,8 @@ class _Scene:
         self._header, self._arrays = header, arrays
         self._nodes: list[Json] = header.get("nodes", [])
         self._meshes: list[Json] = header.get("meshes", [])
-        self._jointed = [all("JOINTS_0" in part["attributes"] for part in _surfaces(mesh)) for mesh in self._meshes]
+        surfaces = ([p for p in mesh["primitives"] if p.get("mode", TRIANGLES) in SURFACES] for mesh in self._meshes)
+        self._jointed = [all("JOINTS_0" in part["attributes"] for part in parts) for parts in surfaces]
         self._worlds = _worlds(self._nodes)
         self._shapes: dict[Any, Triangles] = {}
         self._unjointed: set[int] = set()
@@ -195,7 +196,7 @@ class _Scene:
             points = self._arrays.floats(part["attributes"]["POSITION"])
             for weight, target in zip(weights, part.get("targets", ()), strict=bool(weights) and "targets" in part):
                 if weight and "POSITION" in target:
-                    points = points + weight * self._arrays.more(target["POSITION"])
+                    points = points + weight * self._arrays.floats(target["POSITION"])
             corners = self._corners(part, len(points))
             if len(corners) and corners.max() >= len(points):
                 raise ValueError(f"a face uses vertex {corners.max()}, but there are {len(points)}")
@@ -227,7 +228,7 @@ class _Scene:
         bones = np.stack([item(self._worlds, joint) for joint in joints])
         if "inverseBindMatrices" not in skin:
             return bones
-        inverses = self._arrays.more(skin["inverseBindMatrices"], "MAT4").reshape(-1, 4, 4)
+        inverses = self._arrays.floats(skin["inverseBindMatrices"], "MAT4").reshape(-1, 4, 4)
         return np.asarray(bones @ inverses[: len(joints)].transpose(0, 2, 1))
 
     def _skinned(self, points: FloatArray, attributes: Json, bones: FloatArray) -> FloatArray:
@@ -235,7 +236,7 @@ class _Scene:
         sets = [name.removeprefix("JOINTS_") for name in sorted(attributes) if name.startswith("JOINTS_")]
         self._arrays.need(2 * bones[0].nbytes * len(points))
         joints = np.concatenate([self._arrays.integers(attributes[f"JOINTS_{one}"], "VEC4") for one in sets], axis=1)
-        weights = np.concatenate([self._arrays.more(attributes[f"WEIGHTS_{one}"], "VEC4") for one in sets], axis=1)
+        weights = np.concatenate([self._arrays.floats(attributes[f"WEIGHTS_{one}"], "VEC4") for one in sets], axis=1)
         whole = weights.sum(axis=1)
         weights[whole == 0, 0] = 1.0  # follow the first joint
         weights /= np.where(whole == 0, 1.0, whole)[:, None]
@@ -256,7 +257,7 @@ class _Scene:
             raise ValueError(f"{self._instances} instances, more than {MOST_PLACES}")
         self._arrays.need(count * (shape.vertices.nbytes + shape.faces.nbytes))
         given = [
-            self._arrays.more(attributes[name], kind) if name in attributes else np.array([at])
+            self._arrays.floats(attributes[name], kind) if name in attributes else np.array([at])
             for (name, kind), at in zip(kinds.items(), UNMOVED, strict=True)
         ]
         moves = _placements(*given)
@@ -270,10 +271,6 @@ class _Scene:
 
 UNMOVED = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
 """Translation, rotation and scale of a node that gives none."""
-
-
-def _surfaces(mesh: Json) -> list[Json]:
-    return [part for part in mesh["primitives"] if part.get("mode", TRIANGLES) in SURFACES]
 
 
 def _worlds(nodes: Sequence[Json]) -> FloatArray:

@@ -1,7 +1,7 @@
 """The arrays of a glTF file, checked against the bytes that it holds.
 
 Its JSON may use one array for any number of meshes, take any part of a buffer any number of times, and declare arrays
-without any bytes behind them. What all of that would take in memory is added up before anything is read.
+without any bytes behind them. What that takes in memory is added up, and refused before an array that is too much.
 """
 
 from __future__ import annotations
@@ -55,16 +55,7 @@ class Arrays:
         self._accessors: list[Json] = list(header.get("accessors", []))
         self._content: dict[int, bytes] = {}
         self._added: dict[int, npt.NDArray[Any]] = {}
-        given += self._bytes_beside()
-        asked = sum(natural(view.get("byteLength", 0), "byteLength") for view in self._views)
-        asked += sum(self._size(accessor) for accessor in self._accessors)
-        for mesh in header.get("meshes", []):
-            for primitive in mesh["primitives"]:
-                used = (primitive["attributes"].get("POSITION"), primitive.get("indices"))
-                asked += sum(self._as_loaded(index) for index in used if index is not None)
-        self._most = most_in_memory(given)
-        if asked > self._most:
-            raise ValueError(f"it asks for {asked} bytes, though it holds {given}")
+        self._most = most_in_memory(given + self._bytes_beside())
 
     def need(self, count: int) -> None:
         """Refuse a file once what is made of its arrays adds up to too many bytes."""
@@ -94,11 +85,6 @@ class Arrays:
         """An array of numbers, ``[N, K]``."""
         return as_floats(self._rows(index, kind), bool(self.accessor(index).get("normalized")))
 
-    def more(self, index: int, kind: str = "VEC3") -> FloatArray:
-        """An array beside positions and indices, which must be `need`-ed as it is read."""
-        self.need(self._as_loaded(index))
-        return self.floats(index, kind)
-
     def view(self, index: int) -> memoryview:
         """The bytes of a buffer view."""
         view = item(self._views, index)
@@ -115,7 +101,8 @@ class Arrays:
             return self._added[index].reshape(-1, width)
         if accessor["type"] != kind:
             raise ValueError(f"accessor {index} is no {kind}")
-        dtype, count = np.dtype(TYPES[accessor["componentType"]]), accessor["count"]
+        dtype, count = np.dtype(TYPES[accessor["componentType"]]), natural(accessor["count"], "count")
+        self.need(8 * count * width)
         rows = np.zeros((count, width), dtype)
         if "bufferView" in accessor and count:
             stride = item(self._views, accessor["bufferView"]).get("byteStride", width * dtype.itemsize)
@@ -133,29 +120,11 @@ class Arrays:
         self, of: Json, shape: tuple[int, int], dtype: np.dtype[Any], stride: int | None = None
     ) -> npt.NDArray[Any]:
         """Rows in a buffer view; without a stride they lie close together."""
-        strides = (shape[1] * dtype.itemsize if stride is None else stride, dtype.itemsize)
+        row = shape[1] * dtype.itemsize
+        if stride is not None and natural(stride, "byteStride") < row:
+            raise ValueError(f"a stride of {stride}, below the {row} of a row")
+        strides = (row if stride is None else stride, dtype.itemsize)
         return np.ndarray(shape, dtype, self.view(of["bufferView"]), of.get("byteOffset", 0), strides)
-
-    def _as_loaded(self, index: int) -> int:
-        """Bytes of an array in a mesh, with eight per number."""
-        if index in self._added:
-            return 0  # it was added up before
-        accessor = item(self._accessors, index)
-        return int(8 * accessor["count"] * ITEMS[accessor["type"]])
-
-    def _size(self, accessor: Json) -> int:
-        """Bytes of an array, for which its view has to have room."""
-        count = natural(accessor["count"], "count")
-        row = np.dtype(TYPES[accessor["componentType"]]).itemsize * ITEMS[accessor["type"]]
-        if "bufferView" in accessor:  # without one: zeros, or data of an extension
-            view = self._views[natural(accessor["bufferView"], "bufferView")]
-            start = natural(accessor.get("byteOffset", 0), "byteOffset")
-            natural(view.get("byteOffset", 0), "byteOffset")
-            stride = natural(view.get("byteStride", row), "byteStride")
-            length = start + (count - 1) * stride + row if count else 0
-            if stride < row or length > view["byteLength"]:
-                raise ValueError(f"it declares {count} rows but has no room for them")
-        return count * row
 
     def _bytes_beside(self) -> int:
         """Count the bytes of the files that the buffers name."""

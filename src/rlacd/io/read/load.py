@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
 from rlacd.io.read.contents import Contents, one_shape, require_few, without_engine_hulls
-from rlacd.io.read.open_file import CONVERTERS, format_of, read_file
+from rlacd.io.read.open_file import CONVERTERS, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import FloatArray, heights
 from rlacd.solid.input_mesh import Asset, InputMesh
@@ -126,15 +126,7 @@ def _read(path: Path) -> Contents:
 
 def _opened(path: Path) -> bytes:
     """The content of a file, which is opened here, not by name in a parser: a name like a URL must not be fetched."""
-    try:
-        content = read_file(path)
-    except FileNotFoundError as error:
-        raise MeshFileError(f"{path} does not exist: check the spelling and the folder") from error
-    except IsADirectoryError as error:
-        raise MeshFileError(f"{path} is a folder: give a mesh file in it") from error
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise MeshFileError(f"{path} cannot be opened ({reason}): check its name and permissions") from error
+    content = read_named(path)
     if not content.strip(b"\0 \t\r\n"):
         raise MeshFileError(f"{path} is empty: export the mesh again")
     return content

@@ -28,15 +28,12 @@ _READERS = {
 }
 """By extension, the function that reads a file with its looks."""
 
-MOST_PIXELS = 2**26
-"""Of one picture: 8,192 by 8,192."""
-
 BETWEEN = "\n"
 """In the name of a node in a scene of looks: between that of the node in the file, and that of its material."""
 
 
-def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None:
-    """Parse a file again, with everything that its parser reads; None where that fails.
+def looks_of(path: Path, content: bytes, extension: str) -> Any:
+    """Parse a file again as a scene with everything that its parser reads; None, with a warning, where that fails.
 
     Parameters
     ----------
@@ -48,10 +45,10 @@ def looks_of(path: Path, content: bytes, extension: str) -> trimesh.Scene | None
         ``obj``, ``ply``, ``dae`` or ``3mf``.
     """
     try:
-        scene: trimesh.Scene = function_of(_READERS[extension])(path, content)
+        return function_of(_READERS[extension])(path, content)
     except Exception:  # parsers may raise anything on damaged files; the triangles have been read without looks
+        warnings.warn(f"the looks of {path.name} could not be read, so it is grey", UserWarning, stacklevel=3)
         return None
-    return scene
 
 
 def painted(arrays: Mapping[str, tuple[FloatArray, IntArray]], material: Any) -> trimesh.Trimesh:
@@ -84,21 +81,11 @@ def opened_picture(beside: FolderFiles, name: str) -> Any:
     try:
         from PIL import Image
 
-        return decoded(Image.open(io.BytesIO(beside.get(name))), name)
+        picture = Image.open(io.BytesIO(beside.get(name)))
+        picture.load()  # now, when one that cannot be decoded may still be left out
+        return picture
     except Exception as error:  # decoders may raise anything
         reasons = {ImportError: "run  pip install 'rlacd[view]'", FileNotFoundError: "it is not in the folder"}
-        why = next((said for kind, said in reasons.items() if isinstance(error, kind)), "it is damaged")
+        why = next((said for kind, said in reasons.items() if isinstance(error, kind)), "it is damaged or too large")
         warnings.warn(f"the picture {name!r:.100} was left out: {why}", UserWarning, stacklevel=2)
         return None
-
-
-def decoded(picture: Any, name: str = "of the vertices") -> Any:
-    """Decode a picture now, when one that cannot be decoded may still be left out; None, with a warning, for such."""
-    try:
-        if picture.width * picture.height > MOST_PIXELS:
-            raise ValueError
-        picture.load()
-    except Exception:  # decoders may raise anything
-        warnings.warn(f"the picture {name!r:.100} was left out: it is damaged or too large", UserWarning, stacklevel=3)
-        return None
-    return picture

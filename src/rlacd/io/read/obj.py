@@ -1,14 +1,15 @@
 """Wavefront OBJ: the triangles of its objects, each a node, and what it says of their looks.
 
-All lines of a kind are read at once, as an array of characters: files of a million lines are common.
+All lines of a kind are read at once: files of a million lines are common.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
+from itertools import compress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,16 +32,11 @@ _UNREAD = {
     b"call": "other files that it calls",
 }
 
+_COMMON = np.array([b"v ", b"vt", b"vn", b"f ", b"s ", b""])
+"""How lines begin that are read at once, mean nothing here, or are empty."""
+
 MOST_PARTS = 2_000
 """Materials of all objects; with more, looks are left out: writing takes a millisecond for each."""
-
-
-class _Faces(NamedTuple):
-    """Triangles, by the numbers of their points, texture coordinates and normals, ``[F, 3]`` each; -1 for none."""
-
-    points: IntArray
-    texture: IntArray
-    normals: IntArray
 
 
 class _File:
@@ -50,10 +46,8 @@ class _File:
         check_text(path, content)
         require_memory(content.count(b"\nf "), BYTES_READ, path.name)
         text = plain_text(content).replace(b"\\\n", b" ").replace(b"\t", b" ")
-        self._text = b"\n".join(line.lstrip(b" ") for line in text.split(b"\n")) if b"\n " in b"\n" + text else text
-        self._letters = np.frombuffer(self._text + b"\n\n\n", np.uint8)
-        self._ends = np.flatnonzero(self._letters == ord("\n"))[:-2]
-        self._begins = np.concatenate([[0], self._ends[:-1] + 1])
+        self._text = [line.split(b"#", 1)[0].strip() for line in text.split(b"\n")]
+        self._words = np.array([line[:2] for line in self._text], "S2")
         points = self.vectors(b"v")
         if len(points) and points.shape[1] < 3:
             raise ValueError(f"a vertex of {points.shape[1]} coordinates")
@@ -61,9 +55,10 @@ class _File:
         self.colors = points[:, 3:6] if points.shape[1] >= 6 else None
         self._named: dict[bytes, list[tuple[int, str]]] = {b"o": [], b"g": [], b"usemtl": [], b"mtllib": []}
         self.unread: list[str] = []
-        for line, word, rest in self._statements():
+        for line in np.flatnonzero(~np.isin(self._words, _COMMON)).tolist():
+            word, _, rest = self._text[line].partition(b" ")
             if word in self._named:
-                self._named[word].append((line, rest.split(b"#")[0].strip().decode(errors="replace")))
+                self._named[word].append((line, rest.strip().decode(errors="replace")))
             elif word in _UNREAD and _UNREAD[word] not in self.unread:
                 self.unread.append(_UNREAD[word])
         self.libraries = [name for _, name in self._named[b"mtllib"]]
@@ -71,35 +66,21 @@ class _File:
 
     def _are(self, word: bytes) -> BoolArray:
         """Which lines begin with a word of one letter or two."""
-        letters = (self._letters[self._begins + at] == letter for at, letter in enumerate(word + b" "))
-        return np.asarray(np.logical_and.reduce(list(letters)))
+        return np.asarray(self._words == word.ljust(2))
 
-    def _of(self, lines: BoolArray, word: bytes) -> bytes:
-        """What stands behind a word on some lines, without comments."""
-        kept = np.repeat(lines, self._ends - self._begins + 1)
-        text = self._letters[: len(kept)][kept].tobytes()
-        if b"#" in text:
-            text = b"\n".join(line.split(b"#", 1)[0] for line in text.split(b"\n"))
-        return text.replace(word, b" " * len(word))
+    def _of(self, word: bytes) -> bytes:
+        """What stands behind a word on its lines."""
+        return b"".join(line[len(word) :] + b"\n" for line in compress(self._text, self._are(word)))
 
     def vectors(self, word: bytes) -> FloatArray:
         """The numbers on all lines of a word, as many as the shortest has."""
-        numbers, counts = rows_of(self._of(self._are(word), word))
+        numbers, counts = rows_of(self._of(word))
         first = (np.cumsum(counts) - counts)[:, None]
         return np.ascontiguousarray(numbers[first + np.arange(counts.min(initial=len(numbers)))])
 
-    def _statements(self) -> Iterator[tuple[int, bytes, bytes]]:
-        """All lines but those of vertices, faces and smoothing groups, and comments: number, word, and the rest."""
-        letter, second = self._letters[self._begins], self._letters[self._begins + 1]
-        common = np.isin(letter, np.frombuffer(b"vf#\n", np.uint8)) | ((letter == ord("s")) & (second <= ord(" ")))
-        for line in np.flatnonzero(~common).tolist():
-            word, _, rest = self._text[self._begins[line] : self._ends[line]].partition(b" ")
-            yield line, word, rest
-
     def _read_faces(self) -> None:
-        lines = self._are(b"f")
-        self._lines = np.flatnonzero(lines)
-        self._counts, words = _fields(self._of(lines, b"f"))
+        self._lines = np.flatnonzero(self._are(b"f"))
+        self._counts, words = _fields(self._of(b"f"))
         index = [self._index(numbers, word) for numbers, word in zip(words, (b"v", b"vt", b"vn"), strict=True)]
         points = index[0]
         if (points < 0).any():
@@ -107,7 +88,7 @@ class _File:
         if len(points) and points.max() >= len(self.points):
             raise ValueError(f"a face uses vertex {points.max() + 1}, but there are {len(self.points)}")
         places = places_of(self.points, self._counts, points)
-        self.faces = _Faces(*(one[places] for one in index))
+        self.faces = [one[places] for one in index]
 
     def _index(self, numbers: IntArray, word: bytes) -> IntArray:
         """Indices from 0; those of the file count from 1, or from the end of what stands before their line."""
@@ -161,11 +142,11 @@ def read_obj(path: Path, content: bytes) -> Contents:
     """
     file = _File(path, content)
     warnings = [f"{what} of {path.name} were left out" for what in file.unread]
-    if not len(file.faces.points):
+    if not len(file.faces[0]):
         return Contents(one_shape(path.stem, file.points), warnings)
     names, owner = file.objects()
     geometry = []
-    for one, faces in _split(file.faces.points, owner):
+    for one, faces in _split(file.faces[0], owner):
         some, local = np.unique(faces, return_inverse=True)
         node = SourceNode(names[one] or path.stem, names[one] or path.stem, np.eye(4))
         geometry.append((node, Triangles(file.points[some], local.reshape(-1, 3))))

@@ -9,6 +9,9 @@ import errno
 import os
 import re
 import stat
+from pathlib import Path
+
+from rlacd.errors import MeshFileError
 
 LARGEST_FILE = 2**30
 """Bytes of the largest file that is read. A binary STL of this length has 21 million triangles."""
@@ -45,6 +48,19 @@ def read_file(path: str | os.PathLike[str], most: int = LARGEST_FILE) -> bytes:
         return file.read(opened.st_size)
 
 
+def read_named(path: Path, most: int = LARGEST_FILE, name: str | None = None) -> bytes:
+    """Do the same for a file that a user or a file names; raises MeshFileError."""
+    try:
+        return read_file(path, most)
+    except FileNotFoundError as error:
+        raise MeshFileError(f"{name or path} does not exist: check the spelling and the folder") from error
+    except IsADirectoryError as error:
+        raise MeshFileError(f"{name or path} is a folder: give a file in it") from error
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        raise MeshFileError(f"{name or path} cannot be opened ({reason}): check its name and permissions") from error
+
+
 def _check(status: os.stat_result, path: str | os.PathLike[str], most: int) -> None:
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
@@ -68,17 +84,15 @@ OFF_KEYWORD = re.compile(rb"((?:ST|[CN4n])*)OFF(?![A-Za-z])|off(?![A-Za-z])")
 _OBJ_WORDS = {b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"g", b"o", b"s", b"mtllib", b"usemtl"}
 
 
+_MARKS = {b"glTF": "glb", b"Kaydara FBX Binary": "fbx", b"ISO-10303-21;": "step", b"ply\n": "ply", b"ply\r": "ply"}
+
+
 def format_of(content: bytes) -> str | None:
     """Guess the format of a file."""
     head = content[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
-    if head.startswith(b"glTF"):
-        return "glb"
-    if head.startswith(b"Kaydara FBX Binary"):
-        return "fbx"
-    if head.startswith(b"ISO-10303-21;"):
-        return "step"
-    if head.startswith(b"ply\n") or head.startswith(b"ply\r"):
-        return "ply"
+    for mark, name in _MARKS.items():
+        if head.startswith(mark):
+            return name
     if head.startswith(b"PK\x03\x04"):
         known = {"usdz": b".usd" in head, "zae": b".dae" in content, "3mf": b".model" in content}
         return next((name for name, held in known.items() if held), None)

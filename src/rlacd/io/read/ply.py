@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import io
 import re
-import struct
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 import trimesh
 
 from rlacd.io.read.beside import PICTURES, FolderFiles
 from rlacd.io.read.contents import Contents, one_shape
-from rlacd.io.read.looks import decoded
 from rlacd.io.read.polygons import strip_triangles, triangles_of
 from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, whole
 from rlacd.memory import BYTES_READ, require_memory
@@ -45,89 +44,68 @@ MOST_FIELDS = 2000
 """Lines of a header whose looks are read: that parser revisits all earlier properties for every list among them."""
 
 
+_LENGTH = "length of "
+
+Kind: TypeAlias = "np.dtype[Any]"
+
+
 @dataclass
 class _Element:
-    """An element of a header: its number, and the name and type of each property; of a list, also that of its length.
-
-    Types are those of numpy, with the order of bytes.
-    """
+    """An element of a header: its number; the name and type of each property, and for a list that of its length."""
 
     count: int
-    properties: list[tuple[str, str, str | None]] = field(default_factory=list)
+    properties: list[tuple[str, Kind, Kind | None]] = field(default_factory=list)
 
 
-class _Lists:
-    """Where the lists of some rows are: the place of the first item of each, and their lengths."""
+def _rows(body: bytes, at: int, element: _Element) -> tuple[IntArray, dict[str, Any]]:
+    """Where each row begins and the last one ends; by property its numbers, or the lengths and the items of its lists.
 
-    def __init__(self, body: bytes, at: int, element: _Element) -> None:
-        self._body, self._element, self._stride = body, element, 0
-        self._begins: list[int] = []
-        names = [name for name, _, length in element.properties if length is not None]
-        self.places: dict[str, list[int]] = {name: [] for name in names}
-        self.counts: dict[str, list[int]] = {name: [] for name in names}
-        self.end = self._walk(at, min(element.count, 1))
-        if element.count and not self._are_alike(at, self.end - at):
-            self.end = self._walk(self.end, element.count - 1)
+    If not all lists are as long as those of the first row, they are found one by one, and numbers are passed over.
+    """
+    _, lists = _walked(body, at, element, min(element.count, 1))
+    fields: list[Any] = []
+    for name, kind, length in element.properties:
+        fields += (
+            [(name, kind)] if length is None else [(_LENGTH + name, length), (name, kind, sum(map(len, lists[name])))]
+        )
+    record = np.dtype(fields)
+    begins = at + record.itemsize * np.arange(element.count + 1)
+    if element.count and begins[-1] <= len(body):
+        rows = np.frombuffer(body, record, element.count, at)
+        counts = {name: rows[_LENGTH + name] for name in lists}
+        if all((counts[name] == len(items)).all() for name, (items,) in lists.items()):
+            return begins, {
+                name: (counts[name].astype(np.int64), whole(rows[name]).ravel()) if name in lists else rows[name]
+                for name, *_ in element.properties
+            }
+    begins, lists = _walked(body, at, element, element.count)
+    return begins, {
+        name: (np.array([len(one) for one in items]), whole(np.concatenate(items)))
+        for name, items in lists.items()
+        if items
+    }
 
-    def _walk(self, at: int, rows: int) -> int:
-        """Go through rows one by one, and return where they end."""
-        steps = [
-            (
-                name,
-                np.dtype(kind).itemsize,
-                None if length is None else struct.Struct(length[0] + np.dtype(length).char),
-            )
-            for name, kind, length in self._element.properties
-        ]
-        for _ in range(rows):
-            self._begins.append(at)
-            for name, size, length in steps:
-                if length is None:
-                    at += size
-                    continue
-                count = int(length.unpack_from(self._body, at)[0])
-                at += length.size
-                if count < 0 or at + count * size > len(self._body):
-                    raise ValueError(f"a list of {count}")
-                self.places[name].append(at)
-                self.counts[name].append(count)
-                at += count * size
-        return at
 
-    def _are_alike(self, at: int, stride: int) -> bool:
-        """Whether the lists of all rows are as long as those of the first; then all are found at once."""
-        rows = self._element.count
-        if at + rows * stride > len(self._body):
-            return False
-        for name, _, length in self._element.properties:
-            if length is not None:
-                first = self.places[name][0] - np.dtype(length).itemsize
-                counts = np.ndarray(rows, length, self._body, first, stride)
-                if (counts != self.counts[name][0]).any():
-                    return False
-        self._stride, self.end = stride, at + rows * stride
-        return True
-
-    def begins(self) -> IntArray:
-        """Where each row begins."""
-        if self._stride:
-            return self._begins[0] + self._stride * np.arange(self._element.count)
-        return np.array(self._begins, dtype=np.int64)
-
-    def items(self, name: str) -> tuple[IntArray, IntArray]:
-        """The lengths of all lists of a name, and all their items."""
-        (kind,) = (kind for other, kind, length in self._element.properties if other == name and length is not None)
-        width, rows = np.dtype(kind).itemsize, self._element.count
-        if self._stride:
-            (place, *_), (count, *_) = self.places[name], self.counts[name]
-            items = np.ndarray((rows, count), kind, self._body, place, (self._stride, width))
-            return np.full(rows, count), whole(items).ravel()
-        counts = np.array(self.counts[name], dtype=np.int64)
-        owner = np.repeat(np.arange(len(counts)), counts)
-        places = np.array(self.places[name], dtype=np.int64)[owner]
-        places += width * (np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner])
-        letters = np.frombuffer(self._body, np.uint8)[places[:, None] + np.arange(width)]
-        return counts, whole(letters.view(kind)[:, 0])
+def _walked(body: bytes, at: int, element: _Element, rows: int) -> tuple[IntArray, dict[str, list[npt.NDArray[Any]]]]:
+    """Where each of some rows begins and the last one ends, and the lists of each name."""
+    begins = [at]
+    lists: dict[str, list[npt.NDArray[Any]]] = {
+        name: [] for name, _, length in element.properties if length is not None
+    }
+    for _ in range(rows):
+        for name, kind, length in element.properties:
+            if length is None:
+                at += kind.itemsize
+                continue
+            if (count := int(np.frombuffer(body, length, 1, at)[0])) < 0:
+                raise ValueError(f"a list of {count}")
+            at += length.itemsize
+            lists[name].append(np.frombuffer(body, kind, count, at))
+            at += kind.itemsize * count
+        if at > len(body):
+            raise ValueError(f"its header declares {element.count} lines")
+        begins.append(at)
+    return np.array(begins), lists
 
 
 def read_ply(path: Path, content: bytes) -> Contents:
@@ -152,25 +130,14 @@ def read_ply(path: Path, content: bytes) -> Contents:
     points, faces = np.empty((0, 3)), [np.empty((0, 3), dtype=np.int64)]
     at = 0
     for name, element in elements.items():
-        begin = at
-        if any(length is not None for *_, length in element.properties):
-            lists = _Lists(body, at, element)
-            at, begins = lists.end, lists.begins()
-            if name in ("face", STRIPS) and element.count:
-                faces.append(_triangles(lists, name == STRIPS, points))
-        else:
-            record = np.dtype([(field, kind) for field, kind, _ in element.properties])
-            begins = at + record.itemsize * np.arange(element.count)
-            at += element.count * record.itemsize
-            if at > len(body):
-                raise ValueError(f"its header declares {element.count} {name} lines")
-            if name == "vertex":
-                rows = np.frombuffer(body, record, element.count, begin)
-                points = np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1)
-        if lines is not None:
-            own = lines[np.searchsorted(lines, begin) :][: element.count + 1]
-            if not np.array_equal(own, np.append(begins, at)):
-                raise ValueError(f"a {name} line of another length than declared")
+        begins, values = _rows(body, at, element)
+        if lines is not None and not np.array_equal(lines[np.searchsorted(lines, at) :][: element.count + 1], begins):
+            raise ValueError(f"a {name} line of another length than its header declares")
+        at = int(begins[-1])
+        if name == "vertex" and element.count:
+            points = np.stack([values[axis].astype(np.float64) for axis in "xyz"], axis=1)
+        elif name in ("face", STRIPS) and element.count:
+            faces.append(_triangles(values, name == STRIPS, points))
     described = _DESCRIBED.search(header) is not None and STRIPS not in elements
     asset = Asset(content, path, "ply") if described and header.count(b"\n") < MOST_FIELDS else None
     return Contents(one_shape(path.stem, points, np.concatenate(faces)), asset=asset)
@@ -193,35 +160,37 @@ def scene_of_ply(path: Path, content: bytes) -> trimesh.Scene:
     beside = FolderFiles(path.parent, PICTURES)
     scene = trimesh.load_scene(io.BytesIO(content), "ply", resolver=beside, allow_remote=False, process=False)
     for shape in scene.geometry.values():
-        material: Any = getattr(shape.visual, "material", None)
-        if getattr(material, "image", None) is not None:
-            material.image = decoded(material.image)
+        if (picture := getattr(getattr(shape.visual, "material", None), "image", None)) is not None:
+            picture.load()  # now, when looks that cannot be decoded may still be left out
     return scene
 
 
 def _elements(header: bytes, is_text: bool) -> dict[str, _Element]:
     order = "<"
     found: dict[str, _Element] = {}
+
+    def kind(word: str) -> Kind:
+        return np.dtype("<f8" if is_text else order + _KINDS[word])
+
     for line in header.decode("latin-1").splitlines():
         match line.split():
-            case ["format", kind, *_]:
-                order = _ORDERS[kind.lower()]
+            case ["format", word, *_]:
+                order = _ORDERS[word.lower()]
             case ["element", name, count]:
                 if name in found:
                     raise ValueError(f"its header declares {name!r:.40} twice")
                 found[name] = last = _Element(count_in(count.encode()))
-            case ["property", "list", length, kind, name]:
-                kinds = ("f8", "f8") if is_text else (_KINDS[kind], _KINDS[length])
-                last.properties.append((name, order + kinds[0], order + kinds[1]))
-            case ["property", kind, name]:
-                last.properties.append((name, order + ("f8" if is_text else _KINDS[kind]), None))
+            case ["property", "list", length, items, name]:
+                last.properties.append((name, kind(items), kind(length)))
+            case ["property", items, name]:
+                last.properties.append((name, kind(items), None))
             case ["element" | "property", *_]:
                 raise ValueError(f"{line!r:.40} in its header")
     return found
 
 
-def _triangles(lists: _Lists, are_strips: bool, points: FloatArray) -> IntArray:
-    counts, corners = lists.items(next(name for name in _CORNERS if name in lists.places))
+def _triangles(values: dict[str, Any], are_strips: bool, points: FloatArray) -> IntArray:
+    counts, corners = next(values[name] for name in _CORNERS if name in values)
     if are_strips:  # -1 ends a strip as well
         strips = [
             strip_triangles(part[part >= 0])

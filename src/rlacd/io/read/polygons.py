@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from manifold3d import triangulate
 
@@ -44,23 +42,15 @@ def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArr
         raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
     if (counts == 3).all():
         return np.arange(len(corners)).reshape(-1, 3)
-    places, owner = fans_of(counts)
-    begins = np.searchsorted(owner, np.arange(len(counts) + 1))
-    first = np.cumsum(counts) - counts
+    pieces, first = np.maximum(counts - 2, 0), np.cumsum(counts) - counts
+    owner, begins = np.repeat(np.arange(len(counts)), pieces), np.cumsum(pieces) - pieces
+    step = np.arange(len(owner)) - begins[owner]
+    places = np.stack([first[owner], first[owner] + step + 1, first[owner] + step + 2], axis=1)
     for polygon in _folded(points, corners[places], owner, len(counts)).tolist():
         ring = slice(first[polygon], first[polygon] + counts[polygon])
         if (apart := triangles_within(points[corners[ring]])) is not None:
-            places[begins[polygon] : begins[polygon + 1]] = first[polygon] + apart
+            places[begins[polygon] : begins[polygon] + pieces[polygon]] = first[polygon] + apart
     return places
-
-
-def fans_of(counts: IntArray) -> tuple[IntArray, IntArray]:
-    """A fan for each polygon, as places in all corners ``[F, 3]``, and the polygon of each triangle."""
-    pieces = np.maximum(counts - 2, 0)
-    owner = np.repeat(np.arange(len(counts)), pieces)
-    first = (np.cumsum(counts) - counts)[owner]
-    step = np.arange(len(first)) - (np.cumsum(pieces) - pieces)[owner]
-    return np.stack([first, first + step + 1, first + step + 2], axis=1), owner
 
 
 def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) -> IntArray:
@@ -74,40 +64,25 @@ def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) 
     return np.unique(owner[turned])
 
 
-def triangles_within(ring: FloatArray, holes: Sequence[FloatArray] = ()) -> IntArray | None:
-    """Triangles of one polygon ``[N, 3]`` that do not fold over; None if there are none.
-
-    ``[N - 2, 3]`` without holes; each hole gives two more than it has corners, which count on after those of the ring.
-    """
-    total = len(ring) + sum(map(len, holes))
-    middle = ring.mean(axis=0)
-    rings = [one - middle for one in (ring, *holes)]
-    if total > MOST_CORNERS or not all(np.isfinite(one).all() for one in rings):
+def triangles_within(ring: FloatArray) -> IntArray | None:
+    """Triangles ``[N - 2, 3]`` of one polygon ``[N, 3]`` that do not fold over; None if there are none."""
+    if len(ring) > MOST_CORNERS or not np.isfinite(ring).all():
         return None
-    normal = _normal(rings[0])
+    ring = ring - ring.mean(axis=0)
+    normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
     length = float(np.linalg.norm(normal))
     if not length > 0:
         return None
     normal /= length
-    across = np.eye(3)[np.abs(normal).argmin()]
-    right = np.cross(across, normal)
+    right = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
     right /= np.linalg.norm(right)
-    flat = [np.ascontiguousarray(np.stack([one @ right, one @ np.cross(normal, right)], axis=1)) for one in rings]
-    places = np.split(np.arange(total), np.cumsum([len(one) for one in rings])[:-1])
-    for hole, one in enumerate(rings[1:], 1):
-        if _normal(one) @ normal > 0:  # holes run the other way
-            flat[hole], places[hole] = np.ascontiguousarray(flat[hole][::-1]), places[hole][::-1]
-    found = np.asarray(triangulate(flat), dtype=np.int64)
-    if found.shape != (total - 2 + 2 * len(holes), 3):
+    flat = np.ascontiguousarray(np.stack([ring @ right, ring @ np.cross(normal, right)], axis=1))
+    found = np.asarray(triangulate([flat]), dtype=np.int64)
+    if found.shape != (len(ring) - 2, 3):
         return None
-    points = np.concatenate(flat)
-    a, b, c = points[found[:, 0]], points[found[:, 1]], points[found[:, 2]]
+    a, b, c = flat[found[:, 0]], flat[found[:, 1]], flat[found[:, 2]]
     areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return np.concatenate(places)[found] if areas.min() >= -TURNED_SHARE * length else None
-
-
-def _normal(ring: FloatArray) -> FloatArray:
-    return np.asarray(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0))
+    return found if areas.min() >= -TURNED_SHARE * length else None
 
 
 def strip_triangles(corners: IntArray) -> IntArray:

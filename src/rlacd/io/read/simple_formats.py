@@ -2,8 +2,8 @@
 
 OFF is Geomview's: a keyword, the numbers of vertices, faces and edges, a line per vertex, a line per face. Letters
 before ``OFF`` say what else the line of a vertex holds: texture coordinates (``ST``), a colour (``C``), a normal
-(``N``), a fourth homogeneous coordinate (``4``), or that there are not three dimensions (``n``). The keyword may be
-left out or have the numbers on its own line, and ``#`` begins a comment.
+(``N``); those of other dimensions (``4``, ``n``) are refused. The keyword may be left out or have the numbers on its
+own line, and ``#`` begins a comment.
 """
 
 from __future__ import annotations
@@ -105,9 +105,11 @@ def read_off(path: Path, content: bytes) -> Contents:
         )
     check_text(path, content)
     lines = [line for line in (raw.split(b"#", 1)[0].strip() for raw in content.splitlines()) if line]
-    letters = _take_keyword(lines)
-    if b"n" in letters:
-        _check_dimension(path, letters, lines)
+    if lines and (keyword := OFF_KEYWORD.match(lines[0])) is not None:
+        if set(keyword[1] or b"") & set(b"n4"):
+            raise MeshFileError(f"{path} is a mesh in other than 3 dimensions: project it first")
+        rest = lines[0][keyword.end() :].strip()
+        lines[:1] = [rest] if rest else []
     header = lines[0].split() if lines else []
     if len(header) < 2:
         raise ValueError("its header lacks the counts")
@@ -115,10 +117,7 @@ def read_off(path: Path, content: bytes) -> Contents:
     body = lines[1:]
     if len(body) < vertices + faces:
         raise ValueError(f"its header declares {vertices} vertices and {faces} faces")
-    points = vectors_of(b"\n".join(body[:vertices]), 4 if b"4" in letters else 3)
-    if b"4" in letters:
-        with np.errstate(all="ignore"):
-            points = points[:, :3] / points[:, 3:]
+    points = vectors_of(b"\n".join(body[:vertices]))
     numbers, words = rows_of(b"\n".join([*body[vertices : vertices + faces], b""]))
     first = np.cumsum(words) - words
     counts = whole(numbers[first])
@@ -128,23 +127,3 @@ def read_off(path: Path, content: bytes) -> Contents:
     place = np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
     corners = whole(numbers[first[owner] + 1 + place])
     return Contents(one_shape(path.stem, points, triangles_of(points, counts, corners)))
-
-
-def _take_keyword(lines: list[bytes]) -> bytes:
-    """Remove the keyword from the first line, or that line if it holds nothing else; returns the letters before it."""
-    found = OFF_KEYWORD.match(lines[0]) if lines else None
-    if found is None:
-        return b""
-    rest = lines[0][found.end() :].strip()
-    lines[:1] = [rest] if rest else []
-    return found[1] or b""
-
-
-def _check_dimension(path: Path, letters: bytes, lines: list[bytes]) -> None:
-    """Remove the dimension of the space from the lines, and refuse any other than three."""
-    word, _, rest = lines[0].partition(b" ") if lines else (b"", b"", b"")
-    lines[:1] = [rest.strip()] if rest.strip() else []
-    dimension = count_in(word)
-    if dimension != 3 or b"4" in letters:
-        what = f"{dimension} dimensions" + (" and homogeneous coordinates" if b"4" in letters else "")
-        raise MeshFileError(f"{path} is a mesh in {what}, not in 3 dimensions: project it first")

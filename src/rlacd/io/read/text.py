@@ -58,13 +58,13 @@ def rows_of(text: bytes) -> tuple[FloatArray, IntArray]:
     return numbers, counts
 
 
-def vectors_of(text: bytes, width: int = 3) -> FloatArray:
-    """The first numbers on each line that has any. Raises ValueError where there are fewer, or none."""
+def vectors_of(text: bytes) -> FloatArray:
+    """The first three numbers on each line that has any. Raises ValueError where there are fewer, or none."""
     numbers, counts = rows_of(text.rstrip() + b"\n")
     counts = counts[counts > 0]
-    if len(counts) and counts.min() < width:
-        raise ValueError(f"not every point has {width} numbers")
-    return np.ascontiguousarray(numbers[(np.cumsum(counts) - counts)[:, None] + np.arange(width)])
+    if len(counts) and counts.min() < 3:
+        raise ValueError("not every point has 3 numbers")
+    return np.ascontiguousarray(numbers[(np.cumsum(counts) - counts)[:, None] + np.arange(3)])
 
 
 def whole(numbers: npt.NDArray[Any]) -> IntArray:

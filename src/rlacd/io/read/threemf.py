@@ -16,7 +16,7 @@ from lxml import etree
 from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
 from rlacd.io.read.conventions import METRES
-from rlacd.io.read.xml import PARSER, check_prologue, open_archive, parse_xml, unpack
+from rlacd.io.read.xml import PARSER, check_prologue, open_archive, parse_xml
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 
@@ -61,7 +61,7 @@ class _Archive:
         names = self._archive.namelist()
         told = [name for name in names if "3d/3dmodel.model" in name.lower()]
         if "_rels/.rels" in names and not told:
-            rows = parse_xml(self._path, unpack(self._path, self._archive, "_rels/.rels")).iter("{*}Relationship")
+            rows = parse_xml(self._path, self._archive.read("_rels/.rels")).iter("{*}Relationship")
             targets = [row.get("Target", "").lstrip("/") for row in rows if row.get("Type", "").endswith("/3dmodel")]
             told = [name for name in targets if name in names]
         if not told:
@@ -71,7 +71,7 @@ class _Archive:
     def _objects_of(self, model: str) -> dict[str, _Object]:
         if model not in self._models:
             self._models[model] = {}
-            data = unpack(self._path, self._archive, model)
+            data = self._archive.read(model)
             check_prologue(self._path, data)
             groups: dict[str, list[Color | None]] = {}
             tags = [f"{{*}}{tag}" for tag in ("basematerials", "colorgroup", "object", "build", "model")]

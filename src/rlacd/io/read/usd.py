@@ -7,7 +7,7 @@ from pathlib import Path
 from rlacd.io.read.apart import read_apart
 from rlacd.io.read.contents import Contents
 
-SERVER = "rlacd.io.read.usd_stage:StageReader"
+SERVER = "rlacd.io.read.usd_stage:read_stage"
 
 
 def read_usd(path: Path, _: bytes) -> Contents:

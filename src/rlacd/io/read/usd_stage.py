@@ -5,25 +5,30 @@ A stage may name other files. They are read only from the folder of the file or 
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.apart import ToldNodes
+from rlacd.io.read.apart import Answered, ToldNodes, served
 from rlacd.io.read.contents import Triangles
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
-from rlacd.pool import Blobs, Shared, Values
+from rlacd.pool import Blobs, Values
 from rlacd.solid.arrays import FloatArray
 
-PRIMITIVES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
-"""The primitives that are read."""
+PRIMITIVES: dict[str, Callable[[Callable[[str], float]], trimesh.Trimesh]] = {
+    "Cube": lambda of: trimesh.creation.box((of("size"),) * 3),
+    "Sphere": lambda of: trimesh.creation.icosphere(3, of("radius")),
+    "Cylinder": lambda of: trimesh.creation.cylinder(of("radius"), of("height")),
+    "Capsule": lambda of: trimesh.creation.capsule(of("height"), of("radius")),
+    "Cone": lambda of: trimesh.creation.cone(of("radius"), of("height")),
+}
+"""The primitives that are read, by their attributes; USD centres each."""
 
 _TO_AXIS = {"X": (0, 1, 0, np.pi / 2), "Y": (1, 0, 0, -np.pi / 2), "Z": (1, 0, 0, 0.0)}
 """How to turn z to an axis: about x, y, z by an angle."""
@@ -33,22 +38,10 @@ _LOOK = {"diffuseColor": 3, "emissiveColor": 3, "opacity": 1, "metallic": 1, "ro
 """The inputs of a UsdPreviewSurface that are read where they are no pictures, and their numbers."""
 
 
-class StageReader:
-    """The server of a process that reads stages (see `rlacd.pool.Server`)."""
-
-    def __init__(self, folder: Path) -> None:
-        os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there
-
-    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """Read the stage at `values`' path: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
-        path = Path(values["path"])
-        try:
-            return _stage(path)
-        except Tf.ErrorException as error:
-            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again") from error
-
-
-def _stage(path: Path) -> tuple[Values, dict[str, bytes]]:
+@served
+def read_stage(values: Values, blobs: Blobs) -> Answered:
+    """Read the stage at `values`' path: ``INDEX.points`` and ``INDEX.faces`` of every node, and its description."""
+    path = Path(values["path"])
     check_files(path)
     stage = Usd.Stage.Open(str(path))
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
@@ -155,22 +148,8 @@ def _value(attribute: Any) -> Any:
 def _primitive(prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
     """A cube, sphere, cylinder, capsule or cone as points and triangles."""
 
-    def measure(name: str) -> float:
-        return float(_value(prim.GetAttribute(name)))
-
-    match str(prim.GetTypeName()):
-        case "Cube":
-            mesh = trimesh.creation.box((measure("size"),) * 3)
-        case "Sphere":
-            mesh = trimesh.creation.icosphere(3, measure("radius"))
-        case "Cylinder":
-            mesh = trimesh.creation.cylinder(measure("radius"), measure("height"))
-        case "Capsule":
-            mesh = trimesh.creation.capsule(measure("height"), measure("radius"))
-            mesh.apply_translation((0, 0, -mesh.bounds.mean(axis=0)[2]))
-        case _:
-            mesh = trimesh.creation.cone(measure("radius"), measure("height"))
-            mesh.apply_translation((0, 0, -measure("height") / 2))
+    mesh = PRIMITIVES[str(prim.GetTypeName())](lambda name: float(_value(prim.GetAttribute(name))))
+    mesh.apply_translation(-mesh.bounds.mean(axis=0))
     if axis := prim.GetAttribute("axis"):
         *about, angle = _TO_AXIS[str(_value(axis))]
         mesh.apply_transform(trimesh.transformations.rotation_matrix(angle, about))

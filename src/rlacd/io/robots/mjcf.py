@@ -192,7 +192,7 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
     """Find the collision meshes of an MJCF model; the rest is as for `rlacd.io.robots.urdf.plan_urdf`."""
     root = compiler.root
     defaults = Defaults.of(root)
-    assets = {_mesh_name(mesh, defaults): mesh for mesh in _assets(root)}
+    assets = {_mesh_name(mesh, defaults): mesh for section in root.named("asset") for mesh in section.named("mesh")}
     warnings = [
         f"What <{kind}> brings in is left unchanged: rewrite that file too."
         for kind in ("model", "attach")
@@ -213,9 +213,10 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
 
     def edit(hulls: HullFiles, sources: Mapping[MeshUse, trimesh.Trimesh], copies: Mapping[MeshUse, str]) -> list[Edit]:
         taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
-        names = {mesh.name: _fresh(mesh.name, len(hulls[mesh.use]), taken) for mesh in meshes}
-        edits = []
+        names: dict[str, list[str]] = {}
+        edits, own = [], {*taken}
         for mesh in meshes:
+            names[mesh.name] = [_unused(f"{mesh.name}_{i:03d}", own) for i in range(len(hulls[mesh.use]))]
             edits.append(_hull_assets(mesh, named, zip(names[mesh.name], hulls[mesh.use], strict=True)))
             moved = compiler.relocated(mesh.asset)
             values = {} if moved is None else {"file": moved}
@@ -368,21 +369,8 @@ def _use(asset: Element, full: Mapping[str, str], references: References, compil
     return MeshUse(place, read_scale(full.get("scale"), where))
 
 
-def _assets(root: Element) -> Iterator[Element]:
-    for section in root.named("asset"):
-        yield from section.named("mesh")
-
-
 def _mesh_name(mesh: Element, defaults: Defaults) -> str:
     return mesh.attributes.get("name") or Path(defaults.full(mesh).get("file", "")).stem
-
-
-def _fresh(name: str, count: int, taken: set[str]) -> list[str]:
-    """Derive names from that of the mesh which nothing in the file uses."""
-    stem = name
-    while any(f"{stem}_{index:03d}" in taken for index in range(count)):
-        stem += "_hull"
-    return [f"{stem}_{index:03d}" for index in range(count)]
 
 
 def _caveats(root: Element, geoms: list[_Geom]) -> Iterator[str]:

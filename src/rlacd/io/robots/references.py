@@ -8,13 +8,14 @@ and in the folders the user allows. Links are followed: ROS workspaces consist o
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.io.read.open_file import read_file
-from rlacd.io.robots.spans import LARGEST_DESCRIPTION, parse
+from rlacd.io.robots.spans import LARGEST_DESCRIPTION
 
 PACKAGE_SCHEMES = ("package", "model")
 
@@ -121,19 +122,15 @@ class References:
             yield path if path.name == name else path / name
 
 
+_NAME = re.compile(rb"<name>\s*([^<]+?)\s*</name>")
+
+
 def _package_name(folder: Path) -> str | None:
-    place = folder / "package.xml"
-    if not place.is_file():
-        return None
     try:
-        root = parse(place, read_file(place, LARGEST_DESCRIPTION))
-    except (MeshFileError, OSError):
+        found = _NAME.search(read_file(folder / "package.xml", LARGEST_DESCRIPTION))
+    except OSError:
         return None
-    found = next(root.named("name"), None)
-    if found is None:
-        return None
-    inner = root.file.data[found.head : found.end].split(b"<")[0]
-    return inner.decode(root.file.encoding, "replace").strip()
+    return found[1].decode(errors="replace") if found else None
 
 
 def _paths(variable: str) -> list[Path]:

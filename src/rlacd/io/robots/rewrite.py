@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshError, MeshFileError, OptionError, OutputError
+from rlacd.errors import MeshError, MeshFileError, OptionError
 from rlacd.io.read.conventions import collada_unit
 from rlacd.io.read.load import load_mesh
-from rlacd.io.read.open_file import read_file
+from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
 from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
 from rlacd.io.robots.plan import MeshUse, Plan
@@ -25,11 +25,11 @@ from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
 from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import file_stem, write_file
-from rlacd.io.write.encode import encode_plain_obj
+from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.single_precision import Triangles
-from rlacd.io.write.target import check_file, check_name
-from rlacd.options import LENGTHS, OPTION_NAMES, Options
+from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
+from rlacd.options import LENGTHS
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
 from rlacd.solid.frame import Frame
@@ -127,11 +127,9 @@ def rewrite_robot(
     if keep_input:
         raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
     packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
-    check_rewrite(source, place)
-    kind, root = _parsed(source)
+    kind, root, folder = _opened(source, place)
     _check_options(options)
     references = References(source, packages)
-    folder = place.with_name(f"{place.stem}_{kind}")
     plan, warnings = _plan(root, kind, references, place, folder)
     if not plan.uses:
         write_file(place, root.file.data)
@@ -146,7 +144,8 @@ def rewrite_robot(
         hulls = {f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)}
         if kind == "mjcf" and not mujoco_reads(use.path):
             copies[use] = f"{stem}_{name}_visual.obj"
-            files[copies[use]] = _as_obj(result.source, use)
+            plain = Triangles(result.source.vertices / use.scale, _oriented(result.source.faces, use))
+            files[copies[use]] = encode_plain_obj(plain)  # without the scale, which is applied when it is read
         files |= hulls
         meshes[use] = RewrittenMesh(use.path, list(hulls), result)
         warnings += [*said, *(f"{use.path.name}: {warning}" for warning in result.report.get("warnings", []))]
@@ -167,10 +166,7 @@ def rewrite_stage(
     _check_options(options)
     data, done, warnings, files = usd.encode_layer(stage, place, lambda mesh: _coarse(mesh, options), flat=keep_input)
     warnings += _left_behind(files, stage.source.parent, place)
-    meshes = [
-        RewrittenMesh(Path(path), [f"hull_{i:03d}" for i in range(count)], result)
-        for path, (result, count) in done.items()
-    ]
+    meshes = [RewrittenMesh(Path(path), [*map(hull_name, range(len(hulls)))], hulls) for path, hulls in done.items()]
     if not meshes:
         warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
@@ -189,33 +185,24 @@ def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:
     check_file(place)
 
 
+def _opened(source: Path, place: Path) -> tuple[str, Element, Path]:
+    """The kind of a robot file, its root, and the folder for its hulls, which is checked before any work."""
+    if not is_robot(source):
+        raise MeshFileError(f"{source} is not a robot file: its name has to end in {' or '.join(ENDINGS)}.")
+    _check_place(source, place, [source.suffix.lower()])
+    kind = ENDINGS[source.suffix.lower()]
+    folder = mesh_folder(place, kind)
+    check_folder(folder)
+    root = parse(source, read_named(source, LARGEST_DESCRIPTION))
+    if root.tag != ROOTS[kind]:
+        raise MeshFileError(f"{source} is not {kind.upper()}: it starts with <{root.tag}>, not <{ROOTS[kind]}>.")
+    return kind, root, folder
+
+
 def _check_options(options: Mapping[str, Any]) -> None:
     for name in ("unit", "scale", "per_node"):
         if options.get(name):
             raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
-
-
-def _as_obj(source: trimesh.Trimesh, use: MeshUse) -> bytes:
-    """A copy of a mesh that the consumer cannot read, without the scale of its use."""
-    return encode_plain_obj(Triangles(source.vertices / use.scale, _oriented(source.faces, use)))
-
-
-def _parsed(source: Path) -> tuple[str, Element]:
-    """The kind of a robot file and its root."""
-    kind, root = ENDINGS[source.suffix.lower()], parse(source, _read(source))
-    if root.tag != ROOTS[kind]:
-        raise MeshFileError(f"{source} is not {kind.upper()}: it starts with <{root.tag}>, not <{ROOTS[kind]}>.")
-    return kind, root
-
-
-def check_rewrite(source: Path, place: Path) -> None:
-    """Check, before any work, that `source` can be rewritten as `place`; raises as `rewrite_robot`."""
-    if not is_robot(source):
-        raise MeshFileError(f"{source} is not a robot file: its name has to end in {' or '.join(ENDINGS)}.")
-    _check_place(source, place, [source.suffix.lower()])
-    folder = place.with_name(f"{place.stem}_{ENDINGS[source.suffix.lower()]}")
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
 
 
 def _plan(root: Element, kind: str, references: References, place: Path, folder: Path) -> tuple[Plan, list[str]]:
@@ -223,7 +210,7 @@ def _plan(root: Element, kind: str, references: References, place: Path, folder:
     if kind == "urdf":
         plan = plan_urdf(root, references, lambda old, hull: _reference(old, hull, references, folder))
     else:
-        compiler = read_model(root, references, _read)
+        compiler = read_model(root, references, lambda path: read_named(path, LARGEST_DESCRIPTION))
         within = os.path.relpath(source / compiler.mesh_folder, source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
         plan = plan_mjcf(compiler, references, lambda _, hull: (Path(target) / hull).as_posix())
@@ -251,36 +238,22 @@ def _reference(old: str, hull: str, references: References, folder: Path) -> str
 
 
 def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) -> list[str]:
-    """Say what one threshold for the whole robot would give, if each mesh's own made many hulls of small ones."""
+    """Say that one length for the whole robot may do, where meshes of other sizes each became many hulls."""
     hulls = sum(len(mesh.files) for mesh in meshes.values())
-    asked = Options(**{name: options[name] for name in OPTION_NAMES if name in options})
-    stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout"))
-    if "threshold" not in asked.numbers or stated or len(meshes) < 2 or hulls < MANY_HULLS * len(meshes):
+    reports = [mesh.result.report for mesh in meshes.values()]
+    scales = [report["scale"] for report in reports]
+    stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout", "criterion"))
+    if stated or max(scales) < 2 * min(scales) or hulls < MANY_HULLS * len(meshes):
         return []
-    largest = min(mesh.result.report["scale"] for mesh in meshes.values())
-    quick = {name: value for name, value in options.items() if name not in ("threshold", "budget", "search_steps")}
-    quick |= {"quality": "fast", "criterion": asked.criterion}  # by distance, as a length is taken, there are no more
-    for times in LARGER:
-        length = float(f"{times * _threshold(meshes) / largest:.1g}")
-        fewer = sum(len(_coarse(mesh.result.source, {**quick, "threshold_abs": length})) for mesh in meshes.values())
-        if fewer <= WORTH_SAYING * hulls:
-            return [
-                f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; "
-                f"--threshold-abs {length:g} gives {fewer} or fewer."
-            ]
-    return []
+    length = reports[0]["options"]["threshold"] / min(scales)
+    return [
+        f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; --threshold-abs "
+        f"{float(f'{length:.1g}'):g}, that of the largest, gives fewer."
+    ]
 
 
-MANY_HULLS, WORTH_SAYING = 10, 0.7
-"""Hulls per mesh from which on fewer are suggested, and the share of them that is worth a word."""
-
-LARGER = (1, 2)
-"""The thresholds that are tried, times that of the largest mesh: a robot is larger than its largest mesh."""
-
-
-def _threshold(meshes: Mapping[MeshUse, RewrittenMesh]) -> float:
-    """The threshold of the meshes, where the longest side of each is 2."""
-    return float(next(iter(meshes.values())).result.report["options"]["threshold"])
+MANY_HULLS = 10
+"""Hulls per mesh from which on a length is suggested."""
 
 
 def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
@@ -331,10 +304,3 @@ def _stems(paths: Sequence[Path]) -> list[str]:
             stem = f"{plain}_{number}"
         stems.append(stem)
     return stems
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return read_file(path, LARGEST_DESCRIPTION)
-    except OSError as error:
-        raise MeshFileError(f"{path} cannot be opened ({error.strerror}): check its name and permissions.") from error

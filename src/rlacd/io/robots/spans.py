@@ -81,11 +81,6 @@ class Element:
         return (child for child in self.children if child.tag in tags)
 
     @property
-    def text(self) -> bytes:
-        """The element's bytes."""
-        return self.file.data[self.start : self.end]
-
-    @property
     def indent(self) -> bytes:
         """The white space between the start of the line and the element; nothing if something else is there."""
         data, start = self.file.data, self.start

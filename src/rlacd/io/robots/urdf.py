@@ -7,7 +7,7 @@ from collections.abc import Callable
 from rlacd.errors import MeshFileError
 from rlacd.io.robots.plan import HullFiles, MeshUse, Plan, Scale
 from rlacd.io.robots.references import References
-from rlacd.io.robots.spans import Edit, Element, File
+from rlacd.io.robots.spans import Edit, Element
 
 
 def plan_urdf(root: Element, references: References, named: Callable[[str, str], str]) -> Plan:
@@ -30,18 +30,16 @@ def plan_urdf(root: Element, references: References, named: Callable[[str, str],
     if any(element.tag.startswith("xacro:") for element in root.walk()):
         raise MeshFileError(f"{root.file.path} holds xacro macros: expand it with the tool xacro first.")
     found: list[tuple[Element, Element, MeshUse]] = []
-    for link in root.named("link"):
-        for collision in link.named("collision"):
-            for geometry in collision.named("geometry"):
-                for mesh in geometry.named("mesh"):
-                    reference = mesh.attributes.get("filename", "")
-                    where = f"link {link.attributes.get('name', '?')} of {root.file.path}"
-                    if not reference:
-                        raise MeshFileError(f"a collision mesh of {where} has no filename: give it one.")
-                    use = MeshUse(
-                        references.find(reference, root.file.folder), read_scale(mesh.attributes.get("scale"), where)
-                    )
-                    found.append((collision, mesh, use))
+    for mesh in root.walk():
+        around = [*mesh.up()]
+        if [element.tag for element in around] != ["mesh", "geometry", "collision", "link", "robot"]:
+            continue
+        reference, (collision, link) = mesh.attributes.get("filename", ""), around[2:4]
+        where = f"link {link.attributes.get('name', '?')} of {root.file.path}"
+        if not reference:
+            raise MeshFileError(f"a collision mesh of {where} has no filename: give it one.")
+        scale = read_scale(mesh.attributes.get("scale"), where)
+        found.append((collision, mesh, MeshUse(references.find(reference, root.file.folder), scale)))
     replaced_meshes = {mesh for _, mesh, _ in found}
     relative = [
         mesh.attributes["filename"]
@@ -84,16 +82,10 @@ def read_scale(text: str | None, where: str) -> Scale:
 
 def _collision(collision: Element, mesh: Element, reference: str, index: int) -> bytes:
     """Return the bytes of the collision with another mesh; its name, if any, gets the hull's number as a suffix."""
-    whole = collision.text
-    inner = mesh.with_attributes({"filename": reference})
-    at, end = mesh.start - collision.start, mesh.end - collision.start
-    whole = whole[:at] + inner + whole[end:]
-    if "name" not in collision.attributes:
-        return whole
-    head = collision.head - collision.start  # the start tag comes before the mesh, so it has not moved
-    file = File(collision.file.path, whole, collision.file.encoding)
-    tag = Element(collision.tag, collision.attributes, None, file, 0, head, head)
-    return tag.with_attributes({"name": f"{collision.attributes['name']}_{index:03d}"}) + whole[head:]
+    own = collision.attributes.get("name")
+    whole = collision.with_attributes({} if own is None else {"name": f"{own}_{index:03d}"})
+    at = mesh.start - collision.end + len(whole)  # the mesh stands behind what has changed
+    return whole[:at] + mesh.with_attributes({"filename": reference}) + whole[at + mesh.end - mesh.start :]
 
 
 def _is_relative(reference: str | None) -> bool:

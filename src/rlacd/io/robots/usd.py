@@ -19,7 +19,7 @@ from rlacd.io.write.usd import require_usd
 ENDINGS = (".usd", ".usda", ".usdc")
 """Of stages that are rewritten."""
 
-SERVER = "rlacd.io.robots.usd_layer:StageRewriter"
+SERVER = "rlacd.io.robots.usd_layer:rewrite"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def colliders_of(mesh: Path) -> Colliders | None:
 
 def encode_layer(
     stage: Colliders, place: Path, decomposed: Callable[[trimesh.Trimesh], Decomposition], *, flat: bool
-) -> tuple[bytes, dict[str, tuple[Decomposition, int]], list[str], list[str]]:
+) -> tuple[bytes, dict[str, Decomposition], list[str], list[str]]:
     """Decompose the meshes that collide, each once at its scale.
 
     Parameters
@@ -84,12 +84,12 @@ def encode_layer(
     Returns
     -------
     tuple of (bytes, dict, list of str, list of str)
-        The layer, the result and the number of hulls of each prim, warnings, and the other files that `flat` names.
+        The layer, the result of each prim, warnings, and the other files that `flat` names.
     """
     blobs, warnings = stage.blobs, list(stage.warnings)
     results: dict[tuple[bytes, bytes, tuple[float, ...]], Decomposition] = {}
     hulls: dict[str, bytes] = {}
-    done: dict[str, tuple[Decomposition, int]] = {}
+    done: dict[str, Decomposition] = {}
     for index, node in enumerate(stage.nodes):
         points, faces, scale = blobs[f"{index}.points"], blobs[f"{index}.faces"], np.array(node["scale"])
         key = points, faces, tuple(node["scale"])
@@ -102,13 +102,13 @@ def encode_layer(
             mesh, shift = required_hull(hull, node["path"], "as USD")
             hulls[f"{index}.{number}.points"] = ((mesh.vertices + shift) / scale).astype("<f4").tobytes()
             hulls[f"{index}.{number}.faces"] = np.asarray(mesh.faces, dtype="<i4").tobytes()
-        done[node["path"]] = results[key], len(results[key])
+        done[node["path"]] = results[key]
     asked = {
         "path": str(stage.source),
         "sublayer": None if flat else Path(os.path.relpath(stage.source, place.absolute().parent)).as_posix(),
         "ending": place.suffix.lower().lstrip("."),
-        "masses": {path: result.report.get("mass") for path, (result, _) in done.items()},
-        "counts": [count for _, count in done.values()],
+        "masses": {path: result.report.get("mass") for path, result in done.items()},
+        "counts": [*map(len, done.values())],
     }
     answer = answer_of(SERVER, stage.source, "USD", asked, hulls)
     return answer.blobs["layer"], done, warnings + answer.values["warnings"], answer.values["files"]

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read.apart import Answered, served
 from rlacd.io.read.usd_stage import check_files, prim_geometry
 from rlacd.io.write.usd import mesh_prim, stage_bytes
-from rlacd.pool import Blobs, Shared, Values
+from rlacd.pool import Blobs, Values
 
 OF_THE_MESH = re.compile(
     r"(Mass|RigidBody|MeshCollision|ConvexHull|ConvexDecomposition|SDFMesh|TriangleMesh|SkelBinding)"
@@ -30,27 +31,13 @@ TO_FRAMES = re.compile(r"physics:body[01]$")
 """Relationships that name where something is, which a mesh still says."""
 
 
-class StageRewriter:
-    """The server of a process that reads colliders and writes layers (see `rlacd.pool.Server`)."""
-
-    def __init__(self, folder: Path) -> None:
-        os.environ["TMPDIR"] = str(folder)  # OpenUSD writes a report of a crash there
-
-    def __call__(self, values: Values, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[Values, dict[str, bytes]]:
-        """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each: over the
-        stage as ``sublayer``, or all in one."""
-        from pxr import Tf
-
-        path = Path(values["path"])
-        try:
-            return _answer(path, values, blobs)
-        except Tf.ErrorException as error:
-            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again") from error
-
-
-def _answer(path: Path, values: Values, blobs: Blobs) -> tuple[Values, dict[str, bytes]]:
+@served
+def rewrite(values: Values, blobs: Blobs) -> Answered:
+    """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each: over the
+    stage as ``sublayer``, or all in one."""
     from pxr import Sdf, Usd
 
+    path = Path(values["path"])
     check_files(path)
     original = Sdf.Layer.FindOrOpen(str(path))
     layer = Sdf.Layer.CreateAnonymous(".usda")

@@ -6,7 +6,7 @@ import os
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,6 @@ from rlacd.io.write.folder import write_folder
 from rlacd.io.write.model import (
     MeshFile,
     Model,
-    check_model_options,
     hollow,
     implausible,
     model_of,
@@ -30,10 +29,10 @@ from rlacd.io.write.model import (
 )
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, hull_target, mesh_folder
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
-from rlacd.options.output import DENSITY, Axis
+from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.result import Result
 
-__all__ = ["FORMATS", "MODELS", "file_stem", "hull_target", "save", "save_hulls", "write_file"]
+__all__ = ["FORMATS", "MODELS", "file_stem", "hull_target", "save", "write_file"]
 
 SIMULATED = (*WITH_MESHES, "usd")
 """Formats whose readers take lengths to be in metres."""
@@ -45,21 +44,8 @@ _PRIMITIVES: dict[str, tuple[PrimitiveKind, ...]] = {
 }
 
 
-@dataclass(frozen=True)
-class Saving:
-    """How to save a decomposition; see `rlacd.Decomposition.save`."""
-
-    file_format: str | None = None
-    density: float = DENSITY
-    mass: float | None = None
-    up: Axis | None = None
-    one_mesh: bool = False
-    keep_input: bool = False
-    scene: bool = False
-
-
 def save(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
-    """Write a decomposition, with the options of `Saving`.
+    """Write a decomposition, with the options of `rlacd.Decomposition.save`.
 
     Raises
     ------
@@ -68,27 +54,24 @@ def save(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
     MissingExtraError
         The format needs an extra that is not installed.
     """
-    asked = Saving(**options)
-    check_model_options(asked.density, asked.up)
-    target = hull_target(
-        path, asked.file_format, one_mesh=asked.one_mesh, keep_input=asked.keep_input, scene=asked.scene
-    )
+    asked = OutputOptions(**options)
+    target = hull_target(path, asked)
     ending = target.path.suffix.lower().lstrip(".")
-    unused = [name for name in ("density", "mass") if getattr(asked, name) != getattr(Saving, name)]
+    unused = [name for name in ("density", "mass") if getattr(asked, name) not in (None, DENSITY)]
     if unused and target.file_format not in SIMULATED:
         warnings.warn(f"{unused[0]} had no effect: {target.path.name} holds no mass", UserWarning, stacklevel=3)
-    if (data := _with_scene(result, target.file_format, ending, asked.keep_input)) is not None:
+    if (data := _with_scene(result, target.file_format, ending, bool(asked.keep_input))) is not None:
         write_file(target.path, data)
         return target.path
     if target.file_format not in MODELS:
-        return save_hulls(result.hulls, path, stem=result.name, file_format=asked.file_format)
-    model = model_of(result, density=asked.density, mass=asked.mass, up=asked.up)
+        return _save_hulls(result.hulls, target, result.name)
+    model = model_of(result, asked)
     if target.file_format in SIMULATED:
         for doubt in (implausible(model), None if asked.mass is not None else hollow(result)):
             if doubt is not None:
                 warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=3)
     if target.file_format in WITH_MESHES:
-        _save_with_meshes(result, replace(model, is_scene=asked.scene), target, asked.one_mesh)
+        _save_with_meshes(result, replace(model, is_scene=bool(asked.scene)), target, bool(asked.one_mesh))
     elif target.file_format == "usd":
         write_file(target.path, function_of("write.usd:encode_usd")(model, ending))
     else:
@@ -137,39 +120,9 @@ def _save_with_meshes(result: Result, model: Model, target: Target, one_mesh: bo
     write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
 
 
-def save_hulls(
-    hulls: Sequence[trimesh.Trimesh],
-    path: str | os.PathLike[str],
-    *,
-    stem: str = "mesh",
-    file_format: str | None = None,
-) -> Path:
-    """Write convex hulls to a file or a folder; see `rlacd.Decomposition.save`.
-
-    Parameters
-    ----------
-    hulls : sequence of trimesh.Trimesh
-        Convex and closed; at least one.
-    path : path-like
-        A file ``*.glb``, ``*.obj``, ``*.ply``, ``*.stl``, or a folder.
-    stem : str
-        Files in a folder are named ``<stem>_000.obj``, ``<stem>_001.obj``, ...
-    file_format : str, optional
-        The format inside a folder.
-
-    Returns
-    -------
-    pathlib.Path
-        Where it was written.
-
-    Raises
-    ------
-    OutputError, OptionError
-        As for `hull_target`, and if the disk fails while writing.
-    """
+def _save_hulls(hulls: Sequence[trimesh.Trimesh], target: Target, stem: str) -> Path:
     if not hulls:
         raise OutputError("there are no hulls to write; decompose a mesh first.")
-    target = hull_target(path, file_format)
     encode = ENCODERS[target.file_format]
     if target.is_folder:
         stem = file_stem(stem)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-import warnings
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -64,8 +63,6 @@ def _scene(mesh: InputMesh, name: str) -> trimesh.Scene:
     content: Any = asset.content
     if asset.path is not None:
         content = looks_of(asset.path, content, asset.extension)
-        if content is None:
-            warnings.warn(f"the looks of {asset.path.name} could not be read, so it is grey", UserWarning, stacklevel=2)
     if content is None or (isinstance(content, trimesh.Scene) and not content.geometry):
         return trimesh.Scene({name: trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)})
     scene = content if isinstance(content, trimesh.Scene) else trimesh.Scene({name: content})

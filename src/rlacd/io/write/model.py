@@ -15,7 +15,6 @@ from rlacd.errors import OutputError
 from rlacd.io.read.conventions import UNITS
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.io.write.single_precision import Triangles, placed_mesh, required_hull
-from rlacd.options.fields import about, checked, read
 from rlacd.options.names import PrimitiveKind
 from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.result import Result
@@ -110,23 +109,20 @@ Shape: TypeAlias = "MeshFile | Primitive"
 """What collides: a mesh file, or a primitive that needs none."""
 
 
-def model_of(result: Result, *, density: float = DENSITY, mass: float | None = None, up: str | None = None) -> Model:
+def model_of(result: Result, asked: OutputOptions) -> Model:
     """Collect everything to be written of a decomposition.
 
     Raises
     ------
     OutputError
         There are no hulls, or the body weighs nothing at this density.
-    OptionError
-        `density` or `mass` is not positive, or `up` is not an axis.
     """
-    density, up = check_model_options(density, up)[0], result.up_axis(up)
-    mass = checked(OutputOptions, "mass", mass)
+    density = DENSITY if asked.density is None else asked.density
     if not result.hulls:
         raise OutputError("there are no hulls to write; decompose a mesh first.")
     of_volume = _mass(result)
-    if mass is not None and of_volume.volume_abs > 0:
-        density = mass / of_volume.volume_abs
+    if asked.mass is not None and of_volume.volume_abs > 0:
+        density = asked.mass / of_volume.volume_abs
     weighed = of_volume.scaled(density)
     if not (0 < weighed.volume_abs < math.inf and np.isfinite(weighed.inertia_abs).all()):
         raise OutputError(
@@ -136,7 +132,7 @@ def model_of(result: Result, *, density: float = DENSITY, mass: float | None = N
     name = printable_name(result.name).replace("::", "_")  # a separator between names in SDF
     if name == "world" or re.fullmatch("__.*__", name):
         name = f"body_{name.strip('_')}"  # simulators reserve those names
-    return Model(name, result.hulls, result.primitives, visual, weighed, up)
+    return Model(name, result.hulls, result.primitives, visual, weighed, result.up_axis(asked.up))
 
 
 def implausible(model: Model) -> str | None:
@@ -179,11 +175,6 @@ PREFERRED = (5e-3, 5.0)
 
 LENGTHS, MASSES = (1e-3, 50.0), (1e-6, 1e6)
 """What is plausible for a body: metres, and kilograms."""
-
-
-def check_model_options(density: float, up: str | None) -> tuple[float, str | None]:
-    """Return both as plain values; raises OptionError unless `density` is positive and `up` an axis or None."""
-    return read(about(OutputOptions, "density").kind, "density", density), checked(OutputOptions, "up", up)
 
 
 def printable_name(name: str) -> str:

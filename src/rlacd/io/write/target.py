@@ -11,8 +11,9 @@ from pathlib import Path
 from rlacd.errors import OptionError, OutputError
 from rlacd.io.read import function_of
 from rlacd.io.write.atomic import output_errors
-from rlacd.options.fields import checked, flag, path_like, read, shown
+from rlacd.options.fields import path_like, read, shown
 from rlacd.options.output import OutputOptions
+from rlacd.options.presets import find_preset
 
 FORMATS = ("glb", "obj", "ply", "stl")
 """Formats of hulls only; also those of the files in a folder."""
@@ -57,52 +58,37 @@ class Target:
     is_folder: bool
 
 
-def hull_target(
-    path: str | os.PathLike[str],
-    file_format: str | None = None,
-    *,
-    one_mesh: bool = False,
-    keep_input: bool = False,
-    scene: bool = False,
-) -> Target:
-    """Interpret `path` as `Decomposition.save` does and check that it can be written to.
-
-    Parameters
-    ----------
-    path : path-like
-        An existing folder, text ending in ``/``, or a name without ending given with a `file_format` is a folder;
-        anything else is one file, its format given by its ending.
-    file_format : str, optional
-        The format of the files in a folder.
-    one_mesh : bool
-        Whether a model has all its hulls in one mesh file; only URDF supports that.
-    keep_input : bool
-        Whether the file holds the input too; only GLB does.
-    scene : bool
-        Whether a model has a floor and a light; only MJCF does.
+def hull_target(path: str | os.PathLike[str], asked: OutputOptions | None = None) -> Target:
+    """Interpret `path` as `Decomposition.save` does and check that it can be written to, with what is asked for.
 
     Raises
     ------
     OutputError
         No permission, or a folder where a file is expected or the reverse.
     OptionError
-        There is no name, or its ending is unknown; `file_format` is unknown, or given for a single file with another
-        ending; or `one_mesh` for anything but URDF,
-        `keep_input` for anything but GLB, or `scene` for anything but MJCF.
+        There is no name, or its ending is unknown; a format is unknown, or given for a single file with another ending;
+        or something is asked for that the format does not know.
     """
-    file_format = checked(OutputOptions, "file_format", file_format)
-    one_mesh = read(flag(), "one_mesh", one_mesh)
-    target = _target(read(path_like(), "path", path), file_format)
-    if one_mesh and target.file_format != "urdf":
-        raise OptionError(f"one_mesh (--one-mesh) works for .urdf files only, not for {target.path}: leave it out.")
-    if read(flag(), "scene", scene) and target.file_format != "mjcf":
-        raise OptionError(f"scene (--scene) works for .xml files (MJCF) only, not for {target.path}: leave it out.")
-    if read(flag(), "keep_input", keep_input) and (target.is_folder or target.path.suffix.lower() != ".glb"):
-        raise OptionError(
-            f"keep_input (--keep-input) works for .glb files only, not for {target.path}: leave it out, or write "
-            "a .glb."
-        )
+    asked = asked or OutputOptions()
+    target = _target(read(path_like(), "path", path), asked.file_format)
+    is_glb = not target.is_folder and target.path.suffix.lower() == ".glb"
+    for name, only, fits in (
+        ("one_mesh", ".urdf", target.file_format == "urdf"),
+        ("scene", ".xml (MJCF)", target.file_format == "mjcf"),
+        ("keep_input", ".glb", is_glb),
+    ):
+        if getattr(asked, name) and not fits:
+            flag = name.replace("_", "-")
+            raise OptionError(f"{name} (--{flag}) works for {only} files only, not for {target.path}: leave it out.")
     return target
+
+
+def file_kind(file_format: str | None, preset: str | None) -> tuple[str, str | None]:
+    """The ending of a file, and its format where one was asked for: by its name, by the preset, or GLB."""
+    if file_format is not None:
+        return f".{ending_of(file_format)}", file_format
+    engine = None if preset is None else find_preset(preset)
+    return (".glb", None) if engine is None else (engine.ending, engine.file_format)
 
 
 def ending_of(file_format: str) -> str:
@@ -117,27 +103,25 @@ def _target(text: str, file_format: str | None) -> Target:
     place = Path(text)
     ending = place.suffix.lower().lstrip(".")
     wanted = None if file_format is None else file_format.lower().lstrip(".")
-    if wanted in MODEL_OF:
-        wanted = MODEL_OF[wanted]
-    if wanted in MODELS:
-        return _model_target(text, wanted)
-    if wanted is not None and wanted not in FORMATS:
-        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
     if wanted is None and ending in MODEL_OF and not text.endswith(SEPARATORS):
-        return _model_target(text, MODEL_OF[ending])
+        wanted = ending
+    if (wanted := MODEL_OF.get(str(wanted), wanted)) in MODELS:
+        return _model_target(text, str(wanted))
+    if wanted not in (None, *FORMATS):
+        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
 
     with output_errors(place):
         is_folder = text.endswith(SEPARATORS) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending)
         if is_folder:
-            _check_folder(place)
+            check_folder(place)
             return Target(place, wanted or FOLDER_FORMAT, is_folder=True)
 
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in (*FORMATS, *MODEL_OF))
-        said = (
-            f"{shown(str(place))}, whose ending is .{ending}" if ending else f"{shown(str(place))}, which has no ending"
+        said = f"whose ending is .{ending}" if ending else "which has no ending"
+        raise OptionError(
+            f"cannot write {shown(str(place))}, {said}; use one of {known}, or end the name with / for a folder."
         )
-        raise OptionError(f"cannot write {said}; use one of {known}, or end the name with / for a folder.")
     if wanted not in (None, ending):
         raise OptionError(
             f"the format {wanted} contradicts the name {shown(str(place))}; give one of the two, or a folder."
@@ -174,7 +158,7 @@ def _model_target(text: str, file_format: str) -> Target:
         function_of("write.usd:require_usd")()
     if file_format in WITH_MESHES:
         check_name(place)
-        _check_folder(mesh_folder(place, file_format))
+        check_folder(mesh_folder(place, file_format))
     return Target(place, file_format, is_folder=False)
 
 
@@ -205,7 +189,8 @@ def checked_place(path: str | os.PathLike[str], what: str, endings: Collection[s
     return place
 
 
-def _check_folder(folder: Path) -> None:
+def check_folder(folder: Path) -> None:
+    """Raise `OutputError` if `folder` cannot be filled, without touching the disk."""
     if folder.is_dir():
         if not os.access(folder, os.W_OK | os.X_OK):
             raise OutputError(

@@ -16,6 +16,8 @@ from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull
 from rlacd.solid.primitive import Primitive
 
+NEEDS_EXTRA = "USD needs an extra: run  pip install 'rlacd[usd]'  and try again."
+
 
 def require_usd() -> None:
     """Raise MissingExtraError, with installation advice, unless USD can be imported."""
@@ -23,7 +25,7 @@ def require_usd() -> None:
         for module in ("pxr", "pxr.UsdPhysics"):
             importlib.import_module(module)
     except ImportError as error:
-        raise MissingExtraError("USD needs an extra: run  pip install 'rlacd[usd]'  and try again.") from error
+        raise MissingExtraError(NEEDS_EXTRA) from error
 
 
 def encode_usd(model: Model, ending: str) -> bytes:
