@@ -106,6 +106,8 @@ ENGINES = {
     "Havok": Engine(("in_havok.mjs",), "@babylonjs/havok", "physx-gpu", is_rough=True),
     "Rapier": Engine(("in_rapier.mjs",), "@dimforge/rapier3d-compat", None),
     "MuJoCo": Engine(("in_mujoco.py",), "mujoco", "mujoco", "xml"),
+    "MJX": Engine(("in_mujoco.py", "mjx"), "jax", "mujoco", "xml", is_rough=True),
+    "MuJoCo Warp": Engine(("in_mujoco.py", "warp"), "mujoco_warp", "mujoco", "xml"),
     "Newton": Engine(("in_newton.py",), "newton", "newton", "usd"),
     "Genesis": Engine(("in_genesis.py",), "genesis", None, "urdf"),
     "Bullet": Engine(("in_bullet.py",), "pybullet", "bullet", "urdf"),
