@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.engines.engines import BALLS, ENGINES, REAL, SLABS, TABLE_HEIGHT, Body, ask, lowest, probes, speed, to_fall
+from tests.engines.engines import BALLS, ENGINES, SLABS, TABLE_HEIGHT, Body, ask, lowest, probes, speed, to_fall
 
 KEPT = 0.01
 """Change of volume, as a share, up to which a probe counts as kept."""
@@ -19,7 +19,7 @@ HEAD = "| engine | file | preset | corners kept | thinnest, mm | corners lost, v
 
 def row(name: str, meshes: Path, folder: Path) -> str:
     engine = ENGINES[name]
-    title, answers = ask(engine, {**to_fall(engine.preset, meshes), "probes": (probes(), [])}, folder)
+    title, answers = ask(engine, {**to_fall(engine, meshes), "probes": (probes(), [])}, folder)
     tried = answers.pop("probes")
     kept = [_kept(tried, index) for index in range(len(tried.given))]
     corners = max((count for count, one in zip(BALLS, kept, strict=False) if one), default=0)
@@ -57,14 +57,12 @@ def _changed(answers: dict[str, Body]) -> str:
 def _rest(answers: dict[str, Body]) -> Sequence[str]:
     if not answers["table"].falls:
         return "–", "–"
-    drops = [(body, body.falls[0]) for name, body in answers.items() if name in ("table", *list(REAL)[:2])]
-    depth = max(abs(lowest(body, ends[0])) for body, ends in drops)
-    stack = answers["table"].falls[1]
-    off = max(abs(end["pose"][2] - index * TABLE_HEIGHT) for index, end in enumerate(stack))
-    return [
-        f"{1000 * far:.1f} mm, {1000 * fast:.1f} mm/s"
-        for far, fast in ((depth, max(speed(ends) for _, ends in drops)), (off, speed(stack)))
-    ]
+    drops = [(body, body.falls[0]) for body in answers.values() if body.falls]
+    said = [(max(abs(lowest(body, ends[0])) for body, ends in drops), max(speed(ends) for _, ends in drops))]
+    for stack in answers["table"].falls[1:]:
+        off = max(abs(end["pose"][2] - index * TABLE_HEIGHT) for index, end in enumerate(stack))
+        said.append((off, speed(stack)))
+    return [*(f"{1000 * far:.1f} mm, {1000 * fast:.1f} mm/s" for far, fast in said), "–"][:2]
 
 
 def main(meshes: Path, wanted: Sequence[str]) -> None:

@@ -68,6 +68,8 @@ class Engine:
         Of the file it reads; empty if it gets the points of hulls.
     is_rough
         Whether it changes hulls a little, whatever its settings.
+    is_slow
+        Whether it compiles for minutes before two bodies can touch: it drops the table alone.
     """
 
     program: tuple[str, ...]
@@ -75,6 +77,7 @@ class Engine:
     preset: str | None
     ending: str = ""
     is_rough: bool = False
+    is_slow: bool = False
 
     @property
     def command(self) -> list[str]:
@@ -106,6 +109,8 @@ ENGINES = {
     "Havok": Engine(("in_havok.mjs",), "@babylonjs/havok", "physx-gpu", is_rough=True),
     "Rapier": Engine(("in_rapier.mjs",), "@dimforge/rapier3d-compat", None),
     "MuJoCo": Engine(("in_mujoco.py",), "mujoco", "mujoco", "xml"),
+    "MJX": Engine(("in_mujoco.py", "mjx"), "jax", "mujoco", "xml", is_rough=True, is_slow=True),
+    "MuJoCo Warp": Engine(("in_mujoco.py", "warp"), "mujoco_warp", "mujoco", "xml"),
     "Newton": Engine(("in_newton.py",), "newton", "newton", "usd"),
     "Genesis": Engine(("in_genesis.py",), "genesis", None, "urdf"),
     "Bullet": Engine(("in_bullet.py",), "pybullet", "bullet", "urdf"),
@@ -158,13 +163,14 @@ def speed(ends: Sequence[Mapping[str, Any]]) -> float:
     return max(abs(part) for end in ends for part in end["velocity"])
 
 
-def to_fall(preset: str | None, meshes: Path | None) -> dict[str, tuple[Decomposition, list[Any]]]:
+def to_fall(engine: Engine, meshes: Path | None) -> dict[str, tuple[Decomposition, list[Any]]]:
     """A table, alone and as a stack of three, and the real meshes, if there are any."""
     drop = {"starts": [[0, 0, DROP]], "seconds": FALL}
     stack = {"starts": [[0, 0, 0.001 + i * (TABLE_HEIGHT + 0.001)] for i in range(3)], "seconds": FALL}
-    bodies = {"table": (decomposed("table", preset, meshes), [drop, stack])}
+    bodies = {"table": (decomposed("table", engine.preset, meshes), [drop] if engine.is_slow else [drop, stack])}
     for index, name in enumerate(REAL if meshes else ()):
-        bodies[name] = decomposed(name, preset, meshes), [drop] if index < 2 else []
+        falls = [drop] if index < 2 and not engine.is_slow else []
+        bodies[name] = decomposed(name, engine.preset, meshes), falls
     return bodies
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -101,6 +104,24 @@ def test_a_process_that_hangs_is_ended(one: LocalPool) -> None:
         one.submit(ask("hang", seconds=0.5)).result()
     assert not psutil.pid_exists(before)
     assert pid(one) != before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_process_ends_by_itself_once_its_time_is_up_and_who_asked_is_gone(tmp_path: Path) -> None:
+    mark = tmp_path / "pid"
+    asking = f"ask('outlive', mark={str(mark)!r}, seconds=0.5)"
+    words = [sys.executable, "-c", f"from tests.pool.test_pool import *; LocalPool(1).submit({asking}).result()"]
+    assert subprocess.run(words, check=False).returncode == -signal.SIGKILL
+    until = time.monotonic() + 60
+    while runs(int(mark.read_text())):
+        assert time.monotonic() < until
+        time.sleep(0.1)
+
+
+def runs(process: int) -> bool:
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return psutil.Process(process).status() != psutil.STATUS_ZOMBIE
+    return False
 
 
 def test_a_process_stays_unless_a_new_one_is_wanted(one: LocalPool) -> None:

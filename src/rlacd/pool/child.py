@@ -2,11 +2,13 @@
 
 Requests come through stdin and answers leave through what stdout was at the start: pipes that every system has. A
 request that crashes, hangs, exhausts memory or makes a library print does so here. The process exits when its parent
-does. A message is a JSON header that names its blobs, then the blobs.
+does or, where a library that hangs holds the interpreter, `LATE` seconds after the limit of its request. A message is a
+JSON header that names its blobs, then the blobs.
 """
 
 from __future__ import annotations
 
+import faulthandler
 import importlib
 import json
 import os
@@ -23,6 +25,9 @@ from rlacd.pool import Blobs, MakeServer, Shared, Values
 
 READY = {"ready": True}
 """Header of the first message, sent when requests may come."""
+
+LATE = 5.0
+"""Seconds after the limit of a request until its process ends itself, should nobody else have done so."""
 
 _LENGTH = struct.Struct("<Q")
 
@@ -98,12 +103,14 @@ def main() -> None:
             shared[header["shares"]] = Shared(blobs, header["key"])
             continue
         shared = {name: shared[name] for name in header["shared"]}
+        faulthandler.dump_traceback_later(min(header["seconds"] + LATE, threading.TIMEOUT_MAX - 1), exit=True)
         try:
             values, files = serve(header["values"], blobs, shared)
         except RlacdError as error:
             send(answers, {"error": [type(error).__name__, str(error)]}, {})
         else:
             send(answers, {"values": values}, files)
+        faulthandler.cancel_dump_traceback_later()
 
 
 if __name__ == "__main__":

@@ -68,7 +68,7 @@ class _Child:
                 send(self.process.stdin, {"shares": name, "key": shared.key}, shared.blobs)
         self.given = {name: shared.key for name, shared in request.shared.items()}
         header = {"shares": "", "values": request.values, "shared": list(request.shared)}
-        send(self.process.stdin, header, request.blobs)
+        send(self.process.stdin, {**header, "seconds": request.limits.seconds}, request.blobs)
 
     def receive(self, until: float, too_late: WorkerDiedError, memory: int) -> Message:
         """Wait for a message; raise EOFError if the process has ended instead."""
