@@ -35,8 +35,8 @@ Changes = Mapping[str, Any]
 Points = list[dict[str, float]]
 """The curves of one run, as in its ``curves.jsonl``."""
 
-RATIOS = (0.01, 0.1, 1.0, 10.0, 100.0)
-"""lambda 1 / lambda 2, as in 4.5.3."""
+RATIOS = (0.1, 10.0, 0.01, 100.0)
+"""lambda 1 / lambda 2 other than 1, as in 4.5.3."""
 
 LARGEST_WEIGHT = 1000.0
 """The larger of the two weights, as in the paper; the ratio determines the smaller one."""
@@ -59,9 +59,10 @@ def _ratio(ratio: float) -> Changes:
 
 ARMS: Mapping[str, Mapping[str, Changes]] = {
     "rewards": {
-        **{f"λ1/λ2 = {ratio:g}": _ratio(ratio) for ratio in RATIOS},
+        "λ1/λ2 = 1": PAPER,
         "without r1": _weights(0.0, LARGEST_WEIGHT),
         "without r2": _weights(LARGEST_WEIGHT, 0.0),
+        **{f"λ1/λ2 = {ratio:g}": _ratio(ratio) for ratio in RATIOS},
         "fewest cuts (not paper)": {"objective": "fewest-cuts"},
     },
     "curves": {

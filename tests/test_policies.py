@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,10 @@ from rlacd.planes.sweep import sweep
 from rlacd.policies import make_policy
 from rlacd.policies.greedy import RandomShortlist, excess_norm, hull_sum
 from rlacd.policies.learned import PROMISING, features_of
+from rlacd.policies.plane_features import FEATURES, plane_features
 
-DOCS = Path(__file__).parent.parent / "docs" / "policies.md"
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs" / "policies.md"
 
 
 def table() -> trimesh.Trimesh:
@@ -97,6 +101,33 @@ def test_the_shipped_policy_sees_the_same_in_a_mirror() -> None:
         component = rlacd.Component(solid)
         seen.append(features_of(component, sweep(component, axis_and_principal(component)), 0.05)[50:75])
     np.testing.assert_allclose(seen[0], seen[1][::-1], atol=0.05)  # equal costs are ranked by their numbers
+
+
+def test_networks_without_hulls_see_the_same_whatever_the_hulls() -> None:
+    pytest.importorskip("torch")
+    from benchmarks.learned.fit import WITHOUT_HULLS
+
+    component = rlacd.Component(hollow_table())
+    scored = sweep(component, axis_and_principal(component))
+    other = replace(scored, hull_below=2 * scored.hull_below, hull_above=3 * scored.hull_above)
+    box = np.ptp(component.box, axis=0)
+    seen, without = (
+        plane_features(s, scored.valid(), times * component.hull.volume, component.volume, box, 0.05)
+        for s, times in ((scored, 1), (other, 2))
+    )
+    changed = np.flatnonzero(~np.isclose(seen, without).all(axis=0))
+    assert set(changed) == set(range(FEATURES)) - set(WITHOUT_HULLS)
+
+
+def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:
+    card = (files("rlacd.policies") / "learned.md").read_text(encoding="utf-8")
+    row = re.search(r"\| concavity 5 %[^|]*\| raw \| ((\S+) \(\S+ to \S+\))", card)
+    assert row
+    fewer = f"{100 * (1 - float(row[2])):.0f} % fewer parts than the best greedy rule"
+    page = (ROOT / "docs" / "what_learning_is_worth.md").read_text(encoding="utf-8")
+    assert f"| greedy-162 | {row[1]} |" in page
+    for text in (page, (ROOT / "README.md").read_text(encoding="utf-8")):
+        assert f"policy leaves {fewer}" in text.replace("`learned`", "policy").replace("\n", " ")
 
 
 @pytest.mark.parametrize("policy", LEARNED)

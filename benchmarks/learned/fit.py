@@ -1,14 +1,15 @@
-"""Fit the networks of `policy="learned"` to labels: `python benchmarks/learned/fit.py LABELS OUT [SEEDS]`.
+"""Fit the networks of `policy="learned"` to labels: `python benchmarks/learned/fit.py LABELS [--out FOLDER]`.
 
 LABELS is the folder that `labels.py` writes. The target is log(parts) less its mean over the component's labelled
 planes; the loss is a Huber loss within components, so that only the order of planes matters. Prints the mean change of
-log(parts) against greedy's plane, five-fold cross-validated by mesh, before it fits to everything.
+log(parts) against greedy's plane, five-fold cross-validated by mesh, before it fits to everything, if there is a folder
+to write to. With `--without-hulls` the networks see nothing of hulls (the paper's 4.5.2).
 """
 
 from __future__ import annotations
 
-import sys
-from dataclasses import dataclass
+import argparse
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,9 @@ from rlacd.policies.plane_features import plane_features
 
 HIDDEN, EPOCHS, RATE, DECAY, DROPOUT, AT_ONCE = (64, 32), 15, 2e-3, 0.1, 0.2, 64
 FOLDS = 5
+
+WITHOUT_HULLS = [8, 10, 11, 12, 15, *range(22, 26), *range(32, 37)]
+"""Features of planes that no hull's volume has a part in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,22 +108,34 @@ def gain(labels: Labels, predicted: NDArray[np.float64], components: NDArray[np.
     return np.array(found)
 
 
-def main() -> None:
-    """Cross-validate, fit and write the networks."""
-    torch.set_num_threads(1)
-    labels, out = read(Path(sys.argv[1])), Path(sys.argv[2])
-    components = np.arange(len(labels.mesh))
-    print(f"{len(labels.parts)} planes of {len(components)} components of {labels.mesh.max() + 1} meshes")
+def cross_validated(labels: Labels) -> NDArray[np.float64]:
+    """`gain` of each component by networks that have not seen its mesh."""
     fold = np.random.default_rng(0).permutation(labels.mesh.max() + 1)[labels.mesh] % FOLDS
     gains = []
     for k in range(FOLDS):
-        networks = [fit(labels, components[fold != k], seed) for seed in range(NETWORKS)]
+        networks = [fit(labels, np.flatnonzero(fold != k), seed) for seed in range(NETWORKS)]
         predicted = np.mean([n(labels.features.astype(np.float32))[:, 0] for n in networks], axis=0)
-        gains.append(gain(labels, predicted, components[fold == k]))
-    every = np.concatenate(gains)
+        gains.append(gain(labels, predicted, np.flatnonzero(fold == k)))
+    return np.concatenate(gains)
+
+
+def main() -> None:
+    """Cross-validate, fit and write the networks."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("labels", type=Path)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--without-hulls", action="store_true")
+    args = parser.parse_args()
+    torch.set_num_threads(1)
+    labels = read(args.labels)
+    if args.without_hulls:
+        labels = replace(labels, features=labels.features[:, WITHOUT_HULLS])
+    print(f"{len(labels.parts)} planes of {len(labels.mesh)} components of {labels.mesh.max() + 1} meshes")
+    every = cross_validated(labels)
     print(f"held out: log(parts) {every.mean():+.4f} +- {every.std() / len(every) ** 0.5:.4f} against greedy's plane")
-    for seed in range(NETWORKS):
-        (out / f"learned_{seed}.npz").write_bytes(fit(labels, components, seed).to_bytes())
+    for seed in range(NETWORKS) if args.out else ():
+        network = fit(labels, np.arange(len(labels.mesh)), seed)
+        (args.out / f"learned_{seed}.npz").write_bytes(network.to_bytes())
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
 """Label planes with the parts that greedy ends in after them.
 
-`python benchmarks/learned/labels.py MESHES OUT CPU_SECONDS`
+`python benchmarks/learned/labels.py MESHES OUT CPU_SECONDS [FIRST]`
 
 For meshes of the split train, trees of cuts are grown, greedily or with a share of random cuts among the ten best. Of
 up to six components of a tree that end in 4 to 60 parts, about nine planes are cut each: greedy's, that of least hull
 sum, good ones apart from each other, and two random ones of the 80 best. Both sides are then completed by greedy, and
 the parts counted. Shards hold eight meshes each; random numbers depend on the shard's number alone, so a run that was
-interrupted goes on where it stopped.
+interrupted goes on where it stopped, and several may begin at different shards, FIRST.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ KINDS = ("concavity", "concavity", "concavity", "navigable")
 MOST, MOST_AFTER = 120, 150
 LEAST_EXCESS = 5.0  # a little simpler than `SIMPLE` of the policy, in the same unit
 
-RUN, SWEEPS = Run(1), SweepCache()
+RUN, SWEEPS, GREEDY = Run(1), SweepCache(), Greedy()
 
 
 def valid_of(s: Sweep) -> NDArray[np.bool_] | None:
@@ -55,12 +55,13 @@ class Explore:
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose a plane."""
+        if self.rng.random() >= self.epsilon:
+            return GREEDY.choose(component, threads)
         s = SWEEPS.of(component)
         if (valid := valid_of(s)) is None:
             return None
         order = np.argsort(np.where(valid, excess_norm(s), np.inf), kind="stable")[: int(valid.sum())]
-        random = self.rng.random() < self.epsilon
-        return s.candidates.plane(int(order[self.rng.integers(min(10, len(order)))] if random else order[0]))
+        return s.candidates.plane(int(order[self.rng.integers(min(10, len(order)))]))
 
 
 def leaves(tree: CutTree, component: Component) -> int:
@@ -97,7 +98,7 @@ def parts_after(component: Component, plane: Plane, criterion: Criterion) -> int
     below, above = component.cut(plane)
     if below is None or above is None:
         return None
-    ends = [CutTree(side, Greedy(), RUN).cut_until(criterion, MOST_AFTER) for side in (below, above)]
+    ends = [CutTree(side, GREEDY, RUN).cut_until(criterion, MOST_AFTER) for side in (below, above)]
     return None if any(left for _, left in ends) else sum(len(done) for done, _ in ends)
 
 
@@ -172,7 +173,7 @@ def main() -> None:
         listed = [r for r in csv.DictReader(file) if r["split"] == "train"]
     listed = [r for r in listed if FACES[0] <= int(r["faces"]) <= FACES[1]]
     names = [listed[i]["file"] for i in np.random.default_rng(7).permutation(len(listed))]
-    number = 0
+    number = int(sys.argv[4]) if len(sys.argv) > 4 else 0
     while time.process_time() < limit:
         path = out / f"{number:05d}.npz"
         if not path.exists():
