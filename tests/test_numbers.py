@@ -170,8 +170,8 @@ RESULTS: list[tuple[str, str, str, str, Callable[[list[dict[str, Any]]], str]]] 
         '{"quality": "fast", "space": [0.05, 0.01]}',
         hulls,
     ),
-    ("docs/physics.md", r"(\d+), 0 \| \d+, \d+ \(", "quick", FAST, hulls),
-    ("docs/physics.md", r", 0 \| \d+, (\d+) \(", "quick", '{"quality": "fast", "primitives": true}', found),
+    ("docs/physics.md", r"(\d+), 0 \| \d+, \d+ \|", "quick", FAST, hulls),
+    ("docs/physics.md", r", 0 \| \d+, (\d+) \|", "quick", '{"quality": "fast", "primitives": true}', found),
     ("docs/guides/primitives.md", r"(\d+) of \d+ parts", "quick", '{"quality": "fast", "primitives": true}', found),
 ]
 
