@@ -35,6 +35,7 @@ RUNS: Parameters = {
     "limit": (600.0, Annotated[float, typer.Option(min=0.01, help="Seconds a method may take for one mesh.")]),
     "memory": (12.0, Annotated[float, typer.Option(min=0.0, help="GB a process may use (Linux); 0: no limit.")]),
     "jobs": (1, Annotated[int, typer.Option(min=1, help="Processes at a time, of one thread each.")]),
+    "threads": (1, Annotated[int, typer.Option(min=1, help="Above 1: do all again with so many, for the wall time.")]),
 }
 """Options of every command that runs methods on meshes: name to default and annotation."""
 
@@ -64,7 +65,7 @@ def experiment(
             with exit_codes():
                 check(**chosen)
                 names = find_meshes(meshes, given["listed"])[: given["first"]]
-                limits = Limits(given["limit"], int(given["memory"] * 2**30), given["jobs"], tasks)
+                limits = Limits(given["limit"], int(given["memory"] * 2**30), given["jobs"], tasks, given["threads"])
                 store = Store(out)
                 try:
                     write(make_page(Bench(meshes, names, store, limits, typer.echo), **chosen), out, name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import statistics
 from collections.abc import Mapping, Sequence
@@ -41,11 +42,12 @@ def compare(
     planes[:ap=N][:ce=N][:no-spatial][:no-principal][:excess|:random|:FILE.npz]
                            the paper's deployment
     """
-    groups = {}
+    settings = {}
     for name in words(methods):
         method = make_method(name)
-        chosen = threshold if threshold is not None and method.setting == "threshold" else None
-        groups[name] = bench.run(name, chosen)
+        is_given = threshold is not None and method.setting == "threshold"
+        settings[name] = (name, threshold if is_given else method.default)
+    groups = bench.run_together(settings)
     page = Page("Side by side", [about(bench)])
     page.add(comparison(groups), "## Mesh by mesh", mesh_by_mesh(groups))
     page.add("## Failures", failures(row for rows in groups.values() for row in rows))
@@ -59,8 +61,19 @@ def about(bench: Bench) -> str:
         f"{len(bench.names)} meshes; {', '.join(versions)}; one thread each, {bench.limits.jobs} at a time, at most "
         f"{bench.limits.seconds:g} s each; {machine()}, Python {platform.python_version()}. Lengths where the longest "
         "side of the input is 2. Distance is the two-sided Hausdorff distance between the input's surface and that of "
-        "the hulls' union. Concavity is decided by bounds on the repaired input inside each hull. CPU seconds are from "
-        "arrays in memory to hulls in memory."
+        "the hulls' union. Concavity is decided by bounds on the repaired input inside each hull. Seconds are from "
+        f"arrays in memory to hulls in memory.{_walls(bench)}"
+    )
+
+
+def _walls(bench: Bench) -> str:
+    """What wall times mean, where they were taken: with how many threads, on how busy a machine."""
+    loads = [row["load"] for row in bench.store.rows() if row.get("load") is not None]
+    if not loads:
+        return ""
+    return (
+        f" Wall seconds were taken on {os.cpu_count()} processors at load averages of {min(loads):.1f} to "
+        f"{max(loads):.1f}, median {statistics.median(loads):.1f}."
     )
 
 
@@ -118,9 +131,18 @@ def _column(rows: Sequence[Row], reference: Sequence[Row]) -> dict[str, str]:
         "CPU s: median, sum": (
             f"{statistics.median(row['cpu'] for row in rows):.2f}, {sum(row['cpu'] for row in rows):.1f}"
         ),
+        **_wall(rows),
         "times as fast, median": "1" if is_first else f"{faster:.3g}",
         "peak MB": f"{max(row['peak_mb'] for row in rows):.0f}",
     }
+
+
+def _wall(rows: Sequence[Row]) -> dict[str, str]:
+    """Wall seconds with threads, where they were taken."""
+    times = [row["wall_threads"] for row in rows if "wall_threads" in row]
+    if len(times) < len(rows):
+        return {}
+    return {f"wall s, {rows[0]['threads']} threads: median, sum": f"{statistics.median(times):.2f}, {sum(times):.1f}"}
 
 
 def mesh_by_mesh(groups: Mapping[str, Sequence[Row]]) -> Table:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,12 +39,15 @@ class Limits:
         Number of concurrent processes.
     tasks : int
         Tasks that a process does before it is replaced. Peak memory is that of its largest so far.
+    threads : int
+        Above 1, each task is done once more with so many threads, for its wall time.
     """
 
     seconds: float = 600.0
     memory: int = 12 * 2**30
     jobs: int = 1
     tasks: int = 1
+    threads: int = 1
 
 
 class Bench:
@@ -84,6 +87,11 @@ class Bench:
         number = make_method(method).default if setting is None else setting
         return self.run_tasks([Task(name, method, number) for name in self.names])
 
+    def run_together(self, settings: Mapping[str, tuple[str, float]]) -> dict[str, list[Row]]:
+        """Run several methods at their settings, by label: mesh by mesh, so that all meet the same machine."""
+        self.run_tasks(Task(name, *pair) for name in self.names for pair in settings.values())
+        return {label: self.run(*pair) for label, pair in settings.items()}
+
     def run_tasks(self, tasks: Iterable[Task]) -> list[Row]:
         """Run unfinished tasks, and return the rows of all tasks in order."""
         tasks = list(tasks)
@@ -103,15 +111,18 @@ class Bench:
         return [found for task in tasks if (found := self.store.get(task)) is not None]
 
     def known(self, task: Task) -> Row | None:
-        """The row of a finished task, unless another version of its tool made it."""
+        """The row of a finished task, unless another version of its tool made it or other threads were timed."""
         row = self.store.get(task)
-        return None if row is None or is_outdated(row) else row
+        is_timed = row is not None and self.limits.threads in (1, row.get("threads", 1))
+        return row if row is not None and is_timed and not is_outdated(row) else None
 
     def _finish(self, task: Task) -> Row:
-        row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting}
+        threads = self.limits.threads
+        row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting, "threads": threads}
         hulls = self.store.hulls_of(task)
-        if self.store.get(task) is not None:
-            hulls.unlink(missing_ok=True)  # made by another version
+        before = self.store.get(task)
+        if before is not None and is_outdated(before):
+            hulls.unlink(missing_ok=True)
         with tempfile.TemporaryDirectory() as folder:
             answer = Path(folder) / "answer.json"
             failure = self._ask(task, hulls, answer)
@@ -119,18 +130,22 @@ class Bench:
                 failure = self._ask(task, hulls, answer)
                 failure = failure and f"measuring: {failure}"
             row |= {"error": failure} if failure else json.loads(answer.read_text(encoding="utf-8"))
+            if threads > 1 and "error" not in row:
+                failure = self._ask(task, hulls, answer, threads)
+                row |= {"error": failure} if failure else json.loads(answer.read_text(encoding="utf-8"))
         if not self._stopping:
             self.store.add(row)
         return row
 
-    def _ask(self, task: Task, hulls: Path, answer: Path) -> str | None:
+    def _ask(self, task: Task, hulls: Path, answer: Path, threads: int = 1) -> str | None:
         """Give a task to a process, which reuses hulls that exist; returns None, or a description of its failure."""
-        child: _Child | None = getattr(self._own, "child", None)
+        own: dict[int, _Child] = self._own.__dict__
+        child = own.get(threads)
         if child is None or child.process.poll() is not None or child.done >= self.limits.tasks:
             if child is not None:
                 child.kill()
                 self._children.discard(child)
-            child = self._own.child = _Child()
+            child = own[threads] = _Child(threads)
             self._children.add(child)
         job = {
             "mesh": str(self.meshes / task.mesh),
@@ -139,6 +154,7 @@ class Bench:
             "memory": self.limits.memory,
             "hulls": str(hulls),
             "answer": str(answer),
+            "threads": threads,
         }
         return child.do(job, self.limits.seconds)
 
@@ -146,10 +162,10 @@ class Bench:
 class _Child:
     """A process that does tasks one after the other, and exits when this one does."""
 
-    def __init__(self) -> None:
+    def __init__(self, threads: int) -> None:
         root = str(Path(__file__).resolve().parents[1])
         path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-        environment = {"OMP_NUM_THREADS": "1", "PYTHONPATH": path}
+        environment = {"OMP_NUM_THREADS": str(threads), "PYTHONPATH": path}
         command = [sys.executable, "-m", "benchmarks.child"]
         self._said = tempfile.TemporaryFile()  # noqa: SIM115
         self.process = start(command, subprocess.PIPE, subprocess.PIPE, self._said, environment)

@@ -50,10 +50,8 @@ def vhacd_set(
     \b
     python -m benchmarks vhacd-set ../shared/meshes/vhacd_set --out RUN
     """
-    groups = {}
-    for word in words(methods):
-        name, setting = _split(word)
-        groups[f"{name} @ {setting:g}"] = bench.run(name, setting)
+    pairs = [_split(word) for word in words(methods)]
+    groups = bench.run_together({f"{name} @ {setting:g}": (name, setting) for name, setting in pairs})
     good = managed(groups)
     lines: list[list[object]] = []
     for label, rows in good.items():
@@ -68,11 +66,13 @@ def vhacd_set(
                     f"{max(row['concavity'] for row in rows):.3f}",
                     f"{statistics.median(overlap):.1%}, {disjoint}",
                     f"{mean(rows, 'cpu'):.2f}",
+                    f"{mean(rows, 'wall_threads'):.2f}" if "wall_threads" in rows[0] else "–",
                 ]
             )
-    lines += [[f"{tool}, published (61 meshes)", *numbers, "", "", ""] for tool, numbers in PUBLISHED.items()]
+    lines += [[f"{tool}, published (61 meshes)", *numbers, "", "", "", ""] for tool, numbers in PUBLISHED.items()]
     count = len(next(iter(good.values()), []))
-    header = [f"{count} meshes", "parts", "concavity", "worst", "overlap: median, meshes without", "CPU s"]
+    wall = f"wall s, {bench.limits.threads} threads"
+    header = [f"{count} meshes", "parts", "concavity", "worst", "overlap: median, meshes without", "CPU s", wall]
     page = Page("V-HACD's set", [about(bench), Table(header, lines)])
     page.add("## Everything else", comparison(groups), "## Mesh by mesh", mesh_by_mesh(groups))
     page.add("## Failures", failures(row for rows in groups.values() for row in rows))

@@ -29,7 +29,7 @@ def main() -> None:
     with step("drawing it"):
         result.picture(picture, up="y")
 
-    print(f"\n{summary(result, 'chair.glb')}")
+    print(f"\n{summary(result, hulls.name)}")
     print(f"\n  input    {mesh}\n  hulls    {hulls}\n  picture  {picture}\n  report   {report}")
     print(f"\nnext: .venv/bin/rlacd view {mesh}")
 

@@ -6,7 +6,6 @@ import contextlib
 import inspect
 import json
 import math
-import re
 import signal
 import subprocess
 import sys
@@ -24,7 +23,7 @@ from benchmarks.deployed import Deployment, decompose_as_deployed
 from benchmarks.methods import make_method, rlacd_options
 from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Store, Task, load_hulls, save_hulls
-from benchmarks.tables import Ratio, Table, common_meshes, fill, ratio_of
+from benchmarks.tables import PLACE, Ratio, Table, common_meshes, fill, ratio_of
 from benchmarks.tuning import CLOSE, next_setting, tune
 from typer.testing import CliRunner
 
@@ -450,10 +449,13 @@ class TestCommands:
         before = (out / "results.jsonl").read_text()
         assert "| decomposed | 2 of 2 |" in run(corpus.app, meshes, "--out", out)
         assert (out / "results.jsonl").read_text() == before
-        page = run(vhacd_set.app, meshes, "--out", out, "--methods", "fast,fast@0.04")
+        page = run(vhacd_set.app, meshes, "--out", out, "--methods", "fast,fast@0.04", "--threads", 2)
         assert "| fast @ 0.05 | 1.5 |" in page
         assert "| fast @ 0.04 |" in page
         assert "VisACD, published" in page
+        assert "| wall s, 2 threads: median, sum |" in page
+        timed = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
+        assert all(row["wall_threads"] > 0 for row in timed if row["threads"] == 2)
 
     @pytest.mark.nightly
     def test_the_papers_tables(self, meshes: Path, tmp_path: Path) -> None:
@@ -508,15 +510,10 @@ class TestCommands:
 
 
 class TestTablesInDocuments:
-    """docs/research/results.md shows tables that commands printed, and no others."""
-
-    def test_every_table_says_where_it_comes_from(self) -> None:
-        document = ROOT / "docs" / "research" / "results.md"
-        if not document.exists():
-            pytest.skip("the archive is not part of this checkout")
-        places = re.compile(r"<!-- \S+\.md, table \d+ -->\n.*?<!-- end -->", re.DOTALL)
-        assert len(places.findall(document.read_text())) > 5
-        assert "|---" not in places.sub("", document.read_text())
+    def test_research_shows_tables_that_commands_printed_and_no_others(self) -> None:
+        document = (ROOT / "research" / "comparison.md").read_text()
+        assert len(PLACE.findall(document)) > 5
+        assert "|---" not in PLACE.sub("", document)
 
     def test_tables_are_put_in_their_place(self, tmp_path: Path) -> None:
         (tmp_path / "quick").mkdir()

@@ -41,6 +41,17 @@ def test_actions_are_pinned_and_have_no_rights_they_do_not_need(workflow: Path) 
     assert "\npermissions: {}\n" in content, "every job states what it may do"
 
 
+def test_what_workflows_run_and_the_metadata_name_exists() -> None:
+    told = "".join(path.read_text(encoding="utf-8") for path in WORKFLOWS)
+    files = set(re.findall(r"tests/[\w/]+\.py", told + text("pyproject.toml")))
+    assert len(files) > 5
+    assert not [name for name in files if not (ROOT / name).is_file()]
+    targets = set(re.findall(r"run: make ([\w-]+)", told))
+    assert targets <= set(re.findall(r"^([\w-]+):", text("Makefile"), re.M))
+    tested = re.search(r"python: \[(.*)\]", told)[1]  # type: ignore[index]
+    assert re.findall(r"Python :: (3\.\d+)", text("pyproject.toml")) == re.findall(r"[\d.]+", tested)
+
+
 def test_the_module_runs_as_the_command() -> None:
     run = subprocess.run([sys.executable, "-m", "rlacd", "--version"], capture_output=True, text=True, timeout=120)
     assert run.stdout == f"rlacd {rlacd.__version__}\n"

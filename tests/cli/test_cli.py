@@ -352,6 +352,12 @@ def test_help_names_every_exit_code_and_version_is_printed() -> None:
     assert rlacd("--version").stdout == f"rlacd {package.__version__}\n"
 
 
+def test_help_speaks_of_its_own_command_only_in_whole_sentences() -> None:
+    assert "..." not in rlacd("--help").output.partition("Commands:")[2]
+    assert "train" not in rlacd("batch", "--help-all").output
+    assert "batch" not in rlacd("train", "--help").output.partition("Exit codes:")[0].replace("--batch", "")
+
+
 def test_help_shows_ten_options_and_help_all_every_one() -> None:
     asked = (rlacd("decompose", word).output for word in ("--help", "--help-all"))
     short, whole = (set(re.findall(r"^  (?:-\w, )?(--[a-z-]+)", text, re.MULTILINE)) for text in asked)

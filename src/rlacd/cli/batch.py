@@ -30,24 +30,24 @@ class BatchOptions:
     Attributes
     ----------
     output
-        A folder, or an address that fsspec knows: s3://bucket/path.
+        Where the results go: a folder, or an address that fsspec knows (s3://bucket/path). Required.
     glob
         Only meshes that match: 'chair_*.obj' in any folder, 'furniture/*' by the whole path.
     fallback
-        Write the convex hull of a mesh that fails.
+        Give a mesh that fails its convex hull.
     folders
-        Write a folder per mesh with one file per hull.
+        Write a folder for each mesh, with a file for each hull.
     redo
         Which meshes to do again: none, those that failed (failed), or all.
     file_format
         The format of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot.
     threads
-        Threads per mesh.
+        Threads for each mesh.
     dry_run
-        List the meshes that would be processed, and write nothing.
+        List the meshes that would be decomposed, and write nothing.
     """
 
-    output: str = option("", flags=("--output", "-o"), metavar="OUT")
+    output: str = option("", flags=("--output", "-o"), metavar="OUT", usual="")
     glob: str = option("**", usual="")
     fallback: bool = option(True, usual="fallback")
     folders: bool = option(False)
@@ -72,10 +72,9 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
       rlacd batch assets/ -o hulls/ --dry-run
       rlacd batch assets/ -o s3://bucket/hulls --ray auto
 
-    A mesh whose process dies, hangs or needs too much memory is given its convex hull, unless a second
-    try succeeds; one that hangs has no second try.
-    OUT/manifest.jsonl records the outcome for each mesh. To resume after an interruption, run the same command again.
-    Ctrl-C once finishes what is running; twice quits at once.
+    A mesh whose process dies or needs too much memory is tried once more. If that fails too, or the mesh takes longer
+    than --limit, it is given its convex hull. OUT/manifest.jsonl records the outcome of each mesh. To resume after an
+    interruption, run the same command again. Ctrl-C once finishes what is running; twice quits at once.
     """
     from rlacd.batch import Batch, JobSpec
 

@@ -15,7 +15,7 @@ from rlacd.plain_json import printable, to_json
 
 
 def _info(mesh: Path, as_json: bool) -> None:
-    """Show what a file contains and how it would be repaired, without decomposing it.
+    """Show what a file contains and how it would be repaired.
 
     \b
     Examples:

@@ -34,12 +34,12 @@ class PoolOptions:
     ray
         Use a Ray cluster: its address, auto, or local.
     limit
-        Time limit for a mesh, or for an episode of a training; after it the process is killed.
+        The longest that one mesh may take; after it the process is killed.
     memory
         Memory limit of a process; 0 means no limit.
     """
 
-    jobs: int | None = option(None, least=0, usual="all cores; train: 1")
+    jobs: int | None = option(None, least=0, usual="all cores")
     ray: str | None = option(None, metavar="ADDRESS")
     limit: float = option(600.0, kind=number(0.1), metavar="SECONDS", usual="600")
     memory: float = option(4.0, kind=number(0.0), metavar="GB", usual="4")

@@ -16,7 +16,7 @@ DEFAULT_PRESET = "two-cores"
 
 
 def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> None:
-    """Train a policy that chooses cuts, by the paper's reinforcement learning.
+    """Train a policy that chooses the cuts.
 
     \b
     Examples:
@@ -26,8 +26,9 @@ def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> 
       rlacd train meshes/ --run run/ --environments 256 --ray auto
       rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
 
-    The run's folder gets the curves, a checkpoint to --resume from, and policy.npz, the best network so far, which
-    decompose takes as --policy. A preset sets all options; those given beside it change it.
+    The training is the reinforcement learning of RL-ACD (Luo et al. 2025); numbers in parentheses are the paper's
+    sections. The run's folder receives the curves, a checkpoint for --resume, and policy.npz, the best network so far,
+    which decompose takes as --policy. A preset sets all options; other options override it.
     """
     where = PoolOptions(**taken(given, PoolOptions))
     options = TrainOptions.preset(preset, **chosen(given))
@@ -48,10 +49,11 @@ COMMAND = Command(
     _train,
     [
         Argument("meshes", "MESHES", "A folder of meshes, of any depth."),
-        Option("--run", "-o", type=click.Path(path_type=Path), required=True, help="A folder for this run."),
+        Option("--run", "-o", type=click.Path(path_type=Path), required=True, help="The folder of this run."),
         Option("--preset", default=DEFAULT_PRESET, show_default=True, help=f"One of {', '.join(PRESETS)}."),
-        Option("--resume", is_flag=True, default=False, help="Go on from the run's last checkpoint."),
-        *options_of(PoolOptions),
+        Option("--resume", is_flag=True, default=False, help="Continue from the run's last checkpoint."),
+        Option("--jobs", type=int, panel="Processes", help="Processes that play episodes.  [default: 1]"),
+        *options_of(PoolOptions, only=("ray", "limit", "memory")),
         *options_of(TrainOptions, note="without a preset: "),
     ],
 )

@@ -21,16 +21,16 @@ CONTROLS = ("threshold", "criterion", "quality", "max_hulls", "open")
 
 
 def _view(mesh: Path, browser: bool, **given: Any) -> None:
-    """Show a mesh and its hulls in the browser, and try thresholds and criteria.
+    """Show a mesh and its hulls in the browser.
 
     \b
     Examples:
       rlacd view chair.glb
       rlacd view chair.glb --threshold 0.02 --port 9000
-      rlacd view chair.glb --no-browser       # tells the address only, e.g. for  ssh -L 8765:localhost:8765
+      rlacd view chair.glb --no-browser       # prints the address only, for ssh -L 8765:localhost:8765
 
-    The page turns, pulls apart and colours the hulls, decomposes anew while you move a slider, and downloads any
-    format. Nothing leaves this machine. Ctrl-C ends it.
+    On the page, rotate the hulls, pull them apart, colour them by error, change thresholds and criteria, and download
+    any format. Nothing leaves this machine. Ctrl-C ends it.
     """
     refuse_stdin(mesh)
     if mesh.suffix.lower() in ROBOTS:

@@ -33,57 +33,57 @@ class TrainOptions:
     finish_reward
         Weight of the reward for finishing, lambda 2 (4.1).
     max_parts
-        Components after which an episode is broken off.
+        Components at which an episode ends.
     rotate
-        Turn each solid about a random axis by 0, 45, 90 or 180 degrees (4.3).
+        Rotate each solid about x, y or z by 0, 45, 90 or 180 degrees (4.3).
     max_faces
-        Leave out meshes with more triangles than this.
+        Skip meshes with more triangles than this.
     encoder
-        What the network sees: the volumes on both sides of each plane, and values it plane by plane; or the paper's
-        pre-trained I2P-MAE of the component, and values all planes at once.
+        What the network sees: sweep, the volumes on both sides of each plane, one plane at a time; or i2p-mae, the
+        paper's pre-trained features of the component, for all planes at once.
     encoder_weights
-        The file of i2p-mae's weights: the published checkpoint.
+        File of the published weights of i2p-mae.
     points
         i2p-mae: points on a component's surface and on its hull (4.1).
     objective
-        What a plane is worth: rewards, its reward and the values of the sides (eq. 8); or fewest-cuts, minus the
-        logarithm of the fewest cuts that any episode needed from there on.
+        What a plane is worth: rewards, its reward plus the values of the two sides (eq. 8); or fewest-cuts, minus the
+        logarithm of the fewest cuts that any episode has needed from there.
     iterations
         Cuts made, each followed by learning (4.1).
     warmup
-        First cuts, made at random without learning (4.1).
+        Random cuts at the start, without learning (4.1).
     epsilon
-        Share of random cuts after them (4.1).
+        Share of random cuts after those (4.1).
     epsilon_decay
-        Factor on it every 1000 cuts (4.1).
+        Factor applied to epsilon every 1000 cuts (4.1).
     replay
-        Transitions kept (4.1).
+        Transitions kept for learning (4.1).
     batch
-        Transitions a gradient step.
+        Transitions for each gradient step.
     learn_every
         Cuts between gradient steps.
     learning_rate
-        Of Adam.
+        Learning rate of Adam.
     target_every
         Gradient steps between copies to the target network.
     temperature
-        Of the soft value, in rewards; 0: the greatest value (eq. 7).
+        Temperature of the soft value, in units of reward; 0 takes the greatest value (eq. 7).
     static_discount
-        What the values of the sides are weighted by: a constant; 0: their share of the hull volume (eq. 9).
+        Constant weight of the values of the two sides; 0 weights them by hull volume (eq. 9).
     seed
         The same seed, meshes and options give the same weights on CPU.
     environments
-        Episodes played side by side; each begins once the one this many before it has been learned from.
+        Episodes played at the same time: episode n begins once episode n - E has been learned from.
     threads
         Threads of the training process.
     device
-        cpu, cuda, or auto: a GPU when there is one.
+        cpu, cuda, or auto: a GPU if there is one.
     log_every
         Cuts between points of the curves.
     validate_every
         Cuts between validations.
     validation
-        Meshes held out for validation; 0: validate with those learned from.
+        Meshes held out for validation; 0 validates on the training meshes.
     checkpoint_seconds
         Seconds between checkpoints.
 

@@ -188,7 +188,7 @@ class Options:
     timeout
         Stop after this time and keep the result so far.
     quality
-        How long to search for fewer hulls: fast does not search, balanced takes about three times as long as fast, best
+        How long to search for fewer hulls: fast does not search, balanced takes two to three times as long, best
         searches until --budget ends.
     budget
         How long the search may take.

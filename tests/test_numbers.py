@@ -1,0 +1,189 @@
+"""Numbers of README and docs are the program's: limits are its constants, results are those of a run today.
+
+Tables of options, presets, exit codes, reports, the gallery and the guides' scripts have tests of their own
+(test_examples.py, test_promises.py). Times and figures of other tools stand beside the command that measures them.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from benchmarks.runner import find_meshes
+
+import rlacd
+from rlacd.batch import assets
+from rlacd.batch.batch import LARGE
+from rlacd.cut import MANY_COMPONENTS
+from rlacd.cut_and_merge import MOST_CUTTING, MOST_MERGING, MOST_PER_FACE
+from rlacd.finish import narrowed, primitives, report
+from rlacd.io.read import apart, contents, open_file, xml
+from rlacd.io.robots import spans
+from rlacd.io.write.model import LENGTHS, MASSES
+from rlacd.merge import grow
+from rlacd.options import Options
+from rlacd.planes.sweep import SLIVER
+from rlacd.policies.greedy import EDGES_PER_COMPONENT
+from rlacd.pool import ProcessLimits
+from rlacd.pool.on_ray import MACHINES
+from rlacd.proxy.simplify import FEW_TRIANGLES
+from rlacd.repair import holes, tangles, work, wraps
+from rlacd.search.neighbourhood import CLUSTER, LEAST_TRIALS
+from rlacd.search.search import BOUNDED_PATIENCE, LEAST_WORK, MOST_WORK, TIMES_FIRST_PASS
+from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.view import connections, server
+
+ROOT = Path(__file__).resolve().parents[1]
+GB = 2**30
+WORDS = {3: "three", 4: "four", 5: "five"}
+ORDINALS = {3: "third", 4: "quarter"}
+HALVES = {0.5: "half"}
+
+
+def page(name: str) -> str:
+    """A page on one line, without emphasis."""
+    text = (ROOT / name).read_text(encoding="utf-8").replace("**", "")
+    return re.sub(r"\s+", " ", text)
+
+
+LIMITS = {
+    "docs/reliability.md": [
+        f"no file over {open_file.LARGEST_FILE // GB} GB",
+        f"within {apart.LIMITS.memory // GB} GB and {apart.LIMITS.seconds / 60:g} minutes",
+        f"at most {contents.MOST_TRIANGLES / 1e6:g} million triangles, {contents.MOST_PLACES:,} instances, "
+        f"{contents.DEEPEST_PART} levels",
+        f"{xml.MOST_MEMBERS:,} members",
+        f"at most {HALVES[spans.MOST_ELEMENTS / 1e6]} a million elements",
+    ],
+    "docs/search.md": [
+        f"may do {TIMES_FIRST_PASS:g} times the work of the first pass, at least {LEAST_WORK / 1e6:g} and at most "
+        f"{MOST_WORK / 1e6:g} million units",
+        f"{WORDS[BOUNDED_PATIENCE]} trials per part (at least {LEAST_TRIALS})",
+        f"at {MOST_CUTTING / 1e6:g} million units and {MOST_PER_FACE} per triangle",
+        f"merging at {MOST_MERGING / 1e6:g} million",
+        f"more than {MANY_COMPONENTS:,} pieces",
+        f"at most {grow.MOST_FACES:,} triangles",
+        f"if a {ORDINALS[1 / grow.CROSSING]} of the parts",
+        f"clusters of {WORDS[CLUSTER]}",
+    ],
+    "docs/repair.md": [
+        f"within {work._WELDS[0] * 1e5:g}·10⁻⁵ (else {work._WELDS[1] * 1e4:g}·10⁻⁴)",
+        f"{2 * HALF_THICKNESS * 1e3:g}·10⁻³ thick",
+        f"over {wraps._CROWD} slabs, or over {wraps._CROSSINGS:,} pairs",
+        f"radius is {100 * Options.gap:g} % of the longest side",
+        f"({100 * holes.HOLE_SHARE:g} % of its area, up to {holes.HOLE:g} away)",
+        f"may have {100 * holes._END:g} % of its area",
+        f"in more than {100 * tangles.TANGLED:g} % of the surface",
+    ],
+    "docs/batch.md": [
+        f"`--memory` ({ProcessLimits().memory // GB} GB)",
+        f"`--limit` ({ProcessLimits().seconds:g} s)",
+        f"over {LARGE / 1e6:g} MB",
+        f"up to {WORDS[MACHINES]} times",
+        f"(`{assets.RESERVED[0]}`)",
+    ],
+    "docs/viewer.md": [
+        f"up to {server.LARGEST_MESH >> 20} MiB",
+        f"{connections.MOST_CONNECTIONS} connections and {connections.MOST_STREAMS} open pages",
+        f"localhost:{server.USUAL_PORT}",
+    ],
+    "docs/reference/report.md": [
+        f"at most {narrowed.MOST_LISTED}: a ball",
+        f"narrower than {50 * 2 * narrowed.NARROWEST:g} % of the longest side or shorter than "
+        f"{50 * narrowed.LEAST_EXTENT:g} % of it",
+        f"at most {report.MOST_HOLES:,}: `body`",
+    ],
+    "docs/policies.md": [
+        f"those of {WORDS[EDGES_PER_COMPONENT]} concave edges",
+        f"more than {MANY_COMPONENTS:,} pieces",
+    ],
+    "docs/training.md": [f"a side thinner than {100 * SLIVER:g} %"],
+    "docs/guides/scans.md": [
+        f"more than {FEW_TRIANGLES:,} triangles",
+        f"more than {report.COVERAGE_TOLERANCE:g} outside",
+    ],
+    "docs/guides/robots.md": [
+        f"smaller than {1e3 * LENGTHS[0]:g} mm or larger than {LENGTHS[1]:g} m",
+        f"lighter than {1e6 * MASSES[0]:g} mg or heavier than {1e-3 * MASSES[1]:,g} t",
+    ],
+    "docs/guides/primitives.md": [
+        f"within a {ORDINALS[1 / (primitives.SIMPLER - 1)]} of the least",
+    ],
+}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_limits_of_a_page_are_those_of_the_program(name: str) -> None:
+    assert [told for told in LIMITS[name] if told not in page(name)] == []
+
+
+@functools.cache
+def measured(corpus: Path, group: str, options: str) -> list[dict[str, Any]]:
+    """The reports of a group of meshes: a list of the corpus, or a folder."""
+    listed = corpus / f"{group}.txt"
+    folder = corpus if listed.is_file() else corpus / group
+    names = find_meshes(folder, listed if listed.is_file() else None)
+    given = json.loads(options)
+    if space := given.pop("space", None):
+        given["criterion"] = rlacd.NavigableSpace(*space)
+    return [rlacd.decompose(folder / name, **given).report for name in names]
+
+
+def hulls(reports: list[dict[str, Any]]) -> str:
+    return f"{sum(report['parts'] for report in reports):,}"
+
+
+def hulls_a_mesh(reports: list[dict[str, Any]]) -> str:
+    return f"{sum(report['parts'] for report in reports) / len(reports):.1f}"
+
+
+def triangles_a_mesh(reports: list[dict[str, Any]]) -> str:
+    return f"{sum(report['faces'] for report in reports) / len(reports):,.0f}"
+
+
+def found(reports: list[dict[str, Any]]) -> str:
+    """How many of the parts became primitives."""
+    return f"{sum(n for report in reports for kind, n in report['primitives'].items() if kind != 'hull'):,}"
+
+
+FAST, DEFAULT = '{"quality": "fast"}', "{}"
+RESULTS: list[tuple[str, str, str, str, Callable[[list[dict[str, Any]]], str]]] = [
+    ("README.md", r"\| hulls \| [\d,]+ \| [\d,]+ \| ([\d,]+) \|", "quick", FAST, hulls),
+    ("README.md", r"\| triangles per mesh \| [\d,]+ \| [\d,]+ \| ([\d,]+) \|", "quick", FAST, triangles_a_mesh),
+    ("README.md", r"\| hulls \| [\d,]+ \| [\d,]+ \| [\d,]+ \| ([\d,]+) \|", "quick", DEFAULT, hulls),
+    ("README.md", r"\| triangles per mesh (?:\| [\d,]+ ){3}\| ([\d,]+) \|", "quick", DEFAULT, triangles_a_mesh),
+    ("docs/benchmarks.md", r"\| `fast` \| ([\d,]+) \| 1 \|", "test", FAST, hulls),
+    ("docs/benchmarks.md", r"\| `test/` \| 181 of 181 \| 0 \| 0 \| ([\d,]+) \|", "test", FAST, hulls),
+    ("docs/benchmarks.md", r"\| `balanced` \(default\) \| ([\d,]+) \|", "test", DEFAULT, hulls),
+    ("docs/benchmarks.md", r"several hulls.*?\| `fast` \| ([\d.]+) \|", "vhacd_set", FAST, hulls_a_mesh),
+    ("docs/benchmarks.md", r"\| rlacd \(default\) \| ([\d.]+) \|", "vhacd_set", DEFAULT, hulls_a_mesh),
+    ("docs/benchmarks.md", r"threshold 0.043 \| ([\d.]+) \|", "vhacd_set", '{"threshold": 0.043}', hulls_a_mesh),
+    (
+        "docs/benchmarks.md",
+        r"`fast` makes ([\d,]+) hulls of the 25 meshes",
+        "quick",
+        '{"quality": "fast", "space": [0.05, 0.01]}',
+        hulls,
+    ),
+    ("docs/physics.md", r"(\d+), 0 \| \d+, \d+ \|", "quick", FAST, hulls),
+    ("docs/physics.md", r", 0 \| \d+, (\d+) \|", "quick", '{"quality": "fast", "primitives": true}', found),
+    ("docs/guides/primitives.md", r"(\d+) of \d+ parts", "quick", '{"quality": "fast", "primitives": true}', found),
+]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("name", "pattern", "group", "options", "statistic"), RESULTS)
+def test_results_of_a_page_are_those_of_today(
+    corpus: Path, name: str, pattern: str, group: str, options: str, statistic: Callable[[list[dict[str, Any]]], str]
+) -> None:
+    assert re.findall(pattern, page(name))[:1] == [statistic(measured(corpus, group, options))]
+
+
+def test_results_of_pages_are_where_the_nightly_test_looks() -> None:
+    for name, pattern, *_ in RESULTS:
+        assert re.search(pattern, page(name)), f"{name} lacks {pattern}"
