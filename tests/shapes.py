@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import trimesh
 from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, Mesh64
 
@@ -52,9 +53,16 @@ def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) ->
     return Manifold.cube(size).translate(lower)
 
 
-def refined(solid: Any, levels: int) -> Any:
-    """The same solid with its faces cut into many coplanar ones."""
-    return solid.refine(levels)
+def is_closed(faces: Ints) -> bool:
+    """Whether every edge is run through as often one way as the other."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = edges[np.lexsort(edges.T)], edges[:, ::-1][np.lexsort(edges[:, ::-1].T)]
+    return np.array_equal(there, back)
+
+
+def trimesh_of(solid: Any) -> trimesh.Trimesh:
+    mesh = from_manifold(solid)
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
 def point_to_triangles(points: Floats, vertices: Floats, faces: Ints) -> Floats:

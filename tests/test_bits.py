@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rlacd.solid.arrays import angles, dots, heights, length
 from rlacd.solid.component import Component
 from tests import bits
 
@@ -79,22 +78,3 @@ def _moments(corners: np.ndarray) -> np.ndarray:
     middles = (corners + np.roll(corners, 1, axis=1)) / 2  # exact for polynomials of degree two
     middles -= np.average(corners.mean(axis=1), weights=area, axis=0)
     return np.einsum("f,fki,fkj->ij", area, middles, middles)
-
-
-def test_products_are_those_of_numpy() -> None:
-    draw = np.random.default_rng(1)
-    points, directions = draw.normal(size=(40, 3)), draw.normal(size=(7, 3))
-    assert heights(points, directions) == pytest.approx(points @ directions.T, abs=1e-14)
-    assert heights(points, directions[0]) == pytest.approx(points @ directions[0], abs=1e-14)
-    assert heights(points[:0], directions).shape == (0, 7)
-    assert dots(points, points[::-1]) == pytest.approx(np.einsum("ij,ij->i", points, points[::-1]), abs=1e-14)
-    assert dots(points, directions[0]) == pytest.approx(points @ directions[0], abs=1e-14)
-    assert length(points[0]) == pytest.approx(np.linalg.norm(points[0]))
-
-
-def test_angles_are_those_of_numpy() -> None:
-    turn = np.concatenate([np.linspace(0, np.pi, 1001), [1e-300, 1e-8, np.pi - 1e-8, np.pi / 2]])
-    for long in (1e-100, 1.0, 1e100):
-        sines, cosines = np.abs(long * np.sin(turn)), long * np.cos(turn)
-        assert angles(sines, cosines) == pytest.approx(np.arctan2(sines, cosines), rel=1e-15, abs=0)
-    assert angles(np.array([0.0, 0.0, 2.0]), np.array([0.0, -1.0, 0.0])) == pytest.approx([0, np.pi, np.pi / 2])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import Hull
+from tests.shapes import is_closed
 
 Surface = tuple[FloatArray, IntArray]
 NOTHING = np.empty((0, 3)), np.empty((0, 3), np.int32)
@@ -38,14 +39,6 @@ def volume(surface: Surface) -> float:
     return _native.mesh_volume(*surface) if len(surface[1]) else 0.0
 
 
-def assert_closed(surface: Surface) -> None:
-    faces = surface[1].astype(np.int64)
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    forth = np.sort(edges[:, 0] * (faces.max() + 1) + edges[:, 1])
-    back = np.sort(edges[:, 1] * (faces.max() + 1) + edges[:, 0])
-    assert np.array_equal(forth, back)
-
-
 def caps_of(side: Surface, normal: tuple[float, float, float], offset: float) -> np.ndarray:
     """Corners [T, 3, 3] of the triangles in a plane."""
     corners = side[0][side[1]]
@@ -66,7 +59,7 @@ def test_a_solid_that_overlaps_itself_is_cut_like_its_bodies_one_by_one(seed, nu
         assert volume(side) == pytest.approx(sum(own), abs=1e-9)
         if not len(side[1]):
             continue
-        assert_closed(side)
+        assert is_closed(side[1])
         a, b, c = np.moveaxis(caps_of(side, normal, 0.05), 1, 0)
         sizeable = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-6
         if sizeable.any():
@@ -84,7 +77,7 @@ def test_cuts_follow_cuts_without_piling_up_vertices(seed) -> None:
         normal = random.normal(size=3)
         normal /= np.linalg.norm(normal)
         surface = cut(surface, tuple(normal.tolist()), 0.25)[0]
-        assert_closed(surface)
+        assert is_closed(surface[1])
     assert len(surface[1]) < 10 * size
 
 
@@ -98,6 +91,6 @@ def test_films_that_coincide_are_closed(offset) -> None:
         sides = cut(surface, (0.0, 0.0, 1.0), offset)
         for side in sides:
             if len(side[1]):
-                assert_closed(side)
+                assert is_closed(side[1])
         assert volume(sides[0]) == pytest.approx(2 * offset, abs=1e-9)
         assert volume(sides[1]) == pytest.approx(2 - 2 * offset, abs=1e-9)

@@ -18,36 +18,12 @@ def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)
     return Component(Manifold.cube((x, y, z)).translate(at))
 
 
-def test_cut_keeps_the_volume() -> None:
-    component = Component(Manifold.sphere(1, 48))
-    below, above = component.cut(Plane((0.6, 0.0, 0.8), 0.3))
-    assert below is not None
-    assert above is not None
-    assert below.volume + above.volume == pytest.approx(component.volume)
-    assert (below.vertices @ [0.6, 0, 0.8]).max() == pytest.approx(0.3)
-
-
-def test_cut_that_misses_leaves_one_side() -> None:
-    below, above = box(1, 1, 1).cut(Plane((1.0, 0.0, 0.0), 2.0))
-    assert below is not None
-    assert above is None
-
-
 def test_cavities_stay_in_the_piece_around_them() -> None:
     hollow = Manifold.sphere(1, 32) - Manifold.sphere(0.5, 32)
     solid = Component(hollow + Manifold.cube((1, 1, 1)).translate((2, 0, 0)))
     pieces = sorted(solid.pieces(), key=lambda piece: piece.volume)
     assert len(pieces) == 2
     assert pieces[1].volume == pytest.approx(hollow.volume())
-
-
-def test_principal_axes_follow_a_rotation() -> None:
-    solid = Manifold.cube((3, 2, 1), True)
-    assert np.abs(Component(solid).principal_axes) == pytest.approx(np.eye(3), abs=1e-9)
-    turned = Component(solid.rotate((0, 0, 30)))
-    assert np.abs(turned.principal_axes[0]) == pytest.approx([np.cos(np.pi / 6), 0.5, 0], abs=1e-9)
-    axes = turned.principal_axes
-    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-9)
 
 
 def test_candidates_are_the_papers_150() -> None:

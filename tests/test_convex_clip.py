@@ -12,6 +12,7 @@ from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
+from tests.shapes import is_closed
 
 
 def solids() -> dict[str, trimesh.Trimesh]:
@@ -50,12 +51,6 @@ def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
             if hull is not None:
                 found.append(hull)
     return found
-
-
-def is_closed(faces: np.ndarray) -> bool:
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there, back = (np.unique(e, axis=0, return_counts=True) for e in (edges, edges[:, ::-1]))
-    return len(there[0]) == len(back[0]) and all((a == b).all() for a, b in zip(there, back, strict=True))
 
 
 @pytest.mark.slow

@@ -40,13 +40,6 @@ def test_coordinates_whose_squares_overflow_are_refused(unit: float) -> None:
         _native.Surface(vertices / unit, faces).closest(vertices)
 
 
-def test_a_point_that_is_no_number_is_refused() -> None:
-    vertices, faces = triangles(1)
-    vertices[3, 1] = np.nan
-    with pytest.raises(ValueError, match="not finite"):
-        _native.Surface(vertices, faces)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "step"), [(12, "slab"), (60, "wrapped")])
 def test_sheets_that_all_cross_are_wrapped_when_they_are_many(count: int, step: str) -> None:

@@ -132,24 +132,6 @@ def test_joint_hull_volumes() -> None:
         _native.joint_hull_volumes(hulls, np.array([[0, 3]], dtype=np.int32), 1)
 
 
-def test_same_bits_every_time() -> None:
-    points = np.random.default_rng(2).normal(size=(500, 3))
-    first, second = (_native.convex_hull(points) for _ in range(2))
-    assert np.array_equal(first[0], second[0])
-    assert np.array_equal(first[1], second[1])
-
-
-@pytest.mark.nightly
-def test_hull_of_real_meshes(corpus) -> None:
-    import trimesh
-
-    for path in sorted((corpus / "test" / "vhacd").glob("*.ply"))[:25]:
-        points = np.asarray(trimesh.load(path, process=False).vertices, dtype=np.float64)
-        hull = Hull.of(points)
-        assert hull is not None
-        assert hull.volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
-
-
 @pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
 def test_points_that_are_not_finite_are_refused(bad: float) -> None:
     """Predicates that decide about infinity once led the kernel astray, out of its own memory."""

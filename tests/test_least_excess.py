@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +11,10 @@ from hypothesis import strategies as st
 from manifold3d import Manifold
 
 from rlacd import _native
-from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import Candidates, axis_and_principal
 from rlacd.planes.sweep import SLIVER, SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep
-from rlacd.policies import SCORES, Greedy
+from rlacd.policies import SCORES
 from rlacd.policies.greedy import excess_norm, hull_sum
-from rlacd.repair.repair import repair
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from tests.test_sweep import SOLIDS, crowded_pyramid, finned_tetrahedron, gear
@@ -59,28 +56,6 @@ def test_it_is_so_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray
     candidates = axis_and_principal(component)
     swept = sweep(component, candidates)
     assert least_excess(component, candidates, EXPONENTS["excess_norm"]) == cheapest(swept, excess_norm(swept))
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("score", EXPONENTS)
-def test_it_is_so_all_the_way_down_real_meshes(corpus: Path, score: str) -> None:
-    names = ("kenney_cc0", "quaternius_cc0", "kaykit_cc0")
-    files = [sorted((corpus / "train" / name).glob("*.*"))[7] for name in names]
-    greedy = Greedy(score.replace("_", "-"))
-    cuts = 0
-    for file in files:
-        frontier = [Component(repair(load_mesh(file)).manifold)]
-        for _ in range(3):
-            sides: list[Component] = []
-            for component in frontier:
-                swept = SweepCache().of(component)
-                plane = greedy.choose(component)
-                assert plane == cheapest(swept, COSTS[score](swept))
-                if plane is not None and component.hull.volume > 1.01 * component.volume:
-                    sides += [side for side in component.cut(plane) if side is not None]
-                    cuts += 1
-            frontier = sides
-    assert cuts > 10
 
 
 @st.composite
@@ -148,13 +123,6 @@ def test_no_planes_no_choice() -> None:
     assert least_excess(Component(gear()), Candidates(np.zeros((0, 3)), np.zeros((0, 1))), 1.0) is None
 
 
-def test_the_same_plane_for_any_number_of_threads() -> None:
-    component = Component(gear().rotate((3, 5, 7)))
-    candidates = SweepCache().candidates(component)
-    planes = {least_excess(component, candidates, 1.3, threads) for threads in (1, 2, 5, 16)}
-    assert len(planes) == 1
-
-
 def ask(vertices: FloatArray, offsets: list[float], exponent: float = 1.3, tie: float = 0.0) -> int:
     faces = Component(gear()).faces
     return _native.find_least_excess(
@@ -177,13 +145,3 @@ def test_what_makes_no_sense_is_refused() -> None:
         ask(vertices, [0.2], tie=-1.0)
     with pytest.raises(ValueError, match="not finite"):
         ask(np.where(vertices == vertices.max(), np.nan, vertices), [0.2])
-
-
-def test_a_solid_cut_through_a_convex_part_is_no_better_than_its_waist() -> None:
-    balls = Manifold.sphere(0.5, 32).translate((-1, 0, 0)) + Manifold.sphere(0.5, 32).translate((1, 0, 0))
-    dumbbell = Component(balls + Manifold.cylinder(2, 0.1, 0.1, 16, True).rotate((0, 90, 0)))
-    for exponent in (1.0, 1.3, math.inf):
-        plane = least_excess(dumbbell, axis_and_principal(dumbbell), exponent)
-        assert plane is not None
-        assert plane.normal == (1.0, 0.0, 0.0)
-        assert abs(plane.offset) < 0.7

@@ -78,18 +78,6 @@ def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
     assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
 
 
-def test_same_result_for_any_number_of_workers() -> None:
-    ring = Manifold.cylinder(0.3, 1, 1, 40, True) - Manifold.cylinder(1, 0.8, 0.8, 40, True)
-    parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0.1), 0.0) for a in np.linspace(0, 3, 6)))
-    results = []
-    for count in (1, 3):
-        with Run(count) as pool:
-            results.append(merge_parts(parts, Concavity(0.05), pool))
-    assert len(results[0]) == len(results[1])
-    for a, b in zip(*results, strict=True):
-        assert np.array_equal(a.hull.vertices, b.hull.vertices)
-
-
 class Counting(Navigable):
     """Counts what it is asked."""
 

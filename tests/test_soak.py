@@ -16,7 +16,7 @@ from fuzz import soak
 from fuzz.cases import case_of, inputs, minimised, try_case
 from fuzz.faults import Fault, Run, complaints, left_behind
 from fuzz.recipes import Shape
-from fuzz.trials import KINDS, Laboratory, Trial
+from fuzz.trials import Laboratory, Trial
 
 CASES = sorted((Path(__file__).parent / "cases").glob("*.json"))
 
@@ -41,10 +41,6 @@ def test_what_was_found_stays_mended(path: Path, laboratory: Laboratory) -> None
     assert trial.is_well, trial.said
 
 
-def test_shares_of_trials_add_up() -> None:
-    assert sum(KINDS.values()) == pytest.approx(1)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["file", "shape"])
 def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) -> None:
@@ -52,13 +48,6 @@ def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) ->
     one, two = (laboratory.trial(number) for _ in range(2))
     assert one.is_well, one.said
     assert replace(one, cpu=0) == replace(two, cpu=0)
-
-
-@pytest.mark.slow
-def test_a_command_under_a_fault_is_a_trial(laboratory: Laboratory) -> None:
-    trial = laboratory.trial(first_of(laboratory, "fault"))
-    assert trial.is_well, trial.said
-    assert trial.counts["faults"] == 1
 
 
 class Pretended:
@@ -91,14 +80,6 @@ def test_a_case_is_made_small_and_is_tried_as_it_stands() -> None:
     shape, _ = inputs(pretended, again)
     assert (shape.vertices == pretended.sought).all()
     assert try_case(pretended, again).end == "wrong"
-
-
-def test_every_option_survives_the_way_through_a_case(laboratory: Laboratory) -> None:
-    for number in range(200):
-        shape, options = laboratory.shape(number) if laboratory.kind(number) == "shape" else (None, {})
-        if shape is not None:
-            case = json.loads(json.dumps(case_of(Trial(0, number, "shape", options=options))))
-            assert inputs(laboratory, case)[1] == options
 
 
 def test_a_soak_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:

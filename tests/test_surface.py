@@ -47,29 +47,6 @@ def test_needles_are_as_near_as_their_edges(width: float) -> None:
     np.testing.assert_allclose(surface.distance(points), np.linalg.norm(points - on_segment, axis=1), atol=width + 1e-8)
 
 
-@pytest.mark.nightly
-def test_distance_to_real_meshes(corpus: Path) -> None:
-    rng = np.random.default_rng(0)
-    for name in (corpus / "quick.txt").read_text().split():
-        mesh = trimesh.load(corpus / name, process=False)
-        vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
-        vertices = 2 * (vertices - mesh.bounds.mean(axis=0)) / mesh.extents.max()
-        faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-        points = np.vstack([rng.uniform(-1.2, 1.2, (8, 3)), vertices[rng.integers(len(vertices), size=4)]])
-        surface = _native.Surface(vertices, faces)
-        np.testing.assert_allclose(surface.distance(points), point_to_triangles(points, vertices, faces), atol=1e-7)
-
-
-def test_results_do_not_depend_on_threads() -> None:
-    mesh = from_manifold(box((0, 0, 0), (1, 1, 1)).refine(20))
-    points = np.random.default_rng(0).uniform(-1, 2, (5000, 3))
-    surface = _native.Surface(mesh.vertices, mesh.faces)
-    assert surface.distance(points, threads=1).tobytes() == surface.distance(points, threads=5).tobytes()
-    assert surface.winding(points, threads=1).tobytes() == surface.winding(points, threads=5).tobytes()
-    for one, many in zip(surface.closest(points, threads=1), surface.closest(points, threads=5), strict=True):
-        assert one.tobytes() == many.tobytes()
-
-
 def test_winding_tells_inside_from_outside() -> None:
     mesh = from_manifold(box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)))
     points = np.random.default_rng(0).uniform(-1.5, 1.5, (4000, 3))

@@ -9,10 +9,10 @@ from manifold3d import Manifold, Mesh64
 from scipy.spatial import ConvexHull, QhullError
 
 from rlacd import _native
-from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd.planes.candidates import axis_and_principal
 from rlacd.planes.sweep import sweep
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.component import Component, Plane
+from rlacd.solid.component import Component
 from rlacd.solid.manifold import to_manifold
 
 
@@ -139,33 +139,6 @@ def test_planes_that_miss_or_shave_are_invalid() -> None:
     assert valid[1].all()
     assert not valid[2, 0], "a slice of 1/26 of the height is thinner than 2 % of the plate"
     assert valid[2, 12]
-
-
-def test_same_bits_for_any_number_of_threads() -> None:
-    component = Component(gear().rotate((3, 5, 7)))
-    candidates = axis_and_principal(component)
-    one, many = (
-        _native.sweep(component.vertices, component.faces, candidates.directions, candidates.offsets, threads)
-        for threads in (1, 5)
-    )
-    assert np.array_equal(one, many)
-
-
-def test_rows_of_equal_directions_share_a_sweep() -> None:
-    component = Component(gear())
-    grid = axis_and_principal(component)
-    extra = Candidates(np.eye(3)[[2, 0, 2, 0]], np.array([[0.4], [0.3], [0.15], [0.4]]))
-    joined = Candidates.joined(grid, extra)
-    assert [joined.plane(i) for i in (0, 40, 150, 153)] == [
-        grid.plane(0),
-        grid.plane(40),
-        Plane((0.0, 0.0, 1.0), 0.4),
-        Plane((1.0, 0.0, 0.0), 0.4),
-    ]
-    together, apart = sweep(component, joined), (sweep(component, grid), sweep(component, extra))
-    for scores in ("hull_below", "hull_above", "solid_below", "section_area", "thickness_above", "extent_below"):
-        expected = np.concatenate([getattr(part, scores) for part in apart])
-        assert getattr(together, scores) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("offsets", [[0.5, 0.2], [0.2, np.nan], [np.inf, np.inf]])

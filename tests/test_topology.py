@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
@@ -16,9 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.repair.union import to_arrays, unite, volume_of
+from rlacd.repair.union import unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.manifold import to_manifold
 from rlacd.solid.topology import (
     Edges,
     bodies_of,
@@ -211,26 +208,6 @@ def test_separate_fans_have_a_vertex_each() -> None:
     assert found[4]
 
 
-@pytest.mark.slow
-def test_a_closed_body_is_taken_as_manifold3d_would_take_it(corpus: Path) -> None:
-    taken = 0
-    for name in (corpus / "quick.txt").read_text().split():
-        source = load_mesh(corpus / name)
-        solid = repair(source, threads=1)
-        vertices, faces = solid.surface
-        if isinstance(solid.shape, Manifold) or len(solid.bodies) > 1 or len(faces) != len(solid.faces):
-            continue
-        outward = faces[:, ::-1] if solid.bodies[0].step == "reoriented" else faces
-        expected = to_arrays(to_manifold(vertices, outward.astype(np.int64)))
-        assert np.array_equal(solid.vertices, expected[0])
-        assert np.array_equal(solid.faces, expected[1])
-        there = to_arrays(solid.manifold)
-        assert np.array_equal(there[0], solid.vertices)
-        assert np.array_equal(there[1], solid.faces)
-        taken += 1
-    assert taken >= 5
-
-
 @pytest.mark.parametrize("sliver", [1e-13, 1e-11])
 def test_a_mesh_that_manifold3d_would_change_is_left_to_it(sliver: float) -> None:
     ball = trimesh.creation.icosphere(2)
@@ -265,39 +242,6 @@ def test_mass_of_closed_meshes(name: str) -> None:
     np.testing.assert_allclose(inertia, expected.inertia, atol=1e-10)
 
 
-def test_dense_folds_are_no_reason_to_leave_a_mesh_to_manifold3d() -> None:
-    ball = trimesh.creation.icosphere(5)
-    rng = np.random.default_rng(1)
-    vertices = np.asarray(ball.vertices) + rng.normal(0, 0.02, (len(ball.vertices), 3))  # as long as edges: faces fold
-    solid = repair(InputMesh(vertices, np.asarray(ball.faces, dtype=np.int64), "ball", ()))
-    assert not isinstance(solid.shape, Manifold)
-    expected = to_arrays(to_manifold(solid.surface[0], solid.surface[1].astype(np.int64)))
-    assert np.array_equal(solid.vertices, expected[0])
-    assert np.array_equal(solid.faces, expected[1])
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_cavities_and_what_stands_in_them_are_filled(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    solids, filled = [], []
-    for place in range(3):
-        solid = Manifold.sphere(2, 24).translate((5.0 * place, 0, 0))
-        filled.append(solid)
-        for side in (-1, 1)[: rng.integers(0, 3)]:
-            inside = (5.0 * place + side, *rng.uniform(-0.1, 0.1, 2))
-            solid -= Manifold.sphere(0.6, 16).translate(inside)
-            if rng.integers(2):
-                solid += Manifold.cube((0.2, 0.2, 0.2), center=True).translate(inside)
-        solids.append(solid)
-    united = unite(solids)
-    vertices, faces = to_arrays(united)
-    expected = Manifold.batch_boolean(filled, OpType.Add)
-    assert volume_of(united) == pytest.approx(expected.volume())
-    assert len(faces) == expected.num_tri()
-    assert len(vertices) == expected.num_vert()
-    assert volume_of(unite(solids, keep_cavities=True)) == pytest.approx(sum(solid.volume() for solid in solids))
-
-
 def test_films_on_closed_bodies_get_vertices_of_their_own() -> None:
     box = shapes()["two"].split()[0]
     vertices = np.concatenate([np.asarray(box.vertices, dtype=float), box.vertices[box.faces[0, :1]] + 1.0])
@@ -323,21 +267,6 @@ def test_windings_decide_where_rounding_folds_a_closed_surface() -> None:
     rounded = np.asarray(body.vert_properties[:, :3], dtype=np.float32).astype(float)
     exact, solid = Manifold(body).volume(), repair(load_mesh((rounded, body.tri_verts)))
     assert solid.manifold.volume() / solid.frame.scale**3 == pytest.approx(exact, rel=2e-3)
-
-
-def test_a_scan_with_holes_closed_is_taken_as_manifold3d_would_take_it() -> None:
-    ball = trimesh.creation.icosphere(4)
-    bumpy = ball.vertices * (1 + 0.01 * np.random.default_rng(0).normal(size=(len(ball.vertices), 1)))
-    kept = np.ones(len(ball.faces), dtype=bool)
-    kept[[3, 700, 701]] = False
-    solid = repair(InputMesh(bumpy, ball.faces[kept][:, ::-1].astype(np.int64), "ball", ()), threads=1)
-    assert [body.step for body in solid.bodies] == ["capped"]
-    assert not isinstance(solid.shape, Manifold)
-    assert len(solid.faces) == len(ball.faces)
-    expected = to_arrays(to_manifold(solid.vertices, solid.faces))
-    assert np.array_equal(solid.vertices, expected[0])
-    assert np.array_equal(solid.faces, expected[1])
-    assert solid.manifold.volume() > 0
 
 
 @pytest.mark.parametrize("seed", range(3))
