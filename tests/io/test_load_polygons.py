@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import struct
 from pathlib import Path
@@ -220,19 +219,6 @@ def test_edges_points_and_very_long_outlines() -> None:
     angles = np.linspace(0, 2 * np.pi, count, endpoint=False)
     comb = np.c_[radii * np.cos(angles), radii * np.sin(angles), np.zeros(count)]
     assert len(triangles_of(comb, np.array([count]), np.arange(count))) == count - 2
-
-
-@settings(max_examples=150, deadline=None)
-@given(kind=st.sampled_from(sorted(WRITERS)), data=st.data())
-def test_damaged_polygons_are_refused_or_read(tmp_path_factory, kind, data) -> None:
-    content = bytearray(WRITERS[kind](prism(L, first=3)))
-    for _ in range(data.draw(st.integers(1, 4))):
-        place = data.draw(st.integers(0, len(content) - 1))
-        content[place] = data.draw(st.one_of(st.integers(0, 255), st.sampled_from(b"0123456789-/ \n#\\ef.")))
-    path = tmp_path_factory.mktemp("damaged") / f"l.{kind}"
-    path.write_bytes(bytes(content[: data.draw(st.integers(1, len(content)))]))
-    with contextlib.suppress(MeshError):
-        load_mesh(path)
 
 
 @pytest.mark.parametrize("order", ["", "<", ">"])

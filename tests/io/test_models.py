@@ -45,14 +45,20 @@ def assert_stands(rest: Rest, result: Decomposition, density: float = 1000.0) ->
 # --- simulators -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.promise("simulators")
-def test_mujoco_simulates_mjcf(tmp_path: Path, wooden: Decomposition) -> None:
-    assert_stands(fall_in_mujoco(wooden.save(tmp_path / "table.xml")), wooden)
+FALLS = [(fall_in_mujoco, "xml"), (fall_in_bullet, "urdf"), (fall_in_drake, "sdf"), (fall_in_drake, "urdf")]
 
 
+@pytest.mark.parametrize(("fall", "ending"), FALLS)
 @pytest.mark.promise("simulators")
-def test_bullet_simulates_urdf(tmp_path: Path, wooden: Decomposition) -> None:
-    assert_stands(fall_in_bullet(wooden.save(tmp_path / "table.urdf")), wooden)
+def test_a_table_stands_in_every_simulator(tmp_path: Path, wooden: Decomposition, fall: Any, ending: str) -> None:
+    assert_stands(fall(wooden.save(tmp_path / f"table.{ending}")), wooden)
+
+
+def test_mujoco_reads_urdf_too(tmp_path: Path, wooden: Decomposition) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    model = mujoco.MjModel.from_xml_path(str(wooden.save(tmp_path / "table.urdf")))
+    assert int(model.geom_contype.astype(bool).sum()) == len(wooden)
+    assert model.ngeom == len(wooden) + 1, "the hulls and what is seen"
 
 
 def test_bullet_reads_the_objects_of_one_mesh_as_hulls(tmp_path: Path, wooden: Decomposition) -> None:
@@ -76,20 +82,6 @@ def test_bullet_reads_the_objects_of_one_mesh_as_hulls(tmp_path: Path, wooden: D
         assert gaps[1] < 0
     finally:
         bullet.disconnect(client)
-
-
-@pytest.mark.promise("simulators")
-def test_drake_simulates_sdf(tmp_path: Path, wooden: Decomposition) -> None:
-    assert_stands(fall_in_drake(wooden.save(tmp_path / "table.sdf")), wooden)
-
-
-def test_mujoco_and_drake_read_urdf_too(tmp_path: Path, wooden: Decomposition) -> None:
-    path = wooden.save(tmp_path / "table.urdf")
-    assert_stands(fall_in_drake(path), wooden)
-    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
-    model = mujoco.MjModel.from_xml_path(str(path))
-    assert int(model.geom_contype.astype(bool).sum()) == len(wooden)
-    assert model.ngeom == len(wooden) + 1, "the hulls and what is seen"
 
 
 def test_yourdfpy_reads_urdf(tmp_path: Path, wooden: Decomposition) -> None:
@@ -202,9 +194,8 @@ def test_any_name_goes_in_every_format(tmp_path: Path, wooden: Decomposition) ->
     folder = tmp_path / "ein Ordner – 机"
     folder.mkdir()
     odd = renamed(wooden, AWKWARD)
-    assert_stands(fall_in_mujoco(odd.save(folder / "Tisch 机 50%&#1.xml")), wooden)
-    assert_stands(fall_in_bullet(odd.save(folder / "Tisch 机 50%&#1.urdf")), wooden)
-    assert_stands(fall_in_drake(odd.save(folder / "Tisch 机 50%&#1.sdf")), wooden)
+    for fall, ending in FALLS:
+        assert_stands(fall(odd.save(folder / f"Tisch 机 50%&#1.{ending}")), wooden)
 
 
 @pytest.mark.parametrize("name", ["world", "main", "visual", "collision", "a::b", "__model__", "0", "ground"])
