@@ -53,6 +53,12 @@ def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) ->
     return Manifold.cube(size).translate(lower)
 
 
+def table() -> trimesh.Trimesh:
+    """A top of 2 x 1 on four legs at its corners."""
+    legs = [Manifold.cube((0.1, 0.1, 1)).translate((x, y, 0)) for x in (0, 1.9) for y in (0, 0.9)]
+    return trimesh_of(sum(legs, Manifold.cube((2, 1, 0.1)).translate((0, 0, 1))))
+
+
 def is_closed(faces: Ints) -> bool:
     """Whether every edge is run through as often one way as the other."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import inspect
 import json
 import math
-import re
 import signal
 import subprocess
 import sys
@@ -15,6 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import psutil
 import pytest
 import trimesh
 from benchmarks import compare, corpus, paper, tables, tuning, vhacd_set
@@ -25,12 +24,14 @@ from benchmarks.methods import make_method, rlacd_options
 from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Store, Task, load_hulls, save_hulls
 from benchmarks.tables import Ratio, Table, common_meshes, fill, ratio_of
+from benchmarks.training import ARMS, LARGEST_WEIGHT, _options, train_arms
 from benchmarks.tuning import CLOSE, next_setting, tune
 from typer.testing import CliRunner
 
 import rlacd
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from tests.shapes import box, from_manifold
+from rlacd.learn.options import PRESETS
+from tests.shapes import box, from_manifold, trimesh_of
 
 CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
 ROOT = Path(__file__).resolve().parents[1]
@@ -41,8 +42,7 @@ def meshes(tmp_path: Path) -> Path:
     folder = tmp_path / "meshes"
     for name, solid in {"a/cross.stl": CROSS, "box.ply": box((0, 0, 0), (3, 1, 1))}.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        mesh = from_manifold(solid)
-        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / name)
+        trimesh_of(solid).export(folder / name)
     return folder
 
 
@@ -54,30 +54,6 @@ def run(app: Any, *words: object, code: int = 0) -> str:
     result = CliRunner().invoke(app, [*map(str, words)])
     assert result.exit_code == code, result.output
     return result.output
-
-
-def wait_for_child(parent: int) -> int:
-    """The process that `parent` has started, once there is one; Linux only."""
-    for _ in range(600):
-        for status in Path("/proc").glob("[0-9]*/stat"):
-            with contextlib.suppress(OSError):
-                if int(status.read_text().rpartition(")")[2].split()[1]) == parent:
-                    time.sleep(1)  # let it begin
-                    return int(status.parent.name)
-        time.sleep(0.1)
-    raise AssertionError("no process was started")
-
-
-def wait_for_end(process: int) -> bool:
-    for _ in range(300):
-        try:
-            state = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
-        except OSError:
-            return True
-        if state == "Z":
-            return True
-        time.sleep(0.1)
-    return False
 
 
 class TestMethods:
@@ -111,10 +87,6 @@ class TestMethods:
         for (vertices, faces), hull in zip(made, usual, strict=True):
             assert np.array_equal(vertices, hull.vertices)
             assert np.array_equal(faces, hull.faces)
-
-    def test_options_are_passed_on(self) -> None:
-        given = rlacd_options("fast:max_vertices=32:primitives=true:policy=navacd:space")
-        assert given == {"quality": "fast", "max_vertices": 32, "primitives": True, "policy": "navacd"}
 
     def test_a_peer_that_is_not_there_says_how_to_get_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
         from importlib import metadata
@@ -168,22 +140,7 @@ def test_other_tools_run_at_their_own_defaults(monkeypatch: pytest.MonkeyPatch) 
     assert passed == [{"threshold": threshold}, {"maxConvexHulls": hulls, "asyncACD": False}]
 
 
-@pytest.mark.nightly
-def test_coacd_on_its_own_example(corpus: Path, tmp_path: Path) -> None:
-    """Version 1.0.14 has been seen to make 47 and 48 parts of SnowFlake at 0.05."""
-    pytest.importorskip("coacd")
-    bench = Bench(corpus, ["test/coacd_examples/SnowFlake.ply"], Store(tmp_path), say=lambda _: None)
-    (row,) = bench.run("coacd")
-    assert 45 <= row["parts"] <= 50
-    assert row["hausdorff"] < 0.06
-    assert row["empty"] == 0
-
-
 class TestDeployment:
-    def test_words(self) -> None:
-        words = ["no-principal", "ap=7", "excess", "ce=0"]
-        assert Deployment.parse(words) == Deployment("excess", 7, 0, True, False)
-
     def test_no_planes_at_all_is_an_error(self) -> None:
         with pytest.raises(OptionError, match="no planes are left"):
             Deployment.parse(["no-principal", "no-spatial", "ce=0"])
@@ -222,11 +179,6 @@ class TestStore:
         store.close()
         assert [row["mesh"] for row in Store(tmp_path).rows()] == ["a.ply", "b.ply"]
 
-    def test_a_damaged_line_is_named(self, tmp_path: Path) -> None:
-        (tmp_path / "results.jsonl").write_text(json.dumps(self.ROW) + '\n{"mesh": 3}\n')
-        with pytest.raises(OutputError, match=r"line 2 .* delete"):
-            Store(tmp_path)
-
     @pytest.mark.parametrize("count", [0, 3])
     def test_hulls_come_back(self, tmp_path: Path, count: int) -> None:
         hulls = [
@@ -257,14 +209,13 @@ class TestRunner:
         (tmp_path / "run" / "results.jsonl").write_text("")
         assert bench_of(meshes, tmp_path / "run").run("fast") == rows
 
-    def test_a_hang_is_recorded_and_the_run_goes_on(self, meshes: Path, tmp_path: Path) -> None:
-        rows = bench_of(meshes, tmp_path / "run", Limits(seconds=0.05)).run("fast")
-        assert [row["error"] for row in rows] == ["more than 0.05 s"] * 2
-
-    @pytest.mark.skipif(sys.platform != "linux", reason="address space is limited on Linux only")
-    def test_too_much_memory_is_recorded(self, meshes: Path, tmp_path: Path) -> None:
-        rows = bench_of(meshes, tmp_path / "run", Limits(memory=2**28)).run("fast")
-        assert all("error" in row for row in rows)
+    @pytest.mark.parametrize(("limits", "says"), [({"seconds": 0.05}, "more than 0.05 s"), ({"memory": 2**28}, "")])
+    def test_a_hang_and_a_lack_of_memory_are_recorded(
+        self, meshes: Path, tmp_path: Path, limits: Any, says: str
+    ) -> None:
+        rows = bench_of(meshes, tmp_path / "run", Limits(**limits)).run("fast")
+        assert all(says in row["error"] for row in rows)
+        assert len(rows) == 2, "the run goes on"
 
     def test_a_crash_is_recorded(self, meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         crasher = tmp_path / "crasher"
@@ -275,7 +226,6 @@ class TestRunner:
         assert [row["error"] for row in rows] == ["died of SIGSEGV last words"] * 2
 
     @pytest.mark.nightly
-    @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
     def test_stopping_a_run_ends_its_processes_and_records_nothing(self, tmp_path: Path) -> None:
         """Whether it is interrupted or killed: no process goes on, and what was running is done again next time."""
         folder = tmp_path / "meshes"
@@ -295,12 +245,15 @@ class TestRunner:
             command = [sys.executable, "-c", program, folder, out]
             with subprocess.Popen(command, stderr=subprocess.DEVNULL, cwd=ROOT) as process:
                 try:
-                    child = wait_for_child(process.pid)
+                    parent = psutil.Process(process.pid)
+                    while not (children := parent.children()):
+                        time.sleep(0.1)
+                    time.sleep(1)  # let it begin
                     process.send_signal(number)
                     process.wait(timeout=60)
                 finally:
                     process.kill()
-            assert wait_for_end(child)
+            assert not psutil.wait_procs(children, timeout=30)[1]
             assert (out / "results.jsonl").read_text() == ""
 
     def test_a_broken_mesh_is_recorded_and_what_another_version_made_is_made_again(
@@ -370,11 +323,6 @@ class TestTuning:
         assert abs(point.hausdorff - target) <= CLOSE * target
         assert calls <= tuning.TRIES
 
-    def test_more_hulls_are_tighter(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        pytest.importorskip("vhacdx")
-        point, _ = self.tuned(monkeypatch, tmp_path, lambda n: 2 / n, 0.1, "vhacd")
-        assert point.setting == 20
-
     def test_a_step_is_bisected_to_its_end(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         point, calls = self.tuned(monkeypatch, tmp_path, lambda t: 0.01 if t < 0.137 else 0.2, 0.15)
         assert point.hausdorff == pytest.approx(0.2)  # the closer of the two there are
@@ -384,11 +332,6 @@ class TestTuning:
         method = make_method("fast")
         assert next_setting(method, [(1.0, 0.02)], 0.5, 3) is None
         assert next_setting(method, [(0.005, 0.9)], 0.5, 3) is None
-
-    def test_failed_meshes_do_not_count(self) -> None:
-        point = tuning.Point(0.1, [{"mesh": "a", "hausdorff": 0.2}, {"mesh": "b", "error": "died"}])
-        assert point.hausdorff == 0.2
-        assert math.isnan(tuning.Point(0.1, [{"mesh": "b", "error": "died"}]).hausdorff)
 
 
 class TestTables:
@@ -507,22 +450,56 @@ class TestCommands:
         assert not (meshes.parent / "run").exists()
 
 
-class TestTablesInDocuments:
-    """docs/research/results.md shows tables that commands printed, and no others."""
+def test_tables_are_put_in_their_place_in_documents(tmp_path: Path) -> None:
+    (tmp_path / "quick").mkdir()
+    (tmp_path / "quick" / "a.md").write_text("# A\n\n| a |\n|---|\n| 1 |\n\ntext\n\n| b |\n|---|\n| 2 |\n")
+    document = "before\n<!-- quick/a.md, table 2 -->\nold\n<!-- end -->\nafter\n"
+    expected = "before\n<!-- quick/a.md, table 2 -->\n\n| b |\n|---|\n| 2 |\n\n<!-- end -->\nafter\n"
+    assert fill(document, tmp_path) == fill(expected, tmp_path) == expected
+    with pytest.raises(SystemExit, match="has 2 tables, not 3"):
+        fill("<!-- quick/a.md, table 3 -->\n<!-- end -->\n", tmp_path)
 
-    def test_every_table_says_where_it_comes_from(self) -> None:
-        document = ROOT / "docs" / "research" / "results.md"
-        if not document.exists():
-            pytest.skip("the archive is not part of this checkout")
-        places = re.compile(r"<!-- \S+\.md, table \d+ -->\n.*?<!-- end -->", re.DOTALL)
-        assert len(places.findall(document.read_text())) > 5
-        assert "|---" not in places.sub("", document.read_text())
 
-    def test_tables_are_put_in_their_place(self, tmp_path: Path) -> None:
-        (tmp_path / "quick").mkdir()
-        (tmp_path / "quick" / "a.md").write_text("# A\n\n| a |\n|---|\n| 1 |\n\ntext\n\n| b |\n|---|\n| 2 |\n")
-        document = "before\n<!-- quick/a.md, table 2 -->\nold\n<!-- end -->\nafter\n"
-        expected = "before\n<!-- quick/a.md, table 2 -->\n\n| b |\n|---|\n| 2 |\n\n<!-- end -->\nafter\n"
-        assert fill(document, tmp_path) == fill(expected, tmp_path) == expected
-        with pytest.raises(SystemExit, match="has 2 tables, not 3"):
-            fill("<!-- quick/a.md, table 3 -->\n<!-- end -->\n", tmp_path)
+CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
+
+
+@pytest.mark.parametrize("experiment", ARMS)
+def test_arms_differ_in_what_they_say_only(experiment: str) -> None:
+    for preset in ("two-cores", "paper"):
+        arms = [_options(preset, 100, 1, changes) for changes in ARMS[experiment].values()]
+        assert len(set(arms)) == len(arms)
+    assert {(a.iterations, a.seed, a.warmup, a.validate_every) for a in arms} == {(100, 1, 20, 50)}
+
+
+def test_weights_have_the_ratio() -> None:
+    for label, changes in ARMS["rewards"].items():
+        if label.startswith("λ1/λ2"):
+            options = _options("two-cores", 100, 0, changes)
+            ratio = options.volume_reward / options.finish_reward
+            assert ratio == pytest.approx(float(label.rpartition("=")[2]))
+            assert max(options.volume_reward, options.finish_reward) == LARGEST_WEIGHT
+
+
+def test_too_short(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="at least 2"):
+        train_arms("curves", tmp_path, tmp_path, "two-cores", 1)
+
+
+@pytest.mark.nightly
+def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch")
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    for number in range(6):
+        mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
+        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
+    monkeypatch.setattr("rlacd.learn.options.PRESETS", {"two-cores": {**PRESETS["two-cores"], "validation": 2}})
+    said: list[str] = []
+    page = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
+    table = next(block for block in page.blocks if isinstance(block, Table))
+    assert [line[0] for line in table.lines] == list(ARMS["curves"])
+    assert all(float(str(line[1]).partition(" ± ")[0]) > 0 for line in table.lines)
+    assert len({(tmp_path / "run" / f"curves-1-seed-{s}" / "curves.jsonl").read_text() for s in (0, 1)}) == 2
+    monkeypatch.setattr("rlacd.learn.train.train", None)  # would fail if called
+    again = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
+    assert str(again) == str(page)

@@ -303,7 +303,6 @@ def test_navacd_takes_the_cut_with_the_least_hulls(name: str) -> None:
 
 def test_navacd_halves_a_box_that_has_to_be_cut() -> None:
     plane = NavACD().choose(Component(box((0, 0, 0), (4, 2, 1))))
-    assert plane is not None
     assert (abs(np.asarray(plane.normal)).max(), plane.offset) in {(1, 2), (1, 1), (1, 0.5)}
 
 
@@ -314,8 +313,6 @@ def test_an_l_falls_into_two_convex_parts(turn: tuple[float, float, float]) -> N
     plane = NavACD().choose(component)
     assert plane is not None
     below, above = component.cut(plane)
-    assert below is not None
-    assert above is not None
     assert below.volume + above.volume == pytest.approx(3)
     for side in (below, above):
         assert side.hull.volume == pytest.approx(side.volume, rel=1e-7)
@@ -328,8 +325,6 @@ def test_policies_cut_every_solid(policy: Policy, name: str) -> None:
     plane = policy.choose(component)
     assert plane is not None
     below, above = component.cut(plane)
-    assert below is not None
-    assert above is not None
     assert below.volume + above.volume == pytest.approx(component.volume)
     assert plane == policy.choose(component, threads=3)
 

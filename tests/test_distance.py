@@ -222,7 +222,6 @@ def test_places_of_the_greatest_distances(seed: int) -> None:
     each = [point_to_triangles(missed, hull.vertices, hull.faces)[0] for hull in hulls if hull]
     assert min(each) == pytest.approx(found.under[0], abs=1e-9)
     for hull in hulls:
-        assert hull is not None
         depth = depth_in(Closed(hull.vertices, hull.faces), np.concatenate([out, missed]))
         assert (depth < 1e-6).all(), "a place inside a hull"
     assert point_to_triangles(missed, surface.vertices, surface.faces) == pytest.approx(0, abs=1e-9)

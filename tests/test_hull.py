@@ -61,7 +61,6 @@ def test_hull_is_exact_and_agrees_with_qhull(strategy: str) -> None:
             return
         assert_is_hull(points, exact_points=12)
         hull = Hull.of(points)
-        assert hull is not None
         # Qhull merges facets that are flat within its tolerance, which costs thin hulls a relative error.
         flat = 1e-15 * reference.area
         assert hull.volume == pytest.approx(reference.volume, rel=1e-9, abs=10 * flat)
@@ -76,7 +75,6 @@ def test_hull_of_random_points(count: int, scale: float) -> None:
     points = np.random.default_rng(count).normal(size=(count, 3)) * scale
     assert_is_hull(points)
     hull = Hull.of(points)
-    assert hull is not None
     assert hull.volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
 
 
@@ -90,7 +88,6 @@ def test_all_points_of_a_sphere_are_corners() -> None:
 def test_only_extreme_points_are_corners() -> None:
     grid = np.array(list(product(range(6), repeat=3)), dtype=np.float64)
     hull = Hull.of(np.concatenate([grid, grid]))
-    assert hull is not None
     assert len(hull.vertices) == 8
     assert len(hull.faces) == 12
     assert hull.volume == 125
@@ -156,7 +153,6 @@ def test_a_ball_fits_up_to_the_inradius(seed: int, count: int, scale: float) -> 
     random = np.random.default_rng(seed)
     points = random.normal(size=(count, 3)) * random.uniform(0.05, 1, 3) + random.normal(size=3)
     hull = Hull.of(points)
-    assert hull is not None
     radius = inradius(hull)
     vertices = hull.vertices * scale
     assert _native.holds_ball(vertices, hull.faces, radius * scale * (1 - 1e-6))

@@ -111,10 +111,8 @@ def test_slivers_are_left_only_where_every_plane_leaves_one() -> None:
     notched = Component(Manifold.cube((4, 4, 1)) - Manifold.cube((1, 1, 0.02)))
     shaving, middle = Candidates(np.eye(3)[2:], np.array([[0.02]])), Candidates(np.eye(3)[2:], np.array([[0.02, 0.5]]))
     plane = least_excess(notched, shaving, 1.0)
-    assert plane is not None
     assert plane.offset == 0.02, "nothing else is left"
     plane = least_excess(notched, middle, 1.0)
-    assert plane is not None
     assert plane.offset == 0.5, "the notch is not worth a film"
     assert least_excess(notched, Candidates(np.eye(3)[2:], np.array([[-1.0, 0.0, 1.0, 7.0]])), 1.0) is None
 

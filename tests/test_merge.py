@@ -8,11 +8,10 @@ from manifold3d import Manifold
 
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.criteria.navigable import Navigable
 from rlacd.merge import merge_parts
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part, Plane
-from rlacd.solid.primitive import Balls
+from tests.test_sweep import SOLIDS
 
 
 def pieces_of(solid: Manifold, *planes: Plane) -> list[Component]:
@@ -78,39 +77,6 @@ def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
     assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
 
 
-class Counting(Navigable):
-    """Counts what it is asked."""
-
-    asked = 0
-
-    def is_met(self, part: Part) -> bool:
-        self.asked += 1
-        return super().is_met(part)
-
-
-class Forgetful(Counting):
-    is_hereditary = False
-
-
-def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
-    """The result is the same as if every union were tested anew."""
-    random = np.random.default_rng(0)
-    ring = Manifold.cylinder(0.3, 1, 1, 40, True) - Manifold.cylinder(1, 0.8, 0.8, 40, True)
-    parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0.1), 0.0) for a in np.linspace(0, np.pi, 9)))
-    asked = {Counting: 0, Forgetful: 0}
-    for _ in range(5):
-        balls = Balls(random.uniform(-1.2, 1.2, (24, 3)), random.uniform(0.02, 0.2, 24))
-        results = []
-        for kind in asked:
-            criterion = kind(0.02, 0.01, balls)
-            with Run(1) as pool:
-                results.append(merge_parts(parts, criterion, pool))
-            asked[kind] += criterion.asked
-        for a, b in zip(*results, strict=True):
-            assert np.array_equal(a.hull.vertices, b.hull.vertices)
-    assert asked[Counting] < 0.9 * asked[Forgetful]
-
-
 @pytest.mark.parametrize("across", [False, True])
 def test_pairs_of_nearby_boxes(across: bool) -> None:
     random = np.random.default_rng(0)
@@ -133,3 +99,40 @@ def test_pairs_of_nearby_boxes(across: bool) -> None:
         }
         boxes = _native.Boxes([part.hull.corners for part in parts.values()], list(parts))
         assert boxes.pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize("seed", range(5))
+def test_gluing_undoes_a_cut(name: str, seed: int) -> None:
+    solid = Component(SOLIDS[name]())
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    below, above = solid.cut(Plane(tuple(normal), float(normal @ solid.vertices.mean(axis=0))))
+    glued = Part.glued(below, above)
+    assert glued.volume == pytest.approx(solid.volume)
+    area = _native.mesh_area(glued.vertices, glued.faces)
+    assert area == pytest.approx(_native.mesh_area(solid.vertices, solid.faces), rel=1e-5)
+    assert glued.hull.volume == pytest.approx(solid.hull.volume)
+
+
+def test_only_the_common_area_of_two_faces_vanishes() -> None:
+    base = Component(Manifold.cube((3, 3, 1)))
+    tower = Component(Manifold.cube((1, 1, 2)).translate((1, 1, 1)))
+    glued = Part.glued(base, tower)
+    assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(30 + 10 - 2)
+
+
+def test_coplanar_faces_on_the_same_side_stay() -> None:
+    left = Component(Manifold.cube((1, 1, 1)))
+    right = Component(Manifold.cube((1, 1, 1)).translate((2, 0, 0)))
+    glued = Part.glued(left, right)
+    assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(12)
+
+
+def test_parts_that_are_all_film_keep_their_surfaces() -> None:
+    """Every face of such a part touches the other one: without a surface there would be nothing to measure."""
+    below = Component(Manifold.cube((1, 1, 2e-9)))
+    above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
+    glued = Part.glued(below, above)
+    assert len(glued.faces) == len(below.faces) + len(above.faces)

@@ -14,6 +14,7 @@ from benchmarks.physics import app
 from typer.testing import CliRunner
 
 import rlacd
+from tests.scripts import ROOT, script
 
 pytest.importorskip("mujoco", reason="the extra sim is not installed")
 
@@ -130,3 +131,19 @@ def test_a_missing_simulator_is_named_before_any_work(tmp_path: Path, monkeypatc
     assert done.exit_code == 2
     assert "pip install 'rlacd[sim]'" in done.output
     assert not (tmp_path / "run").exists()
+
+
+def test_the_mug_is_one_closed_body_with_one_handle() -> None:
+    mug = script(ROOT / "examples" / "mug.py").mug()
+    assert mug.is_watertight
+    assert (mug.body_count, mug.euler_number) == (1, 0), "a cup with a handle is a torus to a topologist"
+
+
+@pytest.mark.nightly
+def test_the_mug_hangs_by_its_handle_and_its_one_hull_falls(tmp_path: Path) -> None:
+    hulls, one = script(ROOT / "examples" / "mug.py").main(tmp_path, threads=1)
+    assert hulls.held
+    assert hulls.height > 0.2
+    assert hulls.speed**2 / (2 * 9.81) < 0.01, "it may swing for minutes, but not so high that it gets off the peg"
+    assert not one.held
+    assert one.height < 0.06

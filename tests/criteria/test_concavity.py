@@ -17,8 +17,6 @@ from hypothesis import strategies as st
 from rlacd import _native
 from rlacd.criteria.concavity import Concavity
 from rlacd.errors import OptionError
-from rlacd.solid.component import Component
-from rlacd.solid.hull import Hull
 from tests.shapes import Closed, box, dense, depth_in, from_manifold, to_manifold
 
 TOLERANCE = 1e-3
@@ -254,14 +252,3 @@ def test_bad_meshes_are_refused() -> None:
     ):
         with pytest.raises(ValueError, match=says):
             _native.meets_concavity(*part, *hull, 1.0, 1.0, 0.05)
-
-
-def test_a_kept_tree_changes_nothing_but_time() -> None:
-    part = Component(box((-1, -1, -1), (1, 1, 1)) - box((-0.2, -2, 0.5), (0.2, 2, 2)))
-    roomy = Hull.of(part.vertices * 1.01)
-    assert roomy is not None
-    alone = [Concavity().measure(each) for each in (part, part.with_hull(roomy))]
-    part.tree = _native.TreeCache()
-    assert [Concavity().measure(each) for each in (part, part.with_hull(roomy))] == alone
-    assert Concavity(0.51).is_met(part)
-    assert not Concavity(0.49).is_met(part)

@@ -15,7 +15,7 @@ import rlacd
 from rlacd import _native
 from rlacd.cli.main import app
 from rlacd.criteria.concavity import Concavity, Distance
-from tests.shapes import box, dense, from_manifold
+from tests.shapes import box, dense, from_manifold, trimesh_of
 
 RADIUS = 1 / 3  # of the hole, where the block's longest side is 2
 
@@ -23,15 +23,13 @@ RADIUS = 1 / 3  # of the hole, where the block's longest side is 2
 def bored() -> trimesh.Trimesh:
     """A block of 60 x 60 x 30 with a round hole of 20 through it."""
     hole = manifold3d.Manifold.cylinder(40, 10, 10, 128).translate((0, 0, -20))
-    mesh = (box((-30, -30, -15), (30, 30, 15)) - hole).to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    return trimesh_of(box((-30, -30, -15), (30, 30, 15)) - hole)
 
 
 def comb() -> trimesh.Trimesh:
-    mesh = (
+    return trimesh_of(
         box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -2, -0.5), (0.6, 2, 2)) - box((-2, -0.3, 0.2), (2, 0.4, 2))
-    ).to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    )
 
 
 @pytest.mark.parametrize(

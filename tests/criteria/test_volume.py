@@ -17,6 +17,7 @@ from rlacd.compat.vhacd import compute_vhacd
 from rlacd.errors import OptionError
 from tests.hulls import assert_convex_hull
 from tests.models import table
+from tests.shapes import trimesh_of
 
 
 def manifold_of(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
@@ -28,8 +29,7 @@ def cup() -> trimesh.Trimesh:
     solid = manifold3d.Manifold.cylinder(2, 1, 1, 24) - manifold3d.Manifold.cylinder(2, 0.9, 0.9, 24).translate(
         (0, 0, 0.1)
     )
-    mesh = solid.to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    return trimesh_of(solid)
 
 
 def torus() -> trimesh.Trimesh:
@@ -71,13 +71,6 @@ def test_a_limit_on_hulls_may_exceed_the_share_and_says_by_how_much() -> None:
     assert len(result) <= 6
     assert result.report["volume"]["max"] > 0.01
     assert any("add more than 1 % of volume" in warning for warning in result.report["warnings"])
-
-
-def test_the_same_bytes_for_any_threads() -> None:
-    results = [rlacd.decompose(torus(), criterion="volume", threads=threads) for threads in (1, 3)]
-    assert len(results[0]) == len(results[1])
-    for one, other in zip(*results, strict=True):
-        assert np.array_equal(one.vertices, other.vertices)
 
 
 def test_the_command_line_takes_a_share(tmp_path: Path) -> None:

@@ -130,13 +130,6 @@ def in_place(path: Path) -> trimesh.Trimesh:
     return mesh if np.allclose(scene.graph[node][0], np.eye(4)) else hull_of(moved_back.vertices)
 
 
-def test_far_from_the_origin_a_glb_keeps_the_shape(tmp_path: Path) -> None:
-    box = hull_of(trimesh.creation.box((0.01, 0.02, 0.03)).vertices + np.array([5e5, -5e5, 1e4]))
-    (mesh,) = load(save_hulls([box], tmp_path / "far.glb")).values()
-    assert mesh.extents == pytest.approx(box.extents, rel=1e-5)
-    assert mesh.bounds == pytest.approx(box.bounds, abs=1e-8)
-
-
 @pytest.mark.promise("convex-in-files")
 def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_work(tmp_path: Path) -> None:
     # Thinner than the spacing of float32 numbers at its corners, on a slant so that no axis helps.

@@ -279,7 +279,6 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
 
     spread = frame().replace(b'count="16" stride="3">', b'count="16" stride="4" offset="2"><param type="float"/>', 1)
     numbers = re.search(rb'<float_array id="p-a"[^>]*>([^<]*)', spread)
-    assert numbers is not None
     rows = np.array(numbers[1].split()).reshape(-1, 3).tolist()
     padded = b"9 9 " + b" ".join(b"9 " + b" ".join(row) for row in rows)
     whole = spread.replace(numbers[1], padded)

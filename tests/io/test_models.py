@@ -17,7 +17,7 @@ import rlacd
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
 from rlacd.io.write import MODELS, save
-from tests.hulls import assert_convex_hull, hull_of, moved, random_hull
+from tests.hulls import assert_convex_hull, hull_of, random_hull
 from tests.models import TABLE_VOLUME, Rest, decomposed_table, fall_in_bullet, fall_in_drake, fall_in_mujoco
 
 AWKWARD = 'ein Tisch – 机 & "co" <1>'
@@ -220,17 +220,6 @@ def test_names_that_xml_or_disks_cannot_hold_are_made_plain(tmp_path: Path, wood
     }
 
 
-@pytest.mark.nightly
-def test_a_body_of_500_hulls_is_simulated(tmp_path: Path) -> None:
-    spots = np.stack(np.meshgrid(np.arange(5), np.arange(10), np.arange(10)), axis=-1).reshape(-1, 3) * 0.05
-    cubes = [hull_of(trimesh.creation.box((0.04, 0.04, 0.04)).vertices + spot) for spot in spots]
-    many = Decomposition(cubes, {"name": "many"}, trimesh.util.concatenate(cubes))
-    for fall, ending in ((fall_in_mujoco, "xml"), (fall_in_bullet, "urdf")):
-        rest = fall(many.save(tmp_path / f"many.{ending}"), 0.15)
-        assert rest.hulls == 500
-        assert rest.mass == pytest.approx(500 * 0.04**3 * 1000)
-
-
 @pytest.mark.parametrize("ending", ["xml", "urdf"])
 def test_thin_tiny_and_far_bodies_load(tmp_path: Path, ending: str) -> None:
     shapes = {
@@ -428,14 +417,3 @@ def test_hulls_too_thin_for_simulators_are_reported(tmp_path: Path) -> None:
         with pytest.raises(OutputError, match=r"hull_000.*too thin for single precision"):
             thin.save(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_hulls_of_every_size_keep_their_shape_in_models(tmp_path: Path) -> None:
-    for scale in (1e-3, 1.0, 1e3):
-        hulls = [moved(random_hull(seed), scale, np.full(3, 1e3 * scale)) for seed in range(2)]
-        source = trimesh.util.concatenate(hulls)
-        path = Decomposition(hulls, {"name": "rocks"}, source).save(tmp_path / f"rocks{scale:g}.urdf")
-        for element, hull in zip(etree.parse(str(path)).iterfind(".//collision"), hulls, strict=True):
-            mesh = trimesh.load_mesh(path.parent / element.find("geometry/mesh").get("filename"), process=False)
-            mesh.apply_translation([float(word) for word in element.find("origin").get("xyz").split()])
-            assert mesh.bounds == pytest.approx(hull.bounds, abs=1e-3 * scale)

@@ -7,7 +7,6 @@ import fractions
 import inspect
 import itertools
 import re
-import typing
 from pathlib import Path
 from typing import Any
 
@@ -244,19 +243,6 @@ def test_a_length_may_be_a_share_or_in_metres() -> None:
 
 
 # --- stated once ------------------------------------------------------------------------------------------------------
-
-
-def test_every_option_of_names_has_a_literal_type() -> None:
-    hints = typing.get_type_hints(Options, localns={"Policy": rlacd.Policy})
-    for field in dataclasses.fields(Options):
-        known = field.metadata["option"]
-        if known.kind.rule.startswith("one of") and field.name != "policy":
-            literal = next(
-                part
-                for part in (hints[field.name], *typing.get_args(hints[field.name]))
-                if typing.get_origin(part) is typing.Literal
-            )
-            assert " ".join(typing.get_args(literal)) == known.kind.values
 
 
 @pytest.mark.parametrize("options", [Options, NavigableSpace, OutputOptions, TrainOptions])

@@ -15,21 +15,11 @@ import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import OptionError
 from rlacd.io.write.model import SHEET, SHEET_THICKNESS
+from tests.assets import write_mesh
 from tests.models import TABLE_VOLUME, decomposed_table, fall_in_mujoco, table
 
 UP = {"glb": "y", "gltf": "y", "obj": "z", "stl": "z", "ply": "z", "off": "z", "dae": "z", "3mf": "z"}
 """The axis that points up in files of each format that say nothing else."""
-
-
-def written(folder: Path, ending: str) -> Path:
-    path = folder / f"chair.{ending}"
-    if ending == "gltf":
-        for name, data in trimesh.Scene(table()).export(file_type="gltf").items():
-            (folder / name).write_bytes(data)
-        (folder / "model.gltf").rename(path)
-    else:
-        table().export(path)
-    return path
 
 
 def told(path: Path, axis: str, metres: float) -> None:
@@ -44,7 +34,7 @@ def told(path: Path, axis: str, metres: float) -> None:
 @pytest.mark.parametrize("ending", [*UP, "dae x", "dae y"])
 def test_python_and_the_command_line_agree_on_what_points_up(tmp_path: Path, ending: str) -> None:
     ending, _, axis = ending.partition(" ")
-    path = written(tmp_path, ending)
+    path = write_mesh(table(), tmp_path / f"chair.{ending}")
     up = axis or UP[ending]
     if ending == "dae":
         told(path, up, 1.0)
@@ -63,10 +53,10 @@ def test_python_and_the_command_line_agree_on_what_points_up(tmp_path: Path, end
 
 
 def test_units_that_files_state(tmp_path: Path) -> None:
-    assert rlacd.decompose(written(tmp_path, "glb"), threads=1).report["metres"] == 1.0
-    assert rlacd.decompose(written(tmp_path, "3mf"), threads=1).report["metres"] == 1e-3
-    assert rlacd.decompose(written(tmp_path, "stl"), threads=1).report["metres"] is None
-    path = written(tmp_path, "dae")
+    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.glb"), threads=1).report["metres"] == 1.0
+    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.3mf"), threads=1).report["metres"] == 1e-3
+    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.stl"), threads=1).report["metres"] is None
+    path = write_mesh(table(), tmp_path / "chair.dae")
     told(path, "z", 0.0254)
     in_inches = rlacd.decompose(path, threads=1)
     assert in_inches.report["metres"] == pytest.approx(0.0254)
@@ -77,7 +67,7 @@ def test_units_that_files_state(tmp_path: Path) -> None:
     otherwise = rlacd.decompose(path, threads=1, unit="mm").report["warnings"]
     assert any("the unit of chair.dae is 0.0254 m" in said and "--unit mm overrides" in said for said in otherwise)
     with pytest.raises(OptionError, match="does not say its unit"):
-        rlacd.decompose(written(tmp_path, "ply"), unit="file")
+        rlacd.decompose(write_mesh(table(), tmp_path / "chair.ply"), unit="file")
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)])
@@ -128,14 +118,6 @@ def test_a_doubt_suggests_what_would_help(tmp_path: Path, factor: float, says: s
     assert f"in metres: {says}" in str(doubts[0].message)
 
 
-def test_a_doubtful_mass_of_a_body_of_plausible_size_is_no_matter_of_units(tmp_path: Path) -> None:
-    result = rlacd.decompose(table(), threads=1, quality="fast")
-    with pytest.warns(rlacd.ImplausibleBodyWarning) as doubts:
-        result.save(tmp_path / "table.xml", density=1e9)
-    assert "--density or --mass" in str(doubts[0].message)
-    assert "--unit" not in str(doubts[0].message)
-
-
 def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> None:
     """A box of faces without its lid: repair makes its walls a thousandth of its longest side thick."""
     walls = trimesh.creation.box((0.2, 0.2, 0.2))
@@ -170,46 +152,23 @@ def test_a_scene_has_a_floor_to_land_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_robot_of_meshes_of_one_size_is_told_of_a_larger_threshold(tmp_path: Path) -> None:
+@pytest.mark.parametrize("other", ["a plain box, much larger", "a ring of nearly the same size"])
+def test_a_robot_of_many_hulls_is_told_of_a_threshold_that_gives_as_few_as_it_says(tmp_path: Path, other: str) -> None:
     ring = trimesh.creation.torus(0.05, 0.015, major_sections=32, minor_sections=12)
     ring.export(tmp_path / "a.stl")
-    ring.apply_scale(0.98).export(tmp_path / "b.stl")
-    mesh = '<link name="{0}"><collision><geometry><mesh filename="{0}.stl"/></geometry></collision></link>'
+    (ring.apply_scale(0.98) if "ring" in other else trimesh.creation.box((2, 0.3, 0.3))).export(tmp_path / "b.stl")
+    link = '<link name="{0}"><collision><geometry><mesh filename="{0}.stl"/></geometry></collision></link>'
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
-    (tmp_path / "robot.urdf").write_text(f'<robot name="r">{mesh.format("a")}{mesh.format("b")}{joint}</robot>')
-    options = {"quality": "fast", "threads": 1}
-    done = rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "acd.urdf", threshold=0.012, **options)
-    said = next(warning for warning in done.warnings if "--threshold-abs" in warning)
-    length, _, promised = said.partition("--threshold-abs ")[2].partition(" gives ")
-    assert float(length) > 1.5 * 0.012 * 0.065  # half the longest side
-    followed = rlacd.rewrite_robot(
-        tmp_path / "robot.urdf", tmp_path / "few.urdf", threshold_abs=float(length), **options
-    )
-    assert sum(len(mesh.files) for mesh in followed.meshes) <= int(promised.split()[0])
-
-
-@pytest.mark.slow
-def test_a_robot_of_many_hulls_is_told_of_a_threshold_for_all(tmp_path: Path) -> None:
-    """A large plain box and small rings that are cut finely: the suggestion holds when it is followed."""
-    trimesh.creation.box((2, 0.3, 0.3)).export(tmp_path / "arm.stl")
-    ring = trimesh.creation.torus(0.05, 0.015, major_sections=32, minor_sections=12)
-    ring.export(tmp_path / "ring.stl")
-    links = "".join(
-        f'<link name="{name}"><collision><geometry><mesh filename="{name}.stl"/></geometry></collision></link>'
-        for name in ("arm", "ring")
-    )
-    joint = '<joint name="j" type="fixed"><parent link="arm"/><child link="ring"/></joint>'
-    (tmp_path / "robot.urdf").write_text(f'<robot name="r">{links}{joint}</robot>')
-    done = rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "acd.urdf", threshold=0.01, threads=1)
+    robot = tmp_path / "robot.urdf"
+    robot.write_text(f'<robot name="r">{link.format("a")}{link.format("b")}{joint}</robot>')
+    done = rlacd.rewrite_robot(robot, tmp_path / "acd.urdf", threshold=0.01, quality="fast", threads=1)
     hulls = sum(len(mesh.files) for mesh in done.meshes)
     assert hulls > 20
     said = next(warning for warning in done.warnings if "--threshold-abs" in warning)
     assert said.startswith(f"2 meshes became {hulls} hulls")
     length, _, promised = said.partition("--threshold-abs ")[2].partition(" gives ")
-    followed = rlacd.rewrite_robot(
-        tmp_path / "robot.urdf", tmp_path / "few.urdf", threshold_abs=float(length), threads=1
-    )
-    assert sum(len(mesh.files) for mesh in followed.meshes) <= int(promised.split()[0]) < hulls
-    assert not any("--threshold-abs" in warning for warning in followed.warnings)
+    few = rlacd.rewrite_robot(robot, tmp_path / "few.urdf", threshold_abs=float(length), quality="fast", threads=1)
+    assert sum(len(mesh.files) for mesh in few.meshes) <= int(promised.split()[0]) < hulls
+    assert not any("--threshold-abs" in warning for warning in few.warnings)
     with pytest.raises(OptionError, match="unit"):
-        rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "mm.urdf", unit="mm")
+        rlacd.rewrite_robot(robot, tmp_path / "mm.urdf", unit="mm")

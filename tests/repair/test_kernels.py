@@ -13,9 +13,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from rlacd import _native
-from rlacd.repair.distance import points_covering, shared_faces
 from rlacd.repair.voxels import Reach, _grown
-from rlacd.solid.topology import Edges
 
 BALL = trimesh.creation.icosphere(3)
 VERTICES, FACES = np.array(BALL.vertices), np.array(BALL.faces, dtype=np.int64)
@@ -80,23 +78,6 @@ def test_caps_avoid_taken_chords_if_they_can() -> None:
         _native.least_bent(points, beside, np.zeros((3, 3), dtype=bool))
 
 
-@given(st.lists(st.floats(0, 6.2), min_size=1, max_size=7, unique_by=lambda x: round(x, 2)), st.integers(0, 2**7 - 1))
-def test_wedges_go_around_an_edge(angles: list[float], wound: int) -> None:
-    spokes = np.stack([np.cos(angles), np.sin(angles), np.full(len(angles), 0.3)], axis=1)
-    vertices = np.concatenate([[[0, 0, 0], [0, 0, 1]], spokes])
-    faces = np.array([(0, 1, i + 2) if wound >> i & 1 else (1, 0, i + 2) for i in range(len(angles))])
-    edges = Edges.of(faces, len(vertices))
-    wedges, sides = _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence))
-    around = edges.of_halfedge[wedges[:, 0]] == edges.of_halfedge[0]
-    following = dict((wedges[around] // 3).tolist())
-    order = np.argsort(angles).tolist()
-    if len(order) > 2:
-        assert following == dict(zip(order, order[1:] + order[:1], strict=True))
-    for (f, g), (a, b) in zip((wedges[around] // 3).tolist(), sides[around].tolist(), strict=True):
-        # A face that runs with the edge shows its front to what follows it.
-        assert (a, b) == (2 * f + (not wound >> f & 1), 2 * g + (wound >> g & 1))
-
-
 def test_nearest_points_do_not_depend_on_their_neighbours() -> None:
     """Points on the surface, where rounding decides whether they lie in the boxes of the triangles they are on."""
     rng = np.random.default_rng(0)
@@ -115,19 +96,6 @@ def test_nearest_points_do_not_depend_on_their_neighbours() -> None:
 def test_cells_grow_to_all_cells_within_a_radius(radius: float) -> None:
     cells = np.random.default_rng(1).random((14, 11, 17)) < 0.01
     np.testing.assert_array_equal(_grown(cells, radius), ndimage.distance_transform_edt(~cells) <= radius + 1e-12)
-
-
-def test_shared_faces_are_found_whatever_their_order_and_winding() -> None:
-    rng = np.random.default_rng(3)
-    order = rng.permutation(len(VERTICES))
-    turned = np.argsort(order)[FACES[::-1, ::-1]]
-    moved = VERTICES[order].copy()
-    moved[0] += 1e-15
-    moved[moved == 0] *= -1  # -0.0 is the same place as 0.0
-    mine, others = shared_faces(VERTICES, FACES, moved, turned[:1000])
-    expected = ~(turned == 0).any(axis=1)
-    np.testing.assert_array_equal(others, expected[:1000])
-    np.testing.assert_array_equal(mine[::-1], expected & (np.arange(len(FACES)) < 1000))
 
 
 @given(st.integers(0, 10**6), st.integers(0, 400), st.floats(0.0, 0.5))
@@ -179,18 +147,6 @@ def test_the_nearest_room(seed: int) -> None:
     for label in np.unique(found[found > 0]):  # the room is as near as any
         own = ndimage.distance_transform_edt(room != label).ravel()
         assert (own[found == label] == away.ravel()[found == label]).all()
-
-
-@pytest.mark.parametrize("spacing", [0.05, 0.5])
-def test_marked_cells_are_those_that_hold_points_of_the_faces(spacing: float) -> None:
-    pitch, margin = 0.04, 3
-    origin, marks, shape = _native.mark_cells(VERTICES, FACES, spacing, pitch, margin)
-    points, _ = points_covering(VERTICES, FACES, spacing)
-    assert np.array_equal(origin, points.min(axis=0) - margin * pitch)
-    wanted = np.zeros(shape, dtype=bool)
-    wanted[tuple(np.rint((points - origin) / pitch).astype(int).T)] = True
-    assert np.array_equal(np.frombuffer(marks, dtype=bool).reshape(shape), wanted)
-    assert shape == tuple(np.argwhere(wanted).max(axis=0) + 1 + margin)
 
 
 def _edges_through(corners: np.ndarray, other: np.ndarray) -> bool:

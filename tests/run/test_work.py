@@ -14,10 +14,7 @@ from manifold3d import Manifold, OpType
 
 import rlacd
 from rlacd import cut_and_merge
-from rlacd.criteria import Concavity
-from rlacd.merge import merge_parts
 from rlacd.run import Run, Work
-from rlacd.solid.component import Component
 from tests.shapes import box
 
 PRICES = st.lists(st.floats(0, 50), max_size=40)
@@ -89,19 +86,6 @@ def test_the_default_stays_within_its_account(shape: Callable[[], Manifold | tri
     for a, b in zip(one, three, strict=True):
         assert (a.vertices == b.vertices).all()
         assert (a.faces == b.faces).all()
-
-
-@pytest.mark.parametrize("most", [0, 2e3, 2e4])
-def test_merging_cut_short_is_the_same_for_any_number_of_threads(most: float) -> None:
-    parts = [Component(Manifold.cube().translate((x, y, 0))) for x in range(4) for y in range(4)]
-    counts = []
-    for threads in (1, 3):
-        with Run(threads) as run, run.limited(most):
-            merged = merge_parts(parts, Concavity(0.05), run)
-        assert sum(part.volume for part in merged) == pytest.approx(16)
-        counts.append([part.volume for part in merged])
-    assert counts[0] == counts[1]
-    assert 1 <= len(counts[0]) <= 16
 
 
 @pytest.mark.slow

@@ -62,11 +62,11 @@ def test_legs_under_a_plate_share_hues_with_each_other_only() -> None:
     assert len(np.unique(coloring.rgb, axis=0)) == len(legs) + 1
 
 
-def test_nothing_and_one() -> None:
-    assert len(color_hulls([]).rgb) == 0
-    assert color_hulls(boxes(np.zeros((1, 3)))).rgb.tolist() == hull_colors(1).tolist()
-
-
 def test_more_hulls_in_one_place_than_there_are_hues_all_differ() -> None:
     coloring = color_hulls(boxes(np.zeros((30, 3))))
     assert len(np.unique(coloring.rgb, axis=0)) == 30
+
+
+def test_nothing_and_one() -> None:
+    assert len(color_hulls([]).rgb) == 0
+    assert color_hulls(boxes(np.zeros((1, 3)))).rgb.tolist() == hull_colors(1).tolist()

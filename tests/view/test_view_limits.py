@@ -203,9 +203,7 @@ def test_the_command_leaves_at_once_and_in_silence_while_at_work(rough: Path, se
     command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "view", str(rough), "--no-browser"]
     with subprocess.Popen([*command, "--quality", "best"], stderr=subprocess.PIPE, text=True) as process:
         try:
-            assert process.stderr is not None
             address = re.search(r"http://\S+", process.stderr.readline())
-            assert address is not None
             port = port_of(address[0])
             with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as stream:
                 stream.sendall(head("/events"))

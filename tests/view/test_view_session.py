@@ -67,13 +67,7 @@ def until(session: Session, state: str, run: int | None = None) -> SessionState:
 
 
 def options_of(session: Session) -> dict[str, Any]:
-    assert session.result is not None
     return session.result[1].report["options"]
-
-
-def test_it_begins_idle_with_nothing(session: Session) -> None:
-    assert session.state == SessionState()
-    assert session.result is None
 
 
 def test_progress_and_then_the_result(session: Session, work: Work) -> None:
@@ -104,7 +98,6 @@ def test_stopping_keeps_what_is_reached(session: Session, work: Work) -> None:
     session.stop()
     work.go_on()
     until(session, "idle", run=1)
-    assert session.result is not None
     assert session.result[1].report["complete"] is False
 
 
@@ -113,7 +106,6 @@ def test_stopping_does_not_reach_into_the_next_run(session: Session, work: Work)
     session.decompose({})
     work.go_on()
     until(session, "idle", run=1)
-    assert session.result is not None
     assert session.result[1].report["complete"] is True
 
 

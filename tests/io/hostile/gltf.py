@@ -59,7 +59,6 @@ def _() -> bytes:
 
 
 refused("a billion vertices in 96 bytes.gltf", "declares", lambda: gltf(accessors=accessors({"count": 10**9}, {})))
-refused("a count below zero.gltf", "declares|negative", lambda: gltf(accessors=accessors({"count": -1}, {})))
 refused(
     "a count that is no whole number.gltf", "count|damaged", lambda: gltf(accessors=accessors({"count": 1e300}, {}))
 )
@@ -69,13 +68,6 @@ refused(
 def _() -> bytes:
     tree = gltf_tree(accessors=accessors({"count": 10**9}, {}))
     tree["bufferViews"][0]["byteStride"] = 1
-    return json.dumps(tree).encode()
-
-
-@refused("a stride below zero.gltf", "declares|stride|negative")
-def _() -> bytes:
-    tree = gltf_tree()
-    tree["bufferViews"][0]["byteStride"] = -(10**9)
     return json.dumps(tree).encode()
 
 
@@ -107,14 +99,6 @@ def _() -> bytes:
     return glb(tree, b"\0" * 12 * 10**5)
 
 
-@refused("ten thousand primitives of one megabyte.glb", "asks for")
-def _() -> bytes:
-    tree = gltf_tree(bufferViews=[{"buffer": 0, "byteLength": 12 * 10**5}], buffers=[{"byteLength": 12 * 10**5}])
-    tree["accessors"] = [{"bufferView": 0, "componentType": 5126, "count": 99_999, "type": "VEC3"}]
-    tree["meshes"] = [{"primitives": many(10_000, {"attributes": {"POSITION": 0}})}]
-    return glb(tree, b"\0" * 12 * 10**5)
-
-
 @refused("a mesh placed a hundred thousand times.glb", "triangles")
 def _() -> bytes:
     tree = gltf_tree(bufferViews=[{"buffer": 0, "byteLength": 36 * 1000}], buffers=[{"byteLength": 36 * 1000}])
@@ -134,7 +118,6 @@ refused(
     "itself",
     lambda: gltf(nodes=[{"children": [1]}, {"children": [2, 0]}, {"mesh": 0, "children": [1]}]),
 )
-refused("a node among its own children.gltf", "itself", lambda: gltf(nodes=[{"mesh": 0, "children": [0]}]))
 harmless(
     "two children each, forty deep.gltf",
     lambda: gltf(nodes=[*({"children": [i + 1, i + 1]} for i in range(40)), {"mesh": 0}]),
@@ -176,16 +159,6 @@ refused(
     lambda: gltf(nodes=[{"children": list(range(1000))}] * 999 + [{"mesh": 0}]),
 )
 refused("a million buffers.glb", "buffers", lambda: glb(gltf_tree(buffers=many(1_000_000, {"uri": "data:;base64,"}))))
-refused(
-    "meshes that only Draco reads.gltf",
-    "KHR_draco_mesh_compression",
-    lambda: gltf(extensionsRequired=["KHR_draco_mesh_compression"]),
-)
-refused(
-    "views that only meshopt reads.gltf",
-    "EXT_meshopt_compression",
-    lambda: gltf(extensionsRequired=["EXT_meshopt_compression"]),
-)
 
 
 @refused("quantized views that only meshopt reads, in a buffer without bytes.gltf", "EXT_meshopt_compression")
@@ -207,9 +180,6 @@ def _() -> bytes:
     primitives[-1] = {**primitives[-1], "mode": 4}
     named = {"name": "a" * 10**6, "extras": {str(i): i for i in range(100_000)}, "primitives": primitives}
     return gltf(meshes=[named], nodes=[{"mesh": 0, "name": "b" * 10**6}])
-
-
-refused("numbers where lists belong.gltf", "damaged", lambda: gltf(accessors=7, meshes={"a": 3}))
 
 
 def reference(uri: str) -> bytes:
