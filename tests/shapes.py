@@ -53,6 +53,20 @@ def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) ->
     return Manifold.cube(size).translate(lower)
 
 
+def block(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Any:
+    return Manifold.cube((x, y, z), True).translate(at)
+
+
+def component_of(mesh: trimesh.Trimesh) -> Component:
+    return Component((np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int32)))
+
+
+def elbow(height: float = 2.0) -> trimesh.Trimesh:
+    """An L of two beams that overlap at its corner."""
+    beams = ([(0, 0, 0), (2, 0.4, 0.4)], [(0, 0, 0), (0.4, 0.4, height)])
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in beams])
+
+
 def table() -> trimesh.Trimesh:
     """A top of 2 x 1 on four legs at its corners."""
     legs = [Manifold.cube((0.1, 0.1, 1)).translate((x, y, 0)) for x in (0, 1.9) for y in (0, 0.9)]

@@ -59,10 +59,3 @@ def band(twists: int, count: int = 100) -> trimesh.Trimesh:
         c, d = (j + count, j) if swap else (j, j + count)
         faces += [[a, c, b], [b, c, d]]
     return trimesh.Trimesh(vertices, faces, process=False)
-
-
-def folded_sphere() -> Mesh:
-    """A sphere one half of which is turned into the other: it goes through itself."""
-    vertices, faces = arrays(creation.icosphere(1))
-    vertices[vertices[:, 0] > 0] *= [-0.8, 1, 1]
-    return vertices, faces

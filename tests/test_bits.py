@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from rlacd.solid.arrays import dots, heights, length
-from rlacd.solid.component import Component
 from tests import bits
+from tests.hulls import hull_of
+from tests.shapes import component_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -48,7 +49,7 @@ def test_axes_are_eigenvectors_of_the_moments() -> None:
     for _ in range(50):
         corners = draw.normal(size=(20, 3)) * draw.uniform(0.2, 2, 3)
         rotation, _ = np.linalg.qr(draw.normal(size=(3, 3)))
-        component = Component(_hull(corners @ rotation))
+        component = component_of(hull_of(corners @ rotation))
         axes = component.principal_axes
         moments = _moments(component.vertices[component.faces])
         values, vectors = np.linalg.eigh(moments)
@@ -61,15 +62,8 @@ def test_axes_are_eigenvectors_of_the_moments() -> None:
 def test_a_cube_keeps_the_axes_of_its_space() -> None:
     """All directions are principal; rounding must not choose some."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 3 + 0.1
-    axes = Component(_hull(corners)).principal_axes
+    axes = component_of(hull_of(corners)).principal_axes
     assert sorted(axes.tolist()) == [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
-
-
-def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    from rlacd.solid.hull import Hull
-
-    hull = Hull.of(np.ascontiguousarray(points))
-    return hull.vertices, hull.faces
 
 
 def _moments(corners: np.ndarray) -> np.ndarray:

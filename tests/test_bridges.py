@@ -22,13 +22,9 @@ from rlacd.solid.component import ClippedPart, Component, Part, Plane, reunite
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.primitive import Balls
-from tests.shapes import strangers
+from tests.shapes import block, strangers
 
 TIGHT = Concavity(0.02)
-
-
-def block(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Manifold:
-    return Manifold.cube((x, y, z), True).translate(at)
 
 
 CROSS = block(2, 0.3, 0.3) + block(0.3, 2, 0.3)
@@ -38,10 +34,7 @@ def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
     """The solid, and what lies left of x = -0.15, right of x = 0.15 and between."""
     root = Component(solid)
     left, rest = root.cut(Plane((1.0, 0.0, 0.0), -0.15))
-    assert left is not None
     middle, right = rest.cut(Plane((1.0, 0.0, 0.0), 0.15))
-    assert middle is not None
-    assert right is not None
     return root, [left, middle, right]
 
 
@@ -132,7 +125,6 @@ def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
     assume(fits is not None)
     assert not (fits and feasibility is not Feasibility.MAYBE)
     larger = Hull.of(np.concatenate([hull.vertices, random.uniform(-1, 1, (3, 3))]))
-    assert larger is not None
     assert Concavity(threshold).screen.forbids(solid.filling, hull) == (feasibility is Feasibility.NEVER)
     if feasibility is Feasibility.NEVER:
         assert Concavity(threshold * (1 - 1e-9)).screen.feasibility(solid.filling, larger) is Feasibility.NEVER

@@ -51,6 +51,8 @@ def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
     assert is_sliver(box(1, 1, 0.01).hull)
     assert not is_sliver(box(1, 1, 0.03).hull)
     assert not is_sliver(Component(Manifold.sphere(1, 32)).hull)
+    assert is_film(box(1, 1, 1e-4))
+    assert not is_film(box(1, 1, 2e-3))
 
 
 def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
@@ -69,11 +71,6 @@ def test_of_a_stack_of_slivers_enough_stay_for_all_of_them() -> None:
     tops = np.array([part.vertices[:, 2].max() for part in kept])
     for part in stack:
         assert np.abs(tops - part.vertices[:, 2].max()).min() <= SLIVER_LOSS + 0.0015
-
-
-def test_films_are_thinner_than_sheets() -> None:
-    assert is_film(box(1, 1, 1e-4))
-    assert not is_film(box(1, 1, 2e-3))
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -95,10 +92,3 @@ def test_a_cut_along_an_axis_is_exact(axis: int) -> None:
             for side, solid in ((below, slab), (above, upper)):
                 assert side.volume == pytest.approx(solid.volume(), rel=1e-12)
                 assert side.hull.volume == pytest.approx(solid.volume(), rel=1e-12)
-
-
-def test_a_plane_beside_a_component_leaves_it_whole() -> None:
-    component = box(1, 1, 1)
-    for normal in ((0.0, 1.0, 0.0), (0.6, 0.0, 0.8)):
-        assert component.cut(Plane(normal, 5.0))[1] is None
-        assert component.cut(Plane(normal, -5.0))[0] is None

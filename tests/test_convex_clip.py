@@ -12,7 +12,7 @@ from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
-from tests.shapes import is_closed
+from tests.shapes import component_of, is_closed
 
 
 def solids() -> dict[str, trimesh.Trimesh]:
@@ -30,10 +30,6 @@ def solids() -> dict[str, trimesh.Trimesh]:
 def inverted(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     mesh.invert()
     return mesh
-
-
-def component(mesh: trimesh.Trimesh) -> Component:
-    return Component((np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int32)))
 
 
 def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
@@ -57,7 +53,7 @@ def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
 @pytest.mark.parametrize("name", solids())
 def test_clipping_agrees_with_a_boolean(name: str) -> None:
     mesh = solids()[name]
-    solid = component(mesh)
+    solid = component_of(mesh)
     whole = to_manifold(solid.vertices, solid.faces)
     for hull in hulls(mesh):
         part = solid.inside(hull)
@@ -78,7 +74,7 @@ def test_a_surface_folded_by_noise_is_clipped_and_its_halves_add_up() -> None:
     """Some hulls have corners where the folded surface holds them twice, or turns inside out."""
     crumpled = trimesh.creation.icosphere(subdivisions=4)
     crumpled.vertices += np.random.default_rng(0).uniform(-0.1, 0.1, crumpled.vertices.shape)
-    solid = component(crumpled)
+    solid = component_of(crumpled)
     rng = np.random.default_rng(2)
     for _ in range(60):
         hull = Hull.of(crumpled.vertices[rng.integers(len(crumpled.vertices), size=12)] * 0.985)
@@ -91,7 +87,7 @@ def test_a_surface_folded_by_noise_is_clipped_and_its_halves_add_up() -> None:
 @pytest.mark.parametrize("name", solids())
 def test_a_clipped_part_measures_alike_with_its_ready_tree_and_without(name: str) -> None:
     mesh = solids()[name]
-    solid = component(mesh)
+    solid = component_of(mesh)
     for hull in hulls(mesh, 5):
         part = solid.inside(hull)
         if not part.size:
@@ -104,10 +100,9 @@ def test_a_clipped_part_measures_alike_with_its_ready_tree_and_without(name: str
 
 
 def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> None:
-    ball = component(solids()["bumpy ball"])
+    ball = component_of(solids()["bumpy ball"])
     around = Hull.of(3 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
     inside = Hull.of(0.5 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
-    assert around is not None
     assert ball.inside(around).size == len(ball.faces)
     assert ball.inside(inside).volume == pytest.approx(inside.volume, abs=1e-6)
 
@@ -116,7 +111,7 @@ def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> 
 def test_hulls_that_take_in_what_is_uncovered_cover_the_surface(name: str) -> None:
     """Hulls of pieces of a shrunk copy miss the surface everywhere; each then takes in its share, and little more."""
     mesh = solids()[name]
-    shrunk = component(mesh.copy().apply_scale(0.97))
+    shrunk = component_of(mesh.copy().apply_scale(0.97))
     x = np.linspace(*shrunk.box[:, 0], 6)[1:-1]
     pieces, rest = [], to_manifold(shrunk.vertices, shrunk.faces)
     for offset in x:
@@ -126,12 +121,10 @@ def test_hulls_that_take_in_what_is_uncovered_cover_the_surface(name: str) -> No
     pieces.append(rest)
     corners = [np.array(piece.to_mesh64().vert_properties[:, :3]) for piece in pieces]
     small = [hull for points in corners if (hull := Hull.of(points)) is not None]
-    solid = component(mesh)
+    solid = component_of(mesh)
     missed = solid.filling.uncovered([h.vertices for h in small], [h.faces for h in small], 0.1, 1e-3)
     grown = [Hull.of(np.concatenate([h.vertices, p])) for h, p in zip(small, missed, strict=True)]
-    assert all(hull is not None for hull in grown)
-    covering = [hull for hull in grown if hull is not None]
-    assert hull_union(covering, 1).under(solid.vertices, solid.faces, 1e-5, 1)[1] <= 2e-5
+    assert hull_union(grown, 1).under(solid.vertices, solid.faces, 1e-5, 1)[1] <= 2e-5
     need = hull_union(small, 1).under(solid.vertices, solid.faces, 1e-4, 1)[1]
-    for before, after in zip(small, covering, strict=True):
+    for before, after in zip(small, grown, strict=True):
         assert hull_union([before], 1).distance(after.vertices, 1).max() < 6 * need + 1e-2

@@ -36,24 +36,33 @@ def case(solid: Closed = ELL, **options: Any) -> Case:
 
 def test_good_hulls_pass() -> None:
     assert judge(case()) == []
-    assert judge(case(criterion=rlacd.NavigableSpace(0.05, 0.02))) == []
+    assert judge(case(**SPACE)) == []
 
 
-def test_a_missing_hull_is_seen() -> None:
-    good = case()
-    assert len(good.hulls) == 2
-    less = replace(good, hulls=good.hulls[:1], report={**good.report, "parts": 1})
-    assert any("out of the hulls" in word for word in judge(less))
+SPACE = {"criterion": rlacd.NavigableSpace(0.05, 0.02)}
 
 
-def test_hulls_larger_than_promised_are_seen() -> None:
-    good = case()
-    whole = case(threshold=1.5)
-    assert len(whole.hulls) == 1
-    assert judge(whole) == []
-    found = judge(replace(whole, options=good.options, report={**good.report, "parts": 1}))
-    assert any("beyond the input" in word for word in found)
-    assert any("concave" in word for word in found)
+@pytest.mark.parametrize(
+    ("seen", "count", "options", "said"),
+    [
+        ("out of the hulls", 1, None, {}),
+        ("beyond the input", None, None, {}),
+        ("concave", None, None, {}),
+        ("more than 0.05, and no word of it", None, {"threshold": 0.05}, {}),
+        ("into a ball", None, SPACE, {"concavity": None}),
+    ],
+)
+def test_what_was_promised_and_is_not_so_is_seen(
+    seen: str, count: int | None, options: dict[str, Any] | None, said: dict[str, Any]
+) -> None:
+    """The first of two hulls alone, or one hull of all under the options of a decomposition into more."""
+    good, whole = case(), case(threshold=1.5)
+    assert (len(good.hulls), len(whole.hulls), judge(whole)) == (2, 1, [])
+    given = good if count else whole
+    wrong = replace(
+        given, hulls=given.hulls[:1], options=options or good.options, report={**given.report, "parts": 1, **said}
+    )
+    assert any(seen in word for word in judge(wrong))
 
 
 def test_hulls_may_extend_to_faces_without_area() -> None:
@@ -66,19 +75,6 @@ def test_hulls_may_extend_to_faces_without_area() -> None:
     assert any("beyond the input" in word for word in judge(larger))
     found = judge(replace(larger, shape=flat, report={**good.report, "hausdorff": {"over": 0.3, "under": 0.0}}))
     assert not any("reach 1 beyond" in word for word in found), "the tip is a point of the input"
-
-
-def test_a_concavity_above_the_threshold_has_to_be_said() -> None:
-    whole = case(threshold=1.5)
-    found = judge(replace(whole, options={"threshold": 0.05}))
-    assert any("more than 0.05, and no word of it" in word for word in found)
-
-
-def test_a_hull_in_the_way_of_a_ball_is_seen() -> None:
-    space = rlacd.NavigableSpace(0.05, 0.02)
-    whole = case(threshold=1.5)
-    found = judge(replace(whole, options={"criterion": space}, report={**whole.report, "concavity": None}))
-    assert any("into a ball" in word for word in found)
 
 
 @pytest.mark.parametrize("limit", [{"max_vertices": 7}, {"max_faces": 11}, {"max_hulls": 1}])

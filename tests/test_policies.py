@@ -9,24 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
-from manifold3d import Manifold, Mesh64
+from manifold3d import Manifold
 
 import rlacd
 from rlacd.options.names import LEARNED
 from rlacd.policies import make_policy
 from rlacd.policies.greedy import RandomShortlist, excess_norm, hull_sum
 from rlacd.policies.learned import PROMISING
+from tests.shapes import table, to_manifold
 
 DOCS = Path(__file__).parent.parent / "docs" / "policies.md"
-
-
-def table() -> trimesh.Trimesh:
-    """A top and two legs of unlike sizes."""
-    parts = [((2, 1.2, 0.1), (0, 0, 1)), ((0.11, 0.12, 1), (-0.9, 0.5, 0.45)), ((0.14, 0.13, 1), (0.8, -0.4, 0.45))]
-    boxes = [Manifold.cube(size, True).translate(place) for size, place in parts]
-    mesh = (boxes[0] + boxes[1] + boxes[2]).to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts)
 
 
 def of_the_docs(name: str) -> Any:
@@ -67,9 +59,8 @@ class Answers:
 
 def hollow_table() -> Manifold:
     """A table whose top is a frame: it takes more than a few cuts."""
-    mesh = table()
-    top = Manifold.cube((1.2, 0.6, 0.5), True).translate((0, 0, 1))
-    return Manifold(Mesh64(np.asarray(mesh.vertices), np.asarray(mesh.faces, np.uint64))) - top
+    top = Manifold.cube((1.2, 0.6, 0.5), True).translate((1, 0.5, 1))
+    return to_manifold(table().vertices, table().faces) - top
 
 
 def test_the_shipped_policy_takes_one_of_greedys_best_planes_and_ignores_what_was_cut_before() -> None:

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.criteria.criterion import Criterion
-from rlacd.run import Run
 from rlacd.search.recut import Exchange
 from rlacd.search.redistribute import redistribute
 from rlacd.solid.component import Component, Part
@@ -68,13 +67,6 @@ def test_all_or_nothing() -> None:
     solid = together([slab, long, tower])
     assert redistribute(bent, [slab], CRITERION, np.random.default_rng(0), solid) is None
     assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid) is not None
-
-
-def test_without_time_pieces_are_not_halved() -> None:
-    left, middle, right = bent_bar()
-    solid = together([left, middle, right])
-    for seed in range(5):
-        assert redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Run(1, -1.0)) is None
 
 
 @settings(max_examples=30, deadline=None)

@@ -17,11 +17,10 @@ import pytest
 import fuzz.light
 import fuzz.warm
 from fuzz import soak
-from fuzz.cases import case_of, file_of, inputs, minimised, try_case
+from fuzz.cases import case_of, file_of, minimised, try_case
 from fuzz.faults import Fault, Run, complaints, left_behind
 from fuzz.light import READ, REFUSED, LightTrials, wrong_in
 from fuzz.mutations import Seed
-from fuzz.recipes import Shape
 from fuzz.soak import reasons
 from fuzz.trials import Laboratory, Trial, seeds_from
 from fuzz.warm import WarmTrials
@@ -57,38 +56,6 @@ def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) ->
     one, two = (laboratory.trial(number) for _ in range(2))
     assert one.is_well, one.said
     assert replace(one, cpu=0) == replace(two, cpu=0)
-
-
-class Pretended:
-    """In place of a laboratory: whatever has triangle (0, 1, 2) and options `a` and `b` is wrong."""
-
-    def __init__(self) -> None:
-        vertices = np.random.default_rng(0).normal(size=(30, 3))
-        self.whole = Shape(vertices, np.arange(30).reshape(-1, 3), ("ten triangles",))
-        self.sought = vertices[:3]
-
-    def shape(self, number: int) -> tuple[Shape, dict[str, Any]]:
-        return self.whole, {}
-
-    def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial:
-        found = any((shape.vertices[face] == self.sought).all() for face in shape.faces)
-        wrong = found and {"a", "b"} <= set(options)
-        return replace(
-            trial, end="wrong" if wrong else "done", said=["it is wrong by 3"] if wrong else [], options=options
-        )
-
-
-def test_a_case_is_made_small_and_is_tried_as_it_stands() -> None:
-    options = {"threshold": 0.1, "a": 1, "seed": 3, "b": 2, "threads": 1}
-    pretended: Any = Pretended()
-    case = case_of(Trial(0, 7, "shape", "wrong", ["it is wrong by 3"], ["ten triangles"], options))
-    small = minimised(pretended, case, tries=100)
-    assert set(small["options"]) == {"threshold", "a", "b", "threads"}
-    assert small["faces"] == [[0, 1, 2]]
-    again = json.loads(json.dumps(small))
-    shape, _ = inputs(pretended, again)
-    assert (shape.vertices == pretended.sought).all()
-    assert try_case(pretended, again).end == "wrong"
 
 
 def test_a_soak_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:

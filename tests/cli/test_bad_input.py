@@ -17,10 +17,10 @@ from trimesh import creation
 
 import rlacd
 from rlacd.cli.main import app
-from rlacd.errors import EmptyMeshError, MeshDataError, OptionError, OutputError, RlacdError
+from rlacd.errors import EmptyMeshError, MeshDataError, OptionError, RlacdError
 from rlacd.repair import repair as repairing
 from tests.hulls import assert_convex_hull
-from tests.shapes_bad import arrays, band, ell, folded_sphere, klein_bottle
+from tests.shapes_bad import arrays, ell
 
 ELL, FACES = ell()
 BOX = arrays(creation.box())
@@ -28,7 +28,6 @@ NO_FACES = np.zeros((0, 3), dtype=int)
 
 
 def check(mesh: Any, **options: Any) -> rlacd.Decomposition:
-    """Decompose and judge what came out."""
     result = rlacd.decompose(mesh, threads=1, **options)
     assert len(result) >= 1
     for hull in result:
@@ -110,14 +109,6 @@ def test_closed_bodies_that_hide_each_other_count_once() -> None:
         all_of_them = check((np.concatenate(bodies), stacked))
         assert len(all_of_them) == len(one)
         assert sum(hull.volume for hull in all_of_them) == pytest.approx(sum(hull.volume for hull in one), rel=1e-3)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("surface", [klein_bottle, lambda: arrays(band(1, 30)), folded_sphere])
-def test_surfaces_without_an_inside_are_covered(surface: Any) -> None:
-    vertices, faces = surface()
-    result = check((vertices, faces), threshold=0.2)
-    assert result.report["hausdorff"]["under"] < 0.07
 
 
 FAR = (np.vstack([ELL, [[1e6, 0, 0]]]), np.vstack([FACES, [[0, 1, len(ELL)]]]))
@@ -334,14 +325,6 @@ def test_an_output_that_cannot_be_written_has_code_3(output: str, says: str, tmp
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_the_library_refuses_names_that_no_file_can_have(tmp_path: Path) -> None:
-    result = rlacd.decompose(BOX)
-    for name in ("\0.glb", "y" * 300 + ".stl"):
-        with pytest.raises(OutputError):
-            result.save(tmp_path / name)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.promise("input-kept")
 def test_links_are_followed_and_their_target_is_never_overwritten(tmp_path: Path) -> None:
     real, link = tmp_path / "box.stl", tmp_path / "link.stl"
@@ -395,15 +378,7 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
     path, output = tmp_path / "box.stl", tmp_path / "out.glb"
     creation.box().export(path)
     output.write_bytes(b"old")
-    command = [
-        sys.executable,
-        "-c",
-        "from rlacd.cli.main import main; main()",
-        "decompose",
-        str(path),
-        "-o",
-        str(output),
-    ]
+    command = [sys.executable, "-m", "rlacd", "decompose", str(path), "-o", str(output)]
     done = subprocess.run(
         command,
         capture_output=True,
@@ -419,7 +394,6 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("limits", [{}, {"max_faces": 8}, {"max_vertices": 4}, {"preset": "unreal"}])
 def test_hulls_of_coordinates_near_the_largest_number_stay_finite(limits):
-    """Found by the soak: a hull with few faces reaches beyond its points, and there to infinity."""
     points = np.array(
         [[1e308, 0, 4], [-23, 0, 13], [-14, 0, 4], [-14, 0, 13], [-14, 0.1, 13], [1e308, 1.7e308, -1e308]]
     )

@@ -69,15 +69,6 @@ def test_volumes_do_not_count() -> None:
     assert measured.volume_radius == 0
 
 
-@pytest.mark.parametrize("shape", [comb, bored])
-def test_a_distance_takes_no_more_hulls_than_a_concavity_of_the_same_number(shape: object) -> None:
-    by_distance, by_concavity = (
-        rlacd.decompose(shape(), criterion=name, quality="fast", threads=1)  # type: ignore[operator, arg-type]
-        for name in ("distance", "concavity")
-    )
-    assert len(by_distance) <= len(by_concavity)
-
-
 def test_a_length_is_a_distance_unless_the_criterion_is_named(tmp_path: Path) -> None:
     path = tmp_path / "comb.glb"
     comb().export(path)

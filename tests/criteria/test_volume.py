@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import manifold3d
-import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
@@ -17,12 +16,7 @@ from rlacd.compat.vhacd import compute_vhacd
 from rlacd.errors import OptionError
 from tests.hulls import assert_convex_hull
 from tests.models import table
-from tests.shapes import trimesh_of
-
-
-def manifold_of(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
-    vertices, faces = np.array(mesh.vertices, order="C"), np.array(mesh.faces, dtype=np.uint64, order="C")
-    return manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
+from tests.shapes import to_manifold, trimesh_of
 
 
 def cup() -> trimesh.Trimesh:
@@ -43,11 +37,11 @@ def torus() -> trimesh.Trimesh:
 def test_no_hull_adds_more_than_the_share(shape: object, tolerance: float) -> None:
     mesh: trimesh.Trimesh = shape()  # type: ignore[operator]
     result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=tolerance, threads=1)
-    solid = manifold_of(mesh)
+    solid = to_manifold(mesh.vertices, mesh.faces)
     least = 1e-3 * mesh.convex_hull.volume
     for hull in result:
         assert_convex_hull(hull)
-        inside = (manifold_of(hull) ^ solid).volume()
+        inside = (to_manifold(hull.vertices, hull.faces) ^ solid).volume()
         assert hull.volume - inside <= tolerance * max(inside, least) * (1 + 1e-6) + 1e-9
     measured = result.report["volume"]
     assert len(measured["per_part"]) == len(result)

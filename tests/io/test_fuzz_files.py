@@ -32,7 +32,6 @@ def shape() -> trimesh.Trimesh:
 
 
 def damaged(kind: str, number: int, folder: Path) -> Path:
-    """The file of a number."""
     write = written_by_extras if kind in APART else written
     seeds: list[Any] = [seed for of, seed in write(shape()) if of == APART.get(kind, kind)]
     rng = np.random.default_rng([7, number])

@@ -70,7 +70,6 @@ def test_what_only_looks_hostile_is_read(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_file_that_is_named_ten_thousand_times_is_read_once(tmp_path: Path) -> None:
-    """Ten thousand times a megabyte would not fit."""
     assert bounded(load, named_often(tmp_path)) == (12, 0.0)
 
 
@@ -177,7 +176,6 @@ def test_a_hostile_robot_is_refused_with_its_reason(text: str, says: str, tmp_pa
 
 @pytest.mark.parametrize(("scale", "says"), [("1e-320 1 1", "inverted"), ("1e999 1 1", "scale"), ("nan", "scale")])
 def test_a_scale_that_no_number_can_hold_is_refused(scale: str, says: str, tmp_path: Path) -> None:
-    """What is divided by the least number there is, is infinite."""
     text = COLLISION.format(f'box.stl" scale="{scale}')
     check_refused(MeshFileError, says, rewrite_robot, robot(tmp_path, f"<robot>{text}</robot>"), tmp_path / "out.urdf")
 
@@ -227,7 +225,6 @@ def test_a_batch_passes_by_what_is_no_file(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_files_beside_an_asset_are_read_once_around(tmp_path: Path) -> None:
-    """A hundred thousand spellings of one name do not make a hundred thousand copies."""
     (tmp_path / "much.bin").write_bytes(bytes(2**20))
     spelled = [{"byteLength": 1, "uri": "./" * i + "much.bin"} for i in range(1500)]
     path = tmp_path / "mesh.gltf"
@@ -276,7 +273,6 @@ def test_a_manifest_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
 
 
 def checkpoint(folder: Path) -> Path:
-    """A sound one."""
     pytest.importorskip("torch", reason="the extra train is not installed")
     from rlacd.learn.checkpoint import load_checkpoint, save_checkpoint
 

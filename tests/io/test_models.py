@@ -16,9 +16,20 @@ from lxml import etree
 import rlacd
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.io.write import MODELS, save
+from rlacd.io.write import FORMATS, MODELS, save
 from tests.hulls import assert_convex_hull, hull_of, random_hull
-from tests.models import TABLE_VOLUME, Rest, decomposed_table, fall_in_bullet, fall_in_drake, fall_in_mujoco
+from tests.models import (
+    FALLS,
+    TABLE_VOLUME,
+    Rest,
+    assert_stands,
+    decomposed_table,
+    fall_in_bullet,
+    fall_in_drake,
+    fall_in_mujoco,
+    mujoco_model,
+    points_of_geom,
+)
 
 AWKWARD = 'ein Tisch – 机 & "co" <1>'
 """Blanks, quotes, XML's own marks, and letters of other scripts."""
@@ -34,18 +45,7 @@ def renamed(result: Decomposition, name: str, **changes: Any) -> Decomposition:
     return Decomposition(parts["hulls"], {**result.report, "name": name}, parts["source"])
 
 
-def assert_stands(rest: Rest, result: Decomposition, density: float = 1000.0) -> None:
-    """The table stands on its legs: it weighs what it should, every hull counts, and it neither sinks nor creeps."""
-    assert rest.mass == pytest.approx(TABLE_VOLUME * density, rel=1e-6)
-    assert rest.hulls == len(result)
-    assert abs(rest.lowest) < 2e-3
-    assert rest.speed < 1e-2
-
-
 # --- simulators -------------------------------------------------------------------------------------------------------
-
-
-FALLS = [(fall_in_mujoco, "xml"), (fall_in_bullet, "urdf"), (fall_in_drake, "sdf"), (fall_in_drake, "urdf")]
 
 
 @pytest.mark.parametrize(("fall", "ending"), FALLS)
@@ -55,8 +55,7 @@ def test_a_table_stands_in_every_simulator(tmp_path: Path, wooden: Decomposition
 
 
 def test_mujoco_reads_urdf_too(tmp_path: Path, wooden: Decomposition) -> None:
-    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
-    model = mujoco.MjModel.from_xml_path(str(wooden.save(tmp_path / "table.urdf")))
+    model = mujoco_model(wooden.save(tmp_path / "table.urdf"))
     assert int(model.geom_contype.astype(bool).sum()) == len(wooden)
     assert model.ngeom == len(wooden) + 1, "the hulls and what is seen"
 
@@ -100,8 +99,7 @@ def test_yourdfpy_reads_urdf(tmp_path: Path, wooden: Decomposition) -> None:
 @pytest.mark.promise("mass")
 def test_mass_and_inertia_are_those_of_the_solid(tmp_path: Path, wooden: Decomposition, density: float) -> None:
     """Compared with trimesh's integrals over the closed input, which knows nothing of hulls."""
-    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
-    model = mujoco.MjModel.from_xml_path(str(wooden.save(tmp_path / "table.xml", density=density)))
+    model = mujoco_model(wooden.save(tmp_path / "table.xml", density=density))
     table = wooden.source.copy()
     table.density = density
     assert model.body_mass[1] == pytest.approx(table.mass, rel=1e-6)
@@ -180,13 +178,6 @@ def test_unreal_finds_the_hulls_of_the_mesh_by_name(tmp_path: Path, wooden: Deco
         assert read.geometry[f"UCX_my_table_{index:02d}"].volume == pytest.approx(hull.volume, rel=1e-5)
 
 
-def test_godot_finds_hulls_by_the_end_of_their_names(tmp_path: Path, wooden: Decomposition) -> None:
-    read = trimesh.load_scene(wooden.save(tmp_path / "table.glb", file_format="godot"), process=False)
-    nodes = {name for name in read.graph.nodes_geometry if name.endswith("-convcolonly")}
-    assert len(nodes) == len(wooden)
-    assert set(read.graph.nodes_geometry) - nodes == {"mesh"}
-
-
 # --- what is awkward --------------------------------------------------------------------------------------------------
 
 
@@ -223,6 +214,7 @@ def test_names_that_xml_or_disks_cannot_hold_are_made_plain(tmp_path: Path, wood
 @pytest.mark.parametrize("ending", ["xml", "urdf"])
 def test_thin_tiny_and_far_bodies_load(tmp_path: Path, ending: str) -> None:
     shapes = {
+        "flat": trimesh.creation.box((1.0, 1.0, 0.0)),
         "thin": trimesh.creation.box((1.0, 1.0, 1e-4)),
         "tiny": trimesh.creation.box((1e-4, 2e-4, 1e-4)),
         "far": trimesh.creation.box((0.1, 0.1, 0.1), transform=trimesh.transformations.translation_matrix([5e5, 0, 9])),
@@ -243,17 +235,9 @@ def loaded_in_bullet(path: Path, _: float) -> Rest:
         bullet.disconnect(client)
 
 
-def test_a_flat_mesh_to_look_at_is_no_obstacle(tmp_path: Path) -> None:
-    square = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
-    result = rlacd.decompose(square, threads=1)
-    assert fall_in_mujoco(result.save(tmp_path / "square.xml"), 0.1).hulls == len(result)
-    assert loaded_in_bullet(result.save(tmp_path / "square.urdf"), 0.0).hulls == len(result)
-
-
 def test_the_input_is_seen_and_hulls_collide(tmp_path: Path, wooden: Decomposition) -> None:
     """In MuJoCo by groups, which its viewer switches; in URDF and SDF by elements."""
-    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
-    model = mujoco.MjModel.from_xml_path(str(wooden.save(tmp_path / "table.xml")))
+    model = mujoco_model(wooden.save(tmp_path / "table.xml"))
     for group, count, collides in ((2, 1, False), (3, len(wooden), True)):
         members = np.flatnonzero(model.geom_group == group)
         assert len(members) == count
@@ -272,15 +256,13 @@ def test_far_from_the_origin_a_model_keeps_the_shape_and_the_place(tmp_path: Pat
     mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
     far = trimesh.creation.box((0.1, 0.1, 0.1), transform=trimesh.transformations.translation_matrix([5e5, 0.03, 9]))
     result = rlacd.decompose(far, threads=1)
-    model = mujoco.MjModel.from_xml_path(str(result.save(tmp_path / "far.xml")))
+    model = mujoco_model(result.save(tmp_path / "far.xml"))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     for geom in range(model.ngeom):
-        mesh = model.geom_dataid[geom]
-        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-        points = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T
+        points = points_of_geom(model, data, geom)
         assert np.ptp(points, axis=0) == pytest.approx([0.1, 0.1, 0.1], abs=1e-6)
-        assert points.mean(axis=0) + data.geom_xpos[geom] == pytest.approx([5e5, 0.03, 9], abs=1e-6)
+        assert points.mean(axis=0) == pytest.approx([5e5, 0.03, 9], abs=1e-6)
     for ending in ("urdf", "sdf"):
         path = result.save(tmp_path / f"far.{ending}")
         for file in (tmp_path / f"far_{ending}").glob("*.obj"):
@@ -289,7 +271,7 @@ def test_far_from_the_origin_a_model_keeps_the_shape_and_the_place(tmp_path: Pat
         assert "500000" in path.read_text().replace(",", "")
 
 
-@pytest.mark.parametrize("ending", ["xml", "urdf", "sdf", "usda"])
+@pytest.mark.parametrize("ending", [*FORMATS, "xml", "urdf", "sdf", "usda"])
 def test_same_decomposition_same_bytes(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
     if ending == "usda":
         pytest.importorskip("pxr", reason="the extra usd is not installed")
@@ -361,7 +343,11 @@ def test_folders_that_may_not_be_written_to_are_reported_before_any_work(
 
 
 @pytest.mark.promise("own-files")
-def test_what_others_put_in_the_folder_of_meshes_is_not_replaced(tmp_path: Path, wooden: Decomposition) -> None:
+def test_what_others_put_where_the_meshes_go_is_not_replaced(tmp_path: Path, wooden: Decomposition) -> None:
+    (tmp_path / "table_mjcf").write_text("mine")
+    with pytest.raises(OutputError, match="it is a file, not a folder"):
+        wooden.save(tmp_path / "table.xml")
+    assert (tmp_path / "table_mjcf").read_text() == "mine"
     (tmp_path / "table_urdf").mkdir()
     theirs = tmp_path / "table_urdf" / "mesh_000.obj"
     theirs.write_text("mine")
@@ -369,13 +355,6 @@ def test_what_others_put_in_the_folder_of_meshes_is_not_replaced(tmp_path: Path,
         wooden.save(tmp_path / "table.urdf")
     assert theirs.read_text() == "mine"
     assert not (tmp_path / "table.urdf").exists()
-
-
-def test_a_file_where_the_folder_of_meshes_goes_is_refused(tmp_path: Path, wooden: Decomposition) -> None:
-    (tmp_path / "table_mjcf").write_text("mine")
-    with pytest.raises(OutputError, match="it is a file, not a folder"):
-        wooden.save(tmp_path / "table.xml")
-    assert (tmp_path / "table_mjcf").read_text() == "mine"
 
 
 def test_saving_again_replaces_model_and_meshes_and_nothing_else(tmp_path: Path, wooden: Decomposition) -> None:

@@ -158,16 +158,7 @@ def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) ->
         given = {"robot": missing, "output": tmp_path / "out.urdf", name: odd}
         assert_accepted_or_told(lambda given=given: rlacd.rewrite_robot(**given), RlacdError)
     nothing = coacd.Mesh()
-    for name in (
-        "threshold",
-        "max_convex_hull",
-        "merge",
-        "decimate",
-        "max_ch_vertex",
-        "apx_mode",
-        "seed",
-        "real_metric",
-    ):
+    for name in inspect.signature(coacd.run_coacd).parameters.keys() - {"mesh"}:
         assert_accepted_or_told(lambda name=name: coacd.run_coacd(nothing, **{name: odd}), RlacdError)
     for name in ("maxConvexHulls", "maxNumVerticesPerCH", "asyncACD"):
         assert_accepted_or_told(lambda name=name: vhacd.compute_vhacd([], [], **{name: odd}), RlacdError)

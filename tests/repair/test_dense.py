@@ -45,7 +45,6 @@ def box_with_room():
 
 @pytest.mark.parametrize(("times", "noise"), [(0, 0.0), (4, 0.0), (4, 1e-3)])
 def test_a_room_of_sheets_on_a_box_is_filled_and_the_box_stays(times, noise):
-    """The sheets that only bound the room gave way to its filling, and the box, of the same body, went with them."""
     mesh = finely(box_with_room(), times, noise)
     solid = solid_of(mesh)
     assert volume(solid) == pytest.approx(12, rel=0.02)
@@ -74,7 +73,6 @@ def solid_as_read(mesh):
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", AS_SOLID)
 def test_noisy_copies_of_real_meshes_are_as_solid(corpus, name):
-    """Their solids had 0.2 to 0.6 of the volume: what was solid became sheets."""
     before, after = map(solid_as_read, noisy_copy(corpus, name))
     assert volume(after) == pytest.approx(volume(before), rel=0.1)
 
@@ -105,7 +103,6 @@ def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["kitchenCabinetUpper", "kitchenMicrowave"])
 def test_slits_too_thin_to_have_a_volume_need_no_cuts(corpus, name):
-    """Between what fills a room and its noisy walls: 2 and 3 hulls became 32 and 17."""
     mesh, copy = noisy_copy(corpus, f"train/kenney_cc0/furniture_pack__{name}.ply")
     before, after = (
         len(rlacd.decompose(trimesh.Trimesh(m.vertices, m.faces, process=False), quality="fast")) for m in (mesh, copy)

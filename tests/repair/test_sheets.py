@@ -22,13 +22,6 @@ def test_a_flat_card_becomes_a_thin_slab():
     assert solid.bodies[0].deviation == pytest.approx(HALF_THICKNESS, rel=1e-6)
 
 
-def test_a_closed_body_without_volume_becomes_a_slab():
-    flat = BOX.copy()
-    flat.vertices[:, 2] = 0
-    solid = solid_of(trimesh.Trimesh(flat.vertices, flat.faces, process=False))
-    assert solid.manifold.volume() == pytest.approx(4 * 2 * HALF_THICKNESS, rel=0.1)
-
-
 def test_a_sheet_that_hangs_between_two_boxes_stays():
     """All its corners are corners of the boxes."""
     left, right = moved(BOX, -3, 0, 0), moved(BOX, 3, 0, 0)
@@ -40,7 +33,6 @@ def test_a_sheet_that_hangs_between_two_boxes_stays():
 
 @pytest.mark.parametrize("tip", [(1.6, 0.5, 1.7), (1.7, 0.1, 1.8), (2.3, 0.1, 2.2)])
 def test_a_fin_that_leans_into_its_body_is_kept_where_it_comes_out_again(tip):
-    """It begins inside: where another fin did not, fins on a person's scan lost their tips, 0.04 long."""
     plate = trimesh.creation.box((4, 0.4, 4))
     corners = [int(np.argmin(np.linalg.norm(plate.vertices - (x, y, 2), axis=1))) for x in (2, -2) for y in (-0.2, 0.2)]
     fins = [[*corners[:2], 8], [*corners[2:], 9]]
@@ -55,7 +47,6 @@ def test_a_fin_that_leans_into_its_body_is_kept_where_it_comes_out_again(tip):
 
 
 def test_a_film_that_begins_inside_its_body_is_kept_where_it_leads_out():
-    """Its middle is inside: the whole film was dropped for that, and its tip missed by 0.33 without a word."""
     corners = [int(np.argmin(np.linalg.norm(BOX.vertices - at, axis=1))) for at in ((-1, -1, -1), (1, -1, -1))]
     film = [[*corners, 8], [*corners[::-1], 8]]
     tip = np.array([[0.0, 0.9, 2.0]])
@@ -129,7 +120,6 @@ def test_hundreds_of_leaves_are_one_crowd():
 
 @pytest.mark.slow
 def test_a_crowd_leaves_no_leaf_outside():
-    """The wrap cut up to 0.003 off the tips of leaves."""
     vertices, faces = with_leaves(310)
     solid = solid_of((vertices, faces))
     assert set(steps(solid)) == {"wrapped"}

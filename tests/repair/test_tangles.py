@@ -122,7 +122,7 @@ def test_bodies_that_cross_each_other_are_no_tangle(apart: float) -> None:
 
 @pytest.mark.slow
 def test_a_body_with_large_faces_that_is_inside_out_here_and_there_is_a_tangle() -> None:
-    """A bracket of 28 triangles, one of them gone and two with a wrong corner: it used to end as 927 hulls."""
+    """A bracket of 28 triangles, one of them gone and two with a wrong corner."""
     result = rlacd.decompose(FAULTY_BRACKET, threads=2, quality="fast")
     assert len(result) < 60
     assert result.report["hausdorff"]["under"] < 1e-3

@@ -10,17 +10,13 @@ import rlacd
 from rlacd.decomposition import Decomposition
 from rlacd.view.heat import FINEST, INNER, HeatMesh, frame_of, heat_map
 from tests.hulls import hull_of
+from tests.shapes import elbow
 
 MEASURED_WITHIN = 2e-3  # width of the interval that the report's distance comes from
 
 
 def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> trimesh.Trimesh:
     return trimesh.creation.box(bounds=[lower, upper])
-
-
-def elbow() -> trimesh.Trimesh:
-    """An L with a beam each way."""
-    return trimesh.util.concatenate([box((0, 0, 0), (2, 0.4, 0.4)), box((0, 0, 0), (0.4, 0.4, 2))])
 
 
 def hottest(heat: list[HeatMesh]) -> float:

@@ -33,6 +33,7 @@ from rlacd.options.navigable import NavigableSpace
 from rlacd.view.controls import ViewerControls, read_controls
 from rlacd.view.downloads import offered
 from rlacd.view.server import ViewServer
+from tests.shapes import elbow
 from tests.view.viewing import open_viewer
 
 PATIENCE = 60.0
@@ -41,9 +42,8 @@ NAME = "an elbow 'n ümläut"
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    beams = ([(0, 0, 0), (2, 0.4, 0.4)], [(0, 0, 0), (0.4, 0.4, 2)])
     path = tmp_path_factory.mktemp("view") / f"{NAME}.stl"
-    trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in beams]).export(path)
+    elbow().export(path)
     return path
 
 
