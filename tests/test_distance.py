@@ -366,14 +366,6 @@ def test_samples_are_spread_by_area() -> None:
         np.testing.assert_allclose(points.mean(axis=0), [0.5, 1, 1.5], atol=0.02)  # the surface's centroid
 
 
-def test_samples_of_one_triangle_are_uniform() -> None:
-    triangle = Closed(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]], dtype=np.int32))
-    points, _ = _native.sample_surface(triangle.vertices, triangle.faces, 4000, 3)
-    cells, _, _ = np.histogram2d(points[:, 0], points[:, 1], bins=[0, 0.25, 0.5, 0.75, 1])
-    whole = [cells[i, j] for i in range(4) for j in range(4) if i + j < 3]
-    np.testing.assert_allclose(whole, 4000 / 8, rtol=0.06)
-
-
 @pytest.mark.parametrize(
     ("vertices", "faces", "says"),
     [

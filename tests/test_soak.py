@@ -175,30 +175,25 @@ def test_a_small_shape_is_decomposed_and_judged(light: LightTrials, monkeypatch:
 
 
 @pytest.mark.parametrize(
-    ("raised", "end"),
-    [(KeyError("x"), "untyped"), (MemoryError(), "memory"), (fuzz.light.rlacd.RlacdError("two\nlines"), "wrong")],
+    ("raised", "end", "opened"),
+    [
+        (KeyError("x"), "untyped", ""),
+        (MemoryError(), "memory", ""),
+        (fuzz.light.rlacd.RlacdError("two\nlines"), "wrong", ""),
+        (fuzz.light.rlacd.MeshFileError("refused"), "wrong", "/etc/hostname"),
+    ],
 )
-def test_what_is_no_sentence_is_a_failure(
-    raised: Exception, end: str, light: LightTrials, monkeypatch: pytest.MonkeyPatch
+def test_what_is_no_sentence_or_opens_another_file_is_a_failure(
+    raised: Exception, end: str, opened: str, light: LightTrials, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(_: object) -> None:
+    def fails(path: Path) -> None:
+        Path(opened or path).read_bytes()
         raise raised
 
     monkeypatch.setattr(fuzz.light, "load_mesh", fails)
-    assert light.reread(Trial(0, 0, "read"), "obj", Seed(b"v 0 0 0")).end == end
-
-
-def test_a_file_that_makes_the_reader_open_another_is_a_failure(
-    light: LightTrials, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def curious(path: Path) -> None:
-        Path("/etc/hostname").read_bytes()
-        raise fuzz.light.rlacd.MeshFileError("refused")
-
-    monkeypatch.setattr(fuzz.light, "load_mesh", curious)
     trial = light.reread(Trial(0, 0, "read"), "obj", Seed(b"v 0 0 0"))
-    assert trial.end == "wrong"
-    assert "it opened '/etc/hostname'" in trial.said
+    assert trial.end == end
+    assert (f"it opened '{opened}'" in trial.said) == bool(opened)
 
 
 def test_a_mesh_that_is_none_is_seen() -> None:

@@ -184,12 +184,8 @@ def test_the_command_is_copied(viewer: ViewServer, mesh: Path, browser: Any) -> 
 @pytest.mark.nightly
 def test_terms_are_explained_where_they_stand(seen: Watched) -> None:
     page = seen.page
-    for name in (
-        "#summary .term >> nth=0",
-        "#controls .term >> nth=0",
-        "button[data-format=mjcf]",
-        "#parts th >> nth=3",
-    ):
+    places = ("#summary .term >> nth=0", "#controls .term >> nth=0", "button[data-format=mjcf]", "#parts th >> nth=3")
+    for name in places:
         page.hover(name)
         page.wait_for_selector("#hint:not([hidden])")
         box = page.locator("#hint").bounding_box()
