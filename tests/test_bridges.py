@@ -14,12 +14,14 @@ import rlacd
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.criteria.criterion import Feasibility
+from rlacd.criteria.navigable import Navigable
 from rlacd.merge import merge_parts
 from rlacd.merge.merge import united_in_turn
 from rlacd.run import Run, Work
 from rlacd.solid.component import ClippedPart, Component, Part, Plane, reunite
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.primitive import Balls
 from tests.shapes import block, strangers
 
 TIGHT = Concavity(0.02)
@@ -175,3 +177,10 @@ def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:
     pieces = [Component(piece) for piece in folded.split_by_plane((1, 0.2, 0.1), 0.1)]
     united = reunite(pieces)
     assert united.volume == pytest.approx((block(2, 0.5, 0.5) + block(0.5, 2, 0.02, (0.3, 0, 0))).volume(), rel=1e-6)
+
+
+def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
+    component = Component(CROSS)
+    space = Navigable(0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
+    assert space.screen.feasibility(component.filling, component.hull) is Feasibility.NEVER
+    assert not space.screen.forbids(component.filling, component.hull)

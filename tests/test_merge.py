@@ -89,9 +89,8 @@ def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
 def test_pairs_of_nearby_boxes(across: bool) -> None:
     random = np.random.default_rng(0)
     for count in (1, 2, 30):
-        places = random.uniform(0, 4, (count, 3))
-        parts = {7 * i: Component(Manifold.cube(tuple(random.uniform(0.1, 1, 3))).translate(tuple(places[i])))
-                 for i in range(count)}  # fmt: skip
+        lower = random.uniform(0, 4, (count, 3))
+        parts = {7 * i: Component(box(tuple(at), tuple(at + random.uniform(0.1, 1, 3)))) for i, at in enumerate(lower)}
         corners = {i: part.box for i, part in parts.items()}
 
         def near(i: int, j: int, corners=corners) -> bool:

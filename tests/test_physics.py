@@ -58,13 +58,6 @@ def test_a_mug_hangs_by_its_handle_and_is_grasped_at_its_wall_as_hulls_but_not_a
     assert (one.hung, one.held) == (0, 0)
 
 
-def test_a_box_is_held_wherever_it_is_grasped_and_has_no_hole_to_hang_by() -> None:
-    box = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.06)), quality="fast", threads=1)
-    handling = handle_in_mujoco(box)
-    assert handling.held == handling.grasps > 0
-    assert handling.pegs == 0
-
-
 def test_exact_depths_are_those_of_a_ball_over_a_box() -> None:
     """On a face, a ball stops one radius above it; beside an edge, it slides down the circle around the edge."""
     box = trimesh.creation.box((0.2, 0.2, 0.2))

@@ -217,3 +217,10 @@ def test_cracks_are_closed(seed: int) -> None:
     found, _ = close_cracks(vertices, faces, Edges.of(faces, len(vertices)), (*TOLERANCES, 2e-2))
     left = len(free_edges(found, Edges.of(found, len(vertices))))
     assert left < before / 4
+
+
+def test_a_body_that_crosses_itself_is_a_result():
+    twisted = SHAPES["ring"].copy()
+    twisted.vertices[:, 0] *= np.sign(twisted.vertices[:, 1]) * 0.9 + 0.1
+    solid = solid_of(twisted)
+    assert solid.manifold.num_tri() > 0

@@ -172,10 +172,9 @@ def test_a_timeout_ends_the_work_however_large_the_input(name: str) -> None:
     assert result.report["stopped_by"] == "timeout"
     # All corners: for the surface between them there is no time here either.
     corners = mesh[0][:: max(1, len(mesh[0]) // 2000)]
-    planes = [hull for hull in result]
     left = np.ones(len(corners), dtype=bool)
     slack = 2e-3 * np.ptp(mesh[0], axis=0).max()
-    for hull in planes:
+    for hull in result:
         lower, upper = hull.bounds
         some = np.flatnonzero(left & (corners >= lower - slack).all(axis=1) & (corners <= upper + slack).all(axis=1))
         height = np.einsum("pj,fj->pf", corners[some], hull.face_normals) - np.einsum(
