@@ -58,10 +58,8 @@ def test_what_was_promised_and_is_not_so_is_seen(
     """The first of two hulls alone, or one hull of all under the options of a decomposition into more."""
     good, whole = case(), case(threshold=1.5)
     assert (len(good.hulls), len(whole.hulls), judge(whole)) == (2, 1, [])
-    given = good if count else whole
-    wrong = replace(
-        given, hulls=given.hulls[:1], options=options or good.options, report={**given.report, "parts": 1, **said}
-    )
+    report = {**(whole if options else good).report, "parts": 1, **said}
+    wrong = replace(good, hulls=(good if count else whole).hulls[:1], options=options or good.options, report=report)
     assert any(seen in word for word in judge(wrong))
 
 
