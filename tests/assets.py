@@ -140,6 +140,16 @@ class Rig:
         return path
 
 
+def write_mesh(mesh: trimesh.Trimesh, path: Path) -> Path:
+    """Write a mesh in the format that the path ends in; glTF brings its buffers along."""
+    if path.suffix == ".gltf":
+        for name, content in trimesh.Scene(mesh).export(file_type="gltf").items():
+            (path if name == "model.gltf" else path.with_name(name)).write_bytes(content)
+    else:
+        (trimesh.Scene(mesh) if path.suffix in (".glb", ".3mf") else mesh).export(path)
+    return path
+
+
 def read_glb(path: Path) -> tuple[Json, bytes, list[tuple[bytes, bytes]]]:
     """The JSON of a GLB file, its binary chunk and its other chunks; checks all lengths."""
     content = path.read_bytes()

@@ -46,6 +46,18 @@ def decomposed_table() -> Decomposition:
     return rlacd.decompose(table(), threads=1)
 
 
+def mujoco_model(path: Path) -> Any:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    return mujoco.MjModel.from_xml_path(str(path))
+
+
+def points_of_geom(model: Any, data: Any, geom: int) -> Any:
+    """Where the corners of a geom's mesh lie in the world."""
+    mesh = model.geom_dataid[geom]
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    return model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+
+
 def fall_in_mujoco(path: Path, seconds: float = 1.5) -> Rest:
     mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
     spec = mujoco.MjSpec.from_file(str(path))
@@ -69,10 +81,7 @@ def _lowest_in_mujoco(model: Any, data: Any, geom: int) -> float:
 
     if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
         return float(data.geom_xpos[geom, 2] - np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_size[geom])
-    mesh = model.geom_dataid[geom]
-    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-    points = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
-    return float(points[:, 2].min())
+    return float(points_of_geom(model, data, geom)[:, 2].min())
 
 
 def fall_in_bullet(path: Path, seconds: float = 1.5) -> Rest:
@@ -126,3 +135,14 @@ def fall_in_drake(path: Path, seconds: float = 1.0) -> Rest:
         float(body.default_mass()),
         len(plant.GetCollisionGeometriesForBody(body)),
     )
+
+
+FALLS = [(fall_in_mujoco, "xml"), (fall_in_bullet, "urdf"), (fall_in_drake, "sdf"), (fall_in_drake, "urdf")]
+
+
+def assert_stands(rest: Rest, result: Decomposition, density: float = 1000.0) -> None:
+    """The table stands on its legs: it weighs what it should, every hull counts, and it neither sinks nor creeps."""
+    assert rest.mass == pytest.approx(TABLE_VOLUME * density, rel=1e-6)
+    assert rest.hulls == len(result)
+    assert abs(rest.lowest) < 2e-3
+    assert rest.speed < 1e-2

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import trimesh
 from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, Mesh64
 
@@ -52,9 +53,36 @@ def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) ->
     return Manifold.cube(size).translate(lower)
 
 
-def refined(solid: Any, levels: int) -> Any:
-    """The same solid with its faces cut into many coplanar ones."""
-    return solid.refine(levels)
+def block(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Any:
+    return Manifold.cube((x, y, z), True).translate(at)
+
+
+def component_of(mesh: trimesh.Trimesh) -> Component:
+    return Component((np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int32)))
+
+
+def elbow(height: float = 2.0) -> trimesh.Trimesh:
+    """An L of two beams that overlap at its corner."""
+    beams = ([(0, 0, 0), (2, 0.4, 0.4)], [(0, 0, 0), (0.4, 0.4, height)])
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in beams])
+
+
+def table() -> trimesh.Trimesh:
+    """A top of 2 x 1 on four legs at its corners."""
+    legs = [Manifold.cube((0.1, 0.1, 1)).translate((x, y, 0)) for x in (0, 1.9) for y in (0, 0.9)]
+    return trimesh_of(sum(legs, Manifold.cube((2, 1, 0.1)).translate((0, 0, 1))))
+
+
+def is_closed(faces: Ints) -> bool:
+    """Whether every edge is run through as often one way as the other."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = edges[np.lexsort(edges.T)], edges[:, ::-1][np.lexsort(edges[:, ::-1].T)]
+    return np.array_equal(there, back)
+
+
+def trimesh_of(solid: Any) -> trimesh.Trimesh:
+    mesh = from_manifold(solid)
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
 def point_to_triangles(points: Floats, vertices: Floats, faces: Ints) -> Floats:

@@ -44,21 +44,18 @@ def klein_bottle(around: int = 24, tube: int = 12) -> Mesh:
     return vertices, np.array(faces)
 
 
-def moebius_strip(around: int = 30, across: int = 3) -> Mesh:
-    t, w = np.meshgrid(np.linspace(0, 2 * np.pi, around, endpoint=False), np.linspace(-0.4, 0.4, across), indexing="ij")
-    reach = 1 + w * np.cos(t / 2)
-    vertices = np.stack([reach * np.cos(t), reach * np.sin(t), w * np.sin(t / 2)], axis=-1).reshape(-1, 3)
+def band(twists: int, count: int = 100) -> trimesh.Trimesh:
+    """A band with half twists; an odd number makes it one-sided."""
+    t = 2 * np.pi * np.arange(count) / count
+    half = 0.3 * np.stack(
+        [np.cos(twists * t / 2) * np.cos(t), np.cos(twists * t / 2) * np.sin(t), np.sin(twists * t / 2)], axis=1
+    )
+    middle = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+    vertices = np.vstack([middle + half, middle - half])
     faces = []
-    for i in range(around):
-        for j in range(across - 1):
-            a, b = i * across + j, i * across + j + 1
-            c, d = (a + across, b + across) if i < around - 1 else (across - 1 - j, across - 2 - j)
-            faces += [[a, c, b], [b, c, d]]
-    return vertices, np.array(faces)
-
-
-def folded_sphere() -> Mesh:
-    """A sphere one half of which is turned into the other: it goes through itself."""
-    vertices, faces = arrays(creation.icosphere(1))
-    vertices[vertices[:, 0] > 0] *= [-0.8, 1, 1]
-    return vertices, faces
+    for i in range(count):
+        j, swap = (i + 1) % count, twists % 2 == 1 and i == count - 1
+        a, b = i, i + count
+        c, d = (j + count, j) if swap else (j, j + count)
+        faces += [[a, c, b], [b, c, d]]
+    return trimesh.Trimesh(vertices, faces, process=False)

@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
+import trimesh
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 Mesh = tuple[Floats, Ints]
 
-_CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
-_SQUARES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
-_CUBE = np.concatenate([_SQUARES[:, [0, 1, 2]], _SQUARES[:, [0, 2, 3]]]).astype(np.int32)
+_BOX = trimesh.creation.box(bounds=[(0, 0, 0), (1, 1, 1)])
+_CORNERS, _CUBE = np.array(_BOX.vertices), _BOX.faces.astype(np.int32)
 
 
 def sponge(level: int = 3) -> Mesh:
@@ -114,26 +114,9 @@ def bristles(count: int = 1000, seed: int = 0) -> Mesh:
 def noisy_ball(faces: int = 1_000_000, noise: float = 0.01, seed: int = 0) -> Mesh:
     """A closed ball of about this many triangles, each corner moved along its radius."""
     rings = max(3, round((faces / 4) ** 0.5))
-    around = 2 * rings
-    theta = np.pi * np.arange(1, rings) / rings
-    phi = 2 * np.pi * np.arange(around) / around
-    t, p = np.meshgrid(theta, phi, indexing="ij")
-    inner = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3)
-    vertices = np.concatenate([inner, [[0, 0, 1.0], [0, 0, -1.0]]])
-    i, j = np.meshgrid(np.arange(rings - 2), np.arange(around), indexing="ij")
-    a, b = (i * around + j).ravel(), (i * around + (j + 1) % around).ravel()
-    k = np.arange(around)
-    north, south, last = len(inner), len(inner) + 1, (rings - 2) * around
-    triangles = np.concatenate(
-        [
-            np.stack([a, a + around, b + around], axis=1),
-            np.stack([a, b + around, b], axis=1),
-            np.stack([np.full(around, north), k, (k + 1) % around], axis=1),
-            np.stack([np.full(around, south), last + (k + 1) % around, last + k], axis=1),
-        ]
-    )
-    moved = 1 + noise * np.random.default_rng(seed).normal(size=(len(vertices), 1))
-    return vertices * moved, triangles.astype(np.int32)
+    ball = trimesh.creation.uv_sphere(1.0, count=(rings, 2 * rings))
+    moved = 1 + noise * np.random.default_rng(seed).normal(size=(len(ball.vertices), 1))
+    return ball.vertices * moved, ball.faces.astype(np.int32)
 
 
 def _grid(rows: int, columns: int) -> Ints:

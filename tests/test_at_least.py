@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from manifold3d import Manifold
 
 import rlacd
@@ -18,7 +17,7 @@ from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.search.at_least import UNCOVERED, at_least
 from rlacd.solid.component import Component
-from tests.shapes import Closed, Floats, box, depth_in, from_manifold
+from tests.shapes import Closed, Floats, box, depth_in, trimesh_of
 
 REACH = 0.05
 
@@ -29,11 +28,6 @@ def comb(teeth: int) -> Manifold:
     for x in np.linspace(-0.9, 0.9, teeth):
         solid += box((x - 0.05, -0.1, 0.05), (x + 0.05, 0.1, 0.9))
     return solid
-
-
-def mesh_of(solid: Manifold) -> trimesh.Trimesh:
-    closed = from_manifold(solid)
-    return trimesh.Trimesh(closed.vertices, closed.faces, process=False)
 
 
 def apart(solid: Component, points: Floats, reach: float = REACH + UNCOVERED) -> Floats:
@@ -48,7 +42,7 @@ def points_of(solid: Component, count: int = 120) -> Floats:
 @pytest.mark.promise("at-least")
 @pytest.mark.parametrize("teeth", [2, 3, 5])
 def test_a_comb_needs_a_hull_for_every_tooth(teeth: int) -> None:
-    result = rlacd.decompose(mesh_of(comb(teeth)), threads=1)
+    result = rlacd.decompose(trimesh_of(comb(teeth)), threads=1)
     assert teeth <= result.report["at_least"] <= len(result)
 
 
@@ -93,8 +87,8 @@ def test_no_valid_hull_of_a_real_mesh_holds_two_of_the_points(corpus: Path, name
 
 
 def test_the_summary_says_what_is_proved() -> None:
-    result = rlacd.decompose(mesh_of(comb(3)), threads=1)
+    result = rlacd.decompose(trimesh_of(comb(3)), threads=1)
     least = result.report["at_least"]
     words = "hulls" if least == len(result) else f"than {least} hulls"
     assert f"no decomposition to this tolerance has fewer {words}" in summary(result, "x.obj")
-    assert rlacd.decompose(mesh_of(comb(3)), quality="fast", threads=1).report["at_least"] is None
+    assert rlacd.decompose(trimesh_of(comb(3)), quality="fast", threads=1).report["at_least"] is None

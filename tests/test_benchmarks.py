@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import inspect
 import json
 import math
@@ -14,22 +13,24 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import psutil
 import pytest
 import trimesh
 from benchmarks import compare, corpus, paper, tables, tuning, vhacd_set
 from benchmarks.__main__ import COMMANDS
-from benchmarks.charts import Curve, curves_chart
 from benchmarks.deployed import Deployment, decompose_as_deployed
 from benchmarks.methods import make_method, rlacd_options
 from benchmarks.runner import Bench, Limits, find_meshes
-from benchmarks.store import Store, Task, load_hulls, save_hulls
+from benchmarks.store import Store, Task
 from benchmarks.tables import PLACE, Ratio, Table, common_meshes, fill, ratio_of
-from benchmarks.tuning import CLOSE, next_setting, tune
+from benchmarks.training import ARMS, _options, train_arms
+from benchmarks.tuning import CLOSE, tune
 from typer.testing import CliRunner
 
 import rlacd
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from tests.shapes import box, from_manifold
+from rlacd.learn.options import PRESETS
+from tests.shapes import box, from_manifold, trimesh_of
 
 CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
 ROOT = Path(__file__).resolve().parents[1]
@@ -40,8 +41,7 @@ def meshes(tmp_path: Path) -> Path:
     folder = tmp_path / "meshes"
     for name, solid in {"a/cross.stl": CROSS, "box.ply": box((0, 0, 0), (3, 1, 1))}.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        mesh = from_manifold(solid)
-        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / name)
+        trimesh_of(solid).export(folder / name)
     return folder
 
 
@@ -53,30 +53,6 @@ def run(app: Any, *words: object, code: int = 0) -> str:
     result = CliRunner().invoke(app, [*map(str, words)])
     assert result.exit_code == code, result.output
     return result.output
-
-
-def wait_for_child(parent: int) -> int:
-    """The process that `parent` has started, once there is one; Linux only."""
-    for _ in range(600):
-        for status in Path("/proc").glob("[0-9]*/stat"):
-            with contextlib.suppress(OSError):
-                if int(status.read_text().rpartition(")")[2].split()[1]) == parent:
-                    time.sleep(1)  # let it begin
-                    return int(status.parent.name)
-        time.sleep(0.1)
-    raise AssertionError("no process was started")
-
-
-def wait_for_end(process: int) -> bool:
-    for _ in range(300):
-        try:
-            state = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
-        except OSError:
-            return True
-        if state == "Z":
-            return True
-        time.sleep(0.1)
-    return False
 
 
 class TestMethods:
@@ -110,10 +86,6 @@ class TestMethods:
         for (vertices, faces), hull in zip(made, usual, strict=True):
             assert np.array_equal(vertices, hull.vertices)
             assert np.array_equal(faces, hull.faces)
-
-    def test_options_are_passed_on(self) -> None:
-        given = rlacd_options("fast:max_vertices=32:primitives=true:policy=navacd:space")
-        assert given == {"quality": "fast", "max_vertices": 32, "primitives": True, "policy": "navacd"}
 
     def test_a_peer_that_is_not_there_says_how_to_get_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
         from importlib import metadata
@@ -167,36 +139,10 @@ def test_other_tools_run_at_their_own_defaults(monkeypatch: pytest.MonkeyPatch) 
     assert passed == [{"threshold": threshold}, {"maxConvexHulls": hulls, "asyncACD": False}]
 
 
-@pytest.mark.nightly
-def test_coacd_on_its_own_example(corpus: Path, tmp_path: Path) -> None:
-    """Version 1.0.14 has been seen to make 47 and 48 parts of SnowFlake at 0.05."""
-    pytest.importorskip("coacd")
-    bench = Bench(corpus, ["test/coacd_examples/SnowFlake.ply"], Store(tmp_path), say=lambda _: None)
-    (row,) = bench.run("coacd")
-    assert 45 <= row["parts"] <= 50
-    assert row["hausdorff"] < 0.06
-    assert row["empty"] == 0
-
-
 class TestDeployment:
-    def test_words(self) -> None:
-        words = ["no-principal", "ap=7", "excess", "ce=0"]
-        assert Deployment.parse(words) == Deployment("excess", 7, 0, True, False)
-
     def test_no_planes_at_all_is_an_error(self) -> None:
         with pytest.raises(OptionError, match="no planes are left"):
             Deployment.parse(["no-principal", "no-spatial", "ce=0"])
-
-    def test_without_the_axes_a_tilted_frame_needs_its_own(self) -> None:
-        """Along x, y, z an open frame turned by 30 degrees has no good cuts; its concave edges have."""
-        frame = box((0, 0, 0), (2, 2, 0.5)) - box((0.5, 0.5, -1), (1.5, 3, 1))
-        mesh = from_manifold(frame.rotate((0, 0, 30)))
-
-        def parts(*words: str) -> int:
-            return len(decompose_as_deployed(Deployment.parse(words), mesh.vertices, mesh.faces, 0.05, 1))
-
-        assert parts("ap=0", "ce=4") == 3
-        assert parts("ap=150", "ce=0", "no-principal") > 3
 
     def test_more_planes_ranked_is_greedy(self) -> None:
         """With all 150 planes on the shortlist and no edges, what is left is the paper's greedy baseline."""
@@ -221,23 +167,6 @@ class TestStore:
         store.close()
         assert [row["mesh"] for row in Store(tmp_path).rows()] == ["a.ply", "b.ply"]
 
-    def test_a_damaged_line_is_named(self, tmp_path: Path) -> None:
-        (tmp_path / "results.jsonl").write_text(json.dumps(self.ROW) + '\n{"mesh": 3}\n')
-        with pytest.raises(OutputError, match=r"line 2 .* delete"):
-            Store(tmp_path)
-
-    @pytest.mark.parametrize("count", [0, 3])
-    def test_hulls_come_back(self, tmp_path: Path, count: int) -> None:
-        hulls = [
-            (np.random.default_rng(i).random((4 + i, 3)), np.full((2 * i, 3), i, dtype=np.int32)) for i in range(count)
-        ]
-        save_hulls(tmp_path / "h.npz", hulls, {"cpu": 1.5})
-        found, account = load_hulls(tmp_path / "h.npz")
-        assert account == {"cpu": 1.5}
-        for (v, f), (v2, f2) in zip(hulls, found, strict=True):
-            assert np.array_equal(v, v2)
-            assert np.array_equal(f, f2)
-
 
 @pytest.mark.slow
 class TestRunner:
@@ -256,14 +185,13 @@ class TestRunner:
         (tmp_path / "run" / "results.jsonl").write_text("")
         assert bench_of(meshes, tmp_path / "run").run("fast") == rows
 
-    def test_a_hang_is_recorded_and_the_run_goes_on(self, meshes: Path, tmp_path: Path) -> None:
-        rows = bench_of(meshes, tmp_path / "run", Limits(seconds=0.05)).run("fast")
-        assert [row["error"] for row in rows] == ["more than 0.05 s"] * 2
-
-    @pytest.mark.skipif(sys.platform != "linux", reason="address space is limited on Linux only")
-    def test_too_much_memory_is_recorded(self, meshes: Path, tmp_path: Path) -> None:
-        rows = bench_of(meshes, tmp_path / "run", Limits(memory=2**28)).run("fast")
-        assert all("error" in row for row in rows)
+    @pytest.mark.parametrize(("limits", "says"), [({"seconds": 0.05}, "more than 0.05 s"), ({"memory": 2**28}, "")])
+    def test_a_hang_and_a_lack_of_memory_are_recorded(
+        self, meshes: Path, tmp_path: Path, limits: Any, says: str
+    ) -> None:
+        rows = bench_of(meshes, tmp_path / "run", Limits(**limits)).run("fast")
+        assert all(says in row["error"] for row in rows)
+        assert len(rows) == 2, "the run goes on"
 
     def test_a_crash_is_recorded(self, meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         crasher = tmp_path / "crasher"
@@ -274,7 +202,6 @@ class TestRunner:
         assert [row["error"] for row in rows] == ["died of SIGSEGV last words"] * 2
 
     @pytest.mark.nightly
-    @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
     def test_stopping_a_run_ends_its_processes_and_records_nothing(self, tmp_path: Path) -> None:
         """Whether it is interrupted or killed: no process goes on, and what was running is done again next time."""
         folder = tmp_path / "meshes"
@@ -294,12 +221,15 @@ class TestRunner:
             command = [sys.executable, "-c", program, folder, out]
             with subprocess.Popen(command, stderr=subprocess.DEVNULL, cwd=ROOT) as process:
                 try:
-                    child = wait_for_child(process.pid)
+                    parent = psutil.Process(process.pid)
+                    while not (children := parent.children()):
+                        time.sleep(0.1)
+                    time.sleep(1)  # let it begin
                     process.send_signal(number)
                     process.wait(timeout=60)
                 finally:
                     process.kill()
-            assert wait_for_end(child)
+            assert not psutil.wait_procs(children, timeout=30)[1]
             assert (out / "results.jsonl").read_text() == ""
 
     def test_a_broken_mesh_is_recorded_and_what_another_version_made_is_made_again(
@@ -321,19 +251,13 @@ class TestRunner:
 
 def test_data_sets_are_read_as_distributed(tmp_path: Path) -> None:
     """Meshes lie between textures, voxels, labels and notes, as in ShapeNetCore, COSEG and HumanBody."""
-    wanted = {
-        "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.obj": True,
-        "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.mtl": False,
-        "02691156/10155655850468db78d106ce0a280f87/models/model_normalized.solid.binvox": False,
-        "chairs/shapes/1.off": True,
-        "chairs/gt/1.seg": False,
-        "meshes/train/faust/tr_reg_000.ply": True,
-        "taxonomy.json": False,
-    }
-    for name in wanted:
+    model = "02691156/10155655850468db78d106ce0a280f87/models/model_normalized"
+    meshes = [f"{model}.obj", "chairs/shapes/1.off", "meshes/train/faust/tr_reg_000.ply"]
+    others = [f"{model}.mtl", f"{model}.solid.binvox", "chairs/gt/1.seg", "taxonomy.json"]
+    for name in meshes + others:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
-    assert find_meshes(tmp_path) == sorted(name for name, is_mesh in wanted.items() if is_mesh)
+    assert find_meshes(tmp_path) == sorted(meshes)
     (tmp_path / "list.txt").write_text("# one\nchairs/shapes/1.off\n\n")
     assert find_meshes(tmp_path, tmp_path / "list.txt") == ["chairs/shapes/1.off"]
 
@@ -369,25 +293,10 @@ class TestTuning:
         assert abs(point.hausdorff - target) <= CLOSE * target
         assert calls <= tuning.TRIES
 
-    def test_more_hulls_are_tighter(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        pytest.importorskip("vhacdx")
-        point, _ = self.tuned(monkeypatch, tmp_path, lambda n: 2 / n, 0.1, "vhacd")
-        assert point.setting == 20
-
     def test_a_step_is_bisected_to_its_end(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         point, calls = self.tuned(monkeypatch, tmp_path, lambda t: 0.01 if t < 0.137 else 0.2, 0.15)
         assert point.hausdorff == pytest.approx(0.2)  # the closer of the two there are
         assert calls <= 2 * tuning.TRIES
-
-    def test_out_of_reach_ends_at_the_range(self) -> None:
-        method = make_method("fast")
-        assert next_setting(method, [(1.0, 0.02)], 0.5, 3) is None
-        assert next_setting(method, [(0.005, 0.9)], 0.5, 3) is None
-
-    def test_failed_meshes_do_not_count(self) -> None:
-        point = tuning.Point(0.1, [{"mesh": "a", "hausdorff": 0.2}, {"mesh": "b", "error": "died"}])
-        assert point.hausdorff == 0.2
-        assert math.isnan(tuning.Point(0.1, [{"mesh": "b", "error": "died"}]).hausdorff)
 
 
 class TestTables:
@@ -418,15 +327,6 @@ class TestTables:
         assert 88 <= sum(ratio.low <= 0.9 <= ratio.high for ratio in ratios) <= 99
         assert ratio_of(self.rows(2, 8), self.rows(4, 4)).startswith("1.000 (0.500 to 2.000")
         assert ratio_of(self.rows(failed="m0"), self.rows(4)) == "–"
-
-    def test_markdown_escapes_bars(self) -> None:
-        assert str(Table(["a", "|b|"], [["x|y", 1]])) == "| a | \\|b\\| |\n|---|---:|\n| x\\|y | 1 |"
-
-    def test_charts_are_the_same_bytes_every_time(self) -> None:
-        pytest.importorskip("matplotlib")
-        drawn = [curves_chart([Curve("a", [3, 1], [1, 2])], "x", "y", log_y=True) for _ in range(2)]
-        assert drawn[0] == drawn[1]
-        assert b"<svg" in drawn[0]
 
 
 class TestCommands:
@@ -509,17 +409,45 @@ class TestCommands:
         assert not (meshes.parent / "run").exists()
 
 
-class TestTablesInDocuments:
-    def test_research_shows_tables_that_commands_printed_and_no_others(self) -> None:
-        document = (ROOT / "research" / "comparison.md").read_text()
-        assert len(PLACE.findall(document)) > 5
-        assert "|---" not in PLACE.sub("", document)
+def test_research_shows_tables_that_commands_printed_and_no_others() -> None:
+    document = (ROOT / "research" / "comparison.md").read_text()
+    assert len(PLACE.findall(document)) > 5
+    assert "|---" not in PLACE.sub("", document)
 
-    def test_tables_are_put_in_their_place(self, tmp_path: Path) -> None:
-        (tmp_path / "quick").mkdir()
-        (tmp_path / "quick" / "a.md").write_text("# A\n\n| a |\n|---|\n| 1 |\n\ntext\n\n| b |\n|---|\n| 2 |\n")
-        document = "before\n<!-- quick/a.md, table 2 -->\nold\n<!-- end -->\nafter\n"
-        expected = "before\n<!-- quick/a.md, table 2 -->\n\n| b |\n|---|\n| 2 |\n\n<!-- end -->\nafter\n"
-        assert fill(document, tmp_path) == fill(expected, tmp_path) == expected
-        with pytest.raises(SystemExit, match="has 2 tables, not 3"):
-            fill("<!-- quick/a.md, table 3 -->\n<!-- end -->\n", tmp_path)
+
+def test_tables_are_put_in_their_place_in_documents(tmp_path: Path) -> None:
+    (tmp_path / "quick").mkdir()
+    (tmp_path / "quick" / "a.md").write_text("# A\n\n| a |\n|---|\n| 1 |\n\ntext\n\n| b |\n|---|\n| 2 |\n")
+    document = "before\n<!-- quick/a.md, table 2 -->\nold\n<!-- end -->\nafter\n"
+    expected = "before\n<!-- quick/a.md, table 2 -->\n\n| b |\n|---|\n| 2 |\n\n<!-- end -->\nafter\n"
+    assert fill(document, tmp_path) == fill(expected, tmp_path) == expected
+    with pytest.raises(SystemExit, match="has 2 tables, not 3"):
+        fill("<!-- quick/a.md, table 3 -->\n<!-- end -->\n", tmp_path)
+
+
+@pytest.mark.parametrize("experiment", ARMS)
+def test_arms_differ_in_what_they_say_only(experiment: str) -> None:
+    for preset in ("two-cores", "paper"):
+        arms = [_options(preset, 100, 1, changes) for changes in ARMS[experiment].values()]
+        assert len(set(arms)) == len(arms)
+    assert {(a.iterations, a.seed, a.warmup, a.validate_every) for a in arms} == {(100, 1, 20, 50)}
+
+
+@pytest.mark.nightly
+def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch")
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    for number in range(6):
+        mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
+        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
+    monkeypatch.setattr("rlacd.learn.options.PRESETS", {"two-cores": {**PRESETS["two-cores"], "validation": 2}})
+    said: list[str] = []
+    page = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
+    table = next(block for block in page.blocks if isinstance(block, Table))
+    assert [line[0] for line in table.lines] == list(ARMS["curves"])
+    assert all(float(str(line[1]).partition(" ± ")[0]) > 0 for line in table.lines)
+    assert len({(tmp_path / "run" / f"curves-1-seed-{s}" / "curves.jsonl").read_text() for s in (0, 1)}) == 2
+    monkeypatch.setattr("rlacd.learn.train.train", None)  # would fail if called
+    again = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
+    assert str(again) == str(page)

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rlacd.solid.arrays import angles, dots, heights, length
-from rlacd.solid.component import Component
+from rlacd.solid.arrays import dots, heights, length
 from tests import bits
+from tests.hulls import hull_of
+from tests.shapes import component_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -48,7 +49,7 @@ def test_axes_are_eigenvectors_of_the_moments() -> None:
     for _ in range(50):
         corners = draw.normal(size=(20, 3)) * draw.uniform(0.2, 2, 3)
         rotation, _ = np.linalg.qr(draw.normal(size=(3, 3)))
-        component = Component(_hull(corners @ rotation))
+        component = component_of(hull_of(corners @ rotation))
         axes = component.principal_axes
         moments = _moments(component.vertices[component.faces])
         values, vectors = np.linalg.eigh(moments)
@@ -61,16 +62,8 @@ def test_axes_are_eigenvectors_of_the_moments() -> None:
 def test_a_cube_keeps_the_axes_of_its_space() -> None:
     """All directions are principal; rounding must not choose some."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 3 + 0.1
-    axes = Component(_hull(corners)).principal_axes
+    axes = component_of(hull_of(corners)).principal_axes
     assert sorted(axes.tolist()) == [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
-
-
-def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    from rlacd.solid.hull import Hull
-
-    hull = Hull.of(np.ascontiguousarray(points))
-    assert hull is not None
-    return hull.vertices, hull.faces
 
 
 def _moments(corners: np.ndarray) -> np.ndarray:
@@ -90,11 +83,3 @@ def test_products_are_those_of_numpy() -> None:
     assert dots(points, points[::-1]) == pytest.approx(np.einsum("ij,ij->i", points, points[::-1]), abs=1e-14)
     assert dots(points, directions[0]) == pytest.approx(points @ directions[0], abs=1e-14)
     assert length(points[0]) == pytest.approx(np.linalg.norm(points[0]))
-
-
-def test_angles_are_those_of_numpy() -> None:
-    turn = np.concatenate([np.linspace(0, np.pi, 1001), [1e-300, 1e-8, np.pi - 1e-8, np.pi / 2]])
-    for long in (1e-100, 1.0, 1e100):
-        sines, cosines = np.abs(long * np.sin(turn)), long * np.cos(turn)
-        assert angles(sines, cosines) == pytest.approx(np.arctan2(sines, cosines), rel=1e-15, abs=0)
-    assert angles(np.array([0.0, 0.0, 2.0]), np.array([0.0, -1.0, 0.0])) == pytest.approx([0, np.pi, np.pi / 2])

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from tests.shapes import elbow
+
 bpy = pytest.importorskip("bpy", reason="bpy, Blender as a Python module, is not installed")
 
 FOLDER = Path(__file__).resolve().parents[1] / "integrations" / "blender"
@@ -34,11 +36,6 @@ def empty_scene() -> None:
         bpy.data.objects.remove(thing, do_unlink=True)
     for collection in list(bpy.data.collections):
         bpy.data.collections.remove(collection)
-
-
-def elbow() -> trimesh.Trimesh:
-    beams = ([(0, 0, 0), (2, 0.4, 0.4)], [(0, 0, 0), (0.4, 0.4, 1.5)])
-    return trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in beams])
 
 
 def place(mesh: trimesh.Trimesh, name: str = "elbow") -> Any:
@@ -94,7 +91,7 @@ def run(**options: Any) -> set[str]:
 
 
 def test_an_elbow_gets_two_hulls_as_children() -> None:
-    thing = place(elbow())
+    thing = place(elbow(1.5))
     assert run() == {"FINISHED"}
     hulls = hulls_of(thing)
     assert [hull.name for hull in hulls] == ["elbow_hull_000", "elbow_hull_001"]
@@ -107,7 +104,7 @@ def test_an_elbow_gets_two_hulls_as_children() -> None:
 
 @pytest.mark.parametrize("scale", [(1, 1, 1), (0.5, 2, 3), (-1, 1, 2)])
 def test_hulls_follow_an_object_that_is_turned_scaled_or_mirrored(scale: tuple[float, float, float]) -> None:
-    thing = place(elbow())
+    thing = place(elbow(1.5))
     thing.location, thing.rotation_euler, thing.scale = (3, -2, 1), (0.3, 0.7, -1.1), scale
     bpy.context.view_layer.update()
     run()
@@ -120,7 +117,7 @@ def test_hulls_follow_an_object_that_is_turned_scaled_or_mirrored(scale: tuple[f
 
 
 def test_options_reach_the_decomposition_and_a_second_run_replaces_the_first() -> None:
-    thing = place(elbow())
+    thing = place(elbow(1.5))
     run()
     run(threshold=1.9)
     assert [hull.name for hull in hulls_of(thing)] == ["elbow_hull_000"]
@@ -144,7 +141,7 @@ def test_modifiers_count_unless_switched_off() -> None:
 
 
 def test_every_selected_mesh_is_done_and_hulls_are_never_decomposed_again() -> None:
-    one, two = place(elbow(), "één"), place(elbow(), "two two")
+    one, two = place(elbow(1.5), "één"), place(elbow(1.5), "two two")
     one.select_set(True)
     run()
     for thing in (one, two):
@@ -164,7 +161,7 @@ def test_what_cannot_be_done_is_one_sentence() -> None:
 
 
 def test_a_missing_rlacd_is_reported_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    place(elbow())
+    place(elbow(1.5))
     monkeypatch.setitem(sys.modules, "rlacd.errors", None)
     with pytest.raises(RuntimeError, match=r"rlacd is missing in Blender's Python: run .* -m pip install rlacd"):
         run()

@@ -22,13 +22,9 @@ from rlacd.solid.component import ClippedPart, Component, Part, Plane, reunite
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.primitive import Balls
-from tests.shapes import strangers
+from tests.shapes import block, strangers
 
 TIGHT = Concavity(0.02)
-
-
-def block(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Manifold:
-    return Manifold.cube((x, y, z), True).translate(at)
 
 
 CROSS = block(2, 0.3, 0.3) + block(0.3, 2, 0.3)
@@ -38,11 +34,7 @@ def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
     """The solid, and what lies left of x = -0.15, right of x = 0.15 and between."""
     root = Component(solid)
     left, rest = root.cut(Plane((1.0, 0.0, 0.0), -0.15))
-    assert left is not None
-    assert rest is not None
     middle, right = rest.cut(Plane((1.0, 0.0, 0.0), 0.15))
-    assert middle is not None
-    assert right is not None
     return root, [left, middle, right]
 
 
@@ -90,17 +82,6 @@ def test_hulls_of_crossing_beams_cover_them_and_no_more() -> None:
     assert found.report["concavity"]["max"] < 1e-3
 
 
-def test_the_number_of_threads_does_not_matter() -> None:
-    root, parts = arms_and_beam(CROSS + block(0.3, 0.3, 2))
-    found = []
-    for threads in (1, 4):
-        with Run(threads) as pool:
-            found.append(merge_parts(parts, TIGHT, pool, solid=root))
-    for one, four in zip(*found, strict=True):
-        assert one.vertices.tobytes() == four.vertices.tobytes()
-        assert one.hull.vertices.tobytes() == four.hull.vertices.tobytes()
-
-
 def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:
     """Gluing would count what two of them have in common twice."""
     root, parts = arms_and_beam(CROSS)
@@ -109,15 +90,7 @@ def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:
     assert isinstance(whole, ClippedPart)
     assert whole.volume == pytest.approx(CROSS.volume())
     united = reunite(strangers(whole.members))
-    assert united is not None
     assert united.volume == pytest.approx(CROSS.volume())
-
-
-def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
-    component = Component(CROSS)
-    space = Navigable(0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
-    assert space.screen.feasibility(component.filling, component.hull) is Feasibility.NEVER
-    assert not space.screen.forbids(component.filling, component.hull)
 
 
 def heap_of_blocks(random: np.random.Generator) -> tuple[Component, list[Manifold]]:
@@ -152,7 +125,6 @@ def test_a_quick_no_is_never_wrong(seed: int, threshold: float) -> None:
     assume(fits is not None)
     assert not (fits and feasibility is not Feasibility.MAYBE)
     larger = Hull.of(np.concatenate([hull.vertices, random.uniform(-1, 1, (3, 3))]))
-    assert larger is not None
     assert Concavity(threshold).screen.forbids(solid.filling, hull) == (feasibility is Feasibility.NEVER)
     if feasibility is Feasibility.NEVER:
         assert Concavity(threshold * (1 - 1e-9)).screen.feasibility(solid.filling, larger) is Feasibility.NEVER
@@ -172,26 +144,6 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
         assert (feasibility == Feasibility.MAYBE) <= (alone is Feasibility.MAYBE)
         assert (feasibility == Feasibility.NEVER) <= (alone is Feasibility.NEVER)
         assert not (share_fits(solid, joint, threshold) and feasibility != Feasibility.MAYBE)
-
-
-def test_all_pairs_in_one_go_are_the_pairs_one_by_one(run: Run) -> None:
-    root, parts = arms_and_beam(CROSS)
-    hulls = [part.hull for part in parts]
-    pairs = np.array([(i, j) for j in range(len(parts)) for i in range(j)], dtype=np.int32)
-    seen = set()
-    for criterion in (Concavity(0.02), Concavity(0.2), Concavity(0.6)):
-        for threads in (1, 3):
-            volumes, feasibilities = criterion.screen.feasibilities(root.filling, hulls, pairs, threads)
-            for (i, j), volume, feasibility in zip(pairs, volumes, feasibilities, strict=True):
-                joint = Hull.around(hulls[i], hulls[j])
-                assert feasibility == Feasibility.NEVER or volume == joint.volume
-                assert (feasibility == Feasibility.MAYBE) == (
-                    criterion.screen.feasibility(root.filling, joint) is Feasibility.MAYBE
-                )
-                seen.add(int(feasibility))
-    assert len(seen) > 1
-    with pytest.raises(ValueError, match="out of range"):
-        TIGHT.screen.feasibilities(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
 
 
 def test_time_may_run_out_before_pairs_are_looked_at() -> None:
@@ -224,5 +176,11 @@ def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:
     folded = Manifold.compose([block(2, 0.5, 0.5), block(0.5, 2, 0.02, (0.3, 0, 0))])
     pieces = [Component(piece) for piece in folded.split_by_plane((1, 0.2, 0.1), 0.1)]
     united = reunite(pieces)
-    assert united is not None
     assert united.volume == pytest.approx((block(2, 0.5, 0.5) + block(0.5, 2, 0.02, (0.3, 0, 0))).volume(), rel=1e-6)
+
+
+def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
+    component = Component(CROSS)
+    space = Navigable(0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
+    assert space.screen.feasibility(component.filling, component.hull) is Feasibility.NEVER
+    assert not space.screen.forbids(component.filling, component.hull)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,37 +55,6 @@ def test_run_coacd_gives_the_originals_kind_of_result() -> None:
         assert len(ours) <= len(theirs)
         for vertices, faces in ours:
             assert_convex_hull(trimesh.Trimesh(vertices, faces, process=False))
-
-
-def test_a_program_written_for_coacd_runs_with_another_import(tmp_path: Path) -> None:
-    """Load, decompose, colour and export, as CoACD's users do."""
-    table().export(tmp_path / "table.obj")
-    program = """
-import coacd
-import trimesh
-
-mesh = trimesh.load(folder / "table.obj", force="mesh")
-mesh = coacd.Mesh(mesh.vertices, mesh.faces)
-parts = coacd.run_coacd(mesh)
-
-scene = trimesh.Scene()
-for vertices, faces in parts:
-    part = trimesh.Trimesh(vertices, faces)
-    part.visual.vertex_colors = trimesh.visual.random_color()
-    scene.add_geometry(part)
-scene.export(folder / "parts.glb")
-"""
-    exec(program.replace("import coacd\n", "from rlacd.compat import coacd\n"), {"folder": tmp_path})
-    parts = trimesh.load_scene(tmp_path / "parts.glb").geometry.values()
-    assert len(parts) > 1
-    assert sum(part.volume for part in parts) == pytest.approx(table().volume, rel=0.01)
-
-
-def test_run_coacd_is_decompose() -> None:
-    mesh = our_coacd.Mesh(table().vertices, table().faces)
-    want = rlacd.decompose((mesh.vertices, mesh.indices), threshold=0.08, seed=3)
-    got = our_coacd.run_coacd(mesh, threshold=0.08, seed=3)
-    assert all(np.array_equal(hull.vertices, v) for hull, (v, _) in zip(want, got, strict=True))
 
 
 def test_options_of_coacd_that_mean_something_are_obeyed() -> None:

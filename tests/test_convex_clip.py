@@ -12,6 +12,7 @@ from rlacd.solid.component import Component, Part, Plane
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
+from tests.shapes import component_of, is_closed
 
 
 def solids() -> dict[str, trimesh.Trimesh]:
@@ -31,10 +32,6 @@ def inverted(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     return mesh
 
 
-def component(mesh: trimesh.Trimesh) -> Component:
-    return Component((np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int32)))
-
-
 def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
     """Hulls of corners of the solid, whose faces touch the facets, of grid points, and of any points."""
     rng = np.random.default_rng(1)
@@ -52,17 +49,11 @@ def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
     return found
 
 
-def is_closed(faces: np.ndarray) -> bool:
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there, back = (np.unique(e, axis=0, return_counts=True) for e in (edges, edges[:, ::-1]))
-    return len(there[0]) == len(back[0]) and all((a == b).all() for a, b in zip(there, back, strict=True))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", solids())
 def test_clipping_agrees_with_a_boolean(name: str) -> None:
     mesh = solids()[name]
-    solid = component(mesh)
+    solid = component_of(mesh)
     whole = to_manifold(solid.vertices, solid.faces)
     for hull in hulls(mesh):
         part = solid.inside(hull)
@@ -83,35 +74,20 @@ def test_a_surface_folded_by_noise_is_clipped_and_its_halves_add_up() -> None:
     """Some hulls have corners where the folded surface holds them twice, or turns inside out."""
     crumpled = trimesh.creation.icosphere(subdivisions=4)
     crumpled.vertices += np.random.default_rng(0).uniform(-0.1, 0.1, crumpled.vertices.shape)
-    solid = component(crumpled)
+    solid = component_of(crumpled)
     rng = np.random.default_rng(2)
     for _ in range(60):
         hull = Hull.of(crumpled.vertices[rng.integers(len(crumpled.vertices), size=12)] * 0.985)
-        assert hull is not None
         below, above = Component((hull.vertices, hull.faces)).cut(Plane((0.0, 0.6, 0.8), 0.1))
-        assert below is not None
-        assert above is not None
         whole, *halves = (solid.inside(one) for one in (hull, below.hull, above.hull))
         assert all(is_closed(part.faces) for part in (whole, *halves))
         assert whole.volume == pytest.approx(sum(half.volume for half in halves), rel=1e-3)
 
 
-def test_the_result_does_not_depend_on_threads_or_on_earlier_calls() -> None:
-    mesh = solids()["bumpy ball"]
-    first, second = component(mesh), component(mesh)
-    some = hulls(mesh, 5)
-    for hull in some:
-        second.inside(hull)
-    for hull in some:
-        one, other = first.inside(hull), second.inside(hull)
-        assert one.vertices.tobytes() == other.vertices.tobytes()
-        assert one.faces.tobytes() == other.faces.tobytes()
-
-
 @pytest.mark.parametrize("name", solids())
 def test_a_clipped_part_measures_alike_with_its_ready_tree_and_without(name: str) -> None:
     mesh = solids()[name]
-    solid = component(mesh)
+    solid = component_of(mesh)
     for hull in hulls(mesh, 5):
         part = solid.inside(hull)
         if not part.size:
@@ -124,11 +100,9 @@ def test_a_clipped_part_measures_alike_with_its_ready_tree_and_without(name: str
 
 
 def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> None:
-    ball = component(solids()["bumpy ball"])
+    ball = component_of(solids()["bumpy ball"])
     around = Hull.of(3 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
     inside = Hull.of(0.5 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
-    assert around is not None
-    assert inside is not None
     assert ball.inside(around).size == len(ball.faces)
     assert ball.inside(inside).volume == pytest.approx(inside.volume, abs=1e-6)
 
@@ -137,7 +111,7 @@ def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> 
 def test_hulls_that_take_in_what_is_uncovered_cover_the_surface(name: str) -> None:
     """Hulls of pieces of a shrunk copy miss the surface everywhere; each then takes in its share, and little more."""
     mesh = solids()[name]
-    shrunk = component(mesh.copy().apply_scale(0.97))
+    shrunk = component_of(mesh.copy().apply_scale(0.97))
     x = np.linspace(*shrunk.box[:, 0], 6)[1:-1]
     pieces, rest = [], to_manifold(shrunk.vertices, shrunk.faces)
     for offset in x:
@@ -147,12 +121,10 @@ def test_hulls_that_take_in_what_is_uncovered_cover_the_surface(name: str) -> No
     pieces.append(rest)
     corners = [np.array(piece.to_mesh64().vert_properties[:, :3]) for piece in pieces]
     small = [hull for points in corners if (hull := Hull.of(points)) is not None]
-    solid = component(mesh)
+    solid = component_of(mesh)
     missed = solid.filling.uncovered([h.vertices for h in small], [h.faces for h in small], 0.1, 1e-3)
     grown = [Hull.of(np.concatenate([h.vertices, p])) for h, p in zip(small, missed, strict=True)]
-    assert all(hull is not None for hull in grown)
-    covering = [hull for hull in grown if hull is not None]
-    assert hull_union(covering, 1).under(solid.vertices, solid.faces, 1e-5, 1)[1] <= 2e-5
+    assert hull_union(grown, 1).under(solid.vertices, solid.faces, 1e-5, 1)[1] <= 2e-5
     need = hull_union(small, 1).under(solid.vertices, solid.faces, 1e-4, 1)[1]
-    for before, after in zip(small, covering, strict=True):
+    for before, after in zip(small, grown, strict=True):
         assert hull_union([before], 1).distance(after.vertices, 1).max() < 6 * need + 1e-2

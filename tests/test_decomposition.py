@@ -23,14 +23,10 @@ def result(count: int = 2, **report: object) -> Decomposition:
     return Decomposition(hulls, {"name": "cup", "complete": True, "concavity": {"max": 0.0312}, **report}, SOURCE)
 
 
-def test_it_is_a_collection_of_hulls() -> None:
+def test_hulls_are_got_by_index_and_slice() -> None:
     cup = result(3)
     assert len(cup) == 3
     assert list(cup) == cup.hulls
-
-
-def test_hulls_are_got_by_index_and_slice() -> None:
-    cup = result(3)
     assert cup[0] is cup.hulls[0]
     assert cup[-1] is cup.hulls[2]
     assert cup[1:] == cup.hulls[1:]

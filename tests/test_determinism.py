@@ -86,16 +86,6 @@ def test_the_same_bytes_in_every_process_and_for_any_number_of_threads(name: str
     assert len(digits) == 1
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", MESHES[2:4])
-def test_limits_do_not_change_that(name: str, corpus: Path, tmp_path: Path) -> None:
-    words = ("--max-hulls", 6, "--max-vertices", 24, "--threshold", 0.1)
-    for threads in (1, 3):
-        out = tmp_path / f"{threads}.ply"
-        rlacd(["decompose", corpus / name, "-o", out, "-q", "--threads", threads, *words], hash_seed=threads)
-    assert (tmp_path / "1.ply").read_bytes() == (tmp_path / "3.ply").read_bytes()
-
-
 def compare(meshes: Path, tmp_path: Path, file_format: str, ending: str, *words: str) -> None:
     """Two batches and two times every mesh by itself, each in new processes and on another number of threads."""
     batches, alone = (tmp_path / "b1", tmp_path / "b2"), (tmp_path / "a1", tmp_path / "a2")
@@ -111,15 +101,6 @@ def compare(meshes: Path, tmp_path: Path, file_format: str, ending: str, *words:
     assert tree(alone[1]) == expected
     assert tree(batches[0], TIMES) == tree(batches[1], TIMES), "the manifest, too"
     assert tree(batches[0], TIMES, "manifest.jsonl", ".rlacd/lock") == expected
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(("file_format", "ending"), FORMATS)
-@pytest.mark.promise("batch-bytes")
-def test_the_same_files_one_by_one_and_in_a_batch(file_format: str, ending: str, corpus: Path, tmp_path: Path) -> None:
-    if file_format == "usd":
-        pytest.importorskip("pxr", reason="the extra usd is not installed")
-    compare(copied(corpus, SMALL, tmp_path / "assets"), tmp_path, file_format, ending)
 
 
 @pytest.mark.nightly

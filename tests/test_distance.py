@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
+import hypothesis.extra.numpy as hnp
 import manifold3d
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 from rlacd import _native
 from rlacd.solid.distance import HullDistances, hull_distances, hull_union
 from rlacd.solid.hull import Hull
-from tests.shapes import Closed, Floats, box, depth_in, from_manifold, point_to_triangles, to_manifold
+from tests.shapes import Closed, Floats, box, depth_in, from_manifold, point_to_triangles
 
 TOLERANCE = 1e-3
 BRICK = ((0, 0, 0), (2, 1, 1))
@@ -81,20 +81,6 @@ def test_known_answers(hulls: list[Any], over: float, under: float, levels: int)
         assert close(found.under, under)
 
 
-def test_touching_facets_are_no_surface_and_outer_ones_are() -> None:
-    # A pear: two balls of unequal size, cut where they meet; the middle of the cut is 0.44 from the surface.
-    pear = manifold3d.Manifold.sphere(0.8, 48) + manifold3d.Manifold.sphere(0.5, 48).translate((0.9, 0, 0))
-    normal, offset = (1.0, 0.0, 0.0), 2 / 3
-    halves = hulls_of(*pear.split_by_plane(normal, offset))
-    found = measured(halves, pear)
-    assert found.over[1] < 0.02
-    _, faces = hull_union(halves).exposed()
-    vertices, _ = hull_union(halves).exposed()
-    on_cut = np.all(np.abs(vertices[faces][:, :, 0] - offset) < 1e-9, axis=1)
-    rim = np.linalg.norm(vertices[faces][on_cut][:, :, 1:], axis=2)
-    assert rim.size == 0 or rim.min() > 0.3  # at most the ring by which one half's hull is wider
-
-
 @pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-7, 5e-7])
 @pytest.mark.parametrize("tilt", [0.0, 1e-7])
 def test_hairline_cracks_are_closed(gap: float, tilt: float) -> None:
@@ -107,15 +93,6 @@ def test_nearly_coplanar_overlapping_facets_do_not_hide_each_other(angle: float)
     # Two lids that cross at a tiny angle, both above the surface: some part of either must stay.
     low, tilted = box((0, 0, 0), (2, 1, 1.2)), box((0, 0, 0), (2, 1, 1.2)).rotate((0, np.rad2deg(angle), 0))
     assert measured(hulls_of(low, tilted), box(*BRICK)).over[0] >= 0.2 - 1e-5
-
-
-def test_area_of_the_exposed_surface() -> None:
-    touching = hull_union(hulls_of(box((0, 0, 0), (0.7, 1, 1)), box((0.7, 0, 0), (2, 1, 1)))).exposed()
-    assert _native.mesh_area(*touching) == pytest.approx(10)
-    crossing = [box((-1, -0.2, -0.2), (1, 0.2, 0.2)), box((-0.2, -1, -0.2), (0.2, 1, 0.2)).translate((0, 0, 0.1))]
-    exposed = hull_union(hulls_of(*crossing)).exposed()
-    joint = from_manifold(crossing[0] + crossing[1])
-    assert _native.mesh_area(*exposed) == pytest.approx(_native.mesh_area(joint.vertices, joint.faces), rel=1e-4)
 
 
 unit = st.floats(-1, 1, width=32)
@@ -199,56 +176,6 @@ def of_hull(hull: Hull) -> tuple[Floats, Floats]:
     return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def test_distance_to_the_union_is_that_to_the_nearest_hull() -> None:
-    rng = np.random.default_rng(0)
-    hulls = [h for c in rng.uniform(-1, 1, (12, 3)) if (h := Hull.of(c + rng.normal(scale=0.2, size=(20, 3))))]
-    points = rng.uniform(-2, 2, (3000, 3))
-    expected = np.full(len(points), np.inf)
-    for hull in hulls:
-        outside = depth_in(Closed(hull.vertices, hull.faces), points) < 0
-        expected = np.minimum(expected, outside * _native.Surface(hull.vertices, hull.faces).distance(points))
-    np.testing.assert_allclose(hull_union(hulls).distance(points), expected, atol=1e-9)
-
-
-@pytest.mark.nightly
-def test_hulls_of_cut_meshes(corpus: Path) -> None:
-    """Hulls of the pieces of a cut mesh hold it, and touch along the cuts only."""
-    rng = np.random.default_rng(0)
-    rows = [row for row in csv.DictReader((corpus / "index.csv").open()) if row["watertight"] == "1"]
-    rows = [row for row in rows if int(row["faces"]) < 8000]
-    done = 0
-    for row in rng.permutation(np.array(rows, dtype=object))[:60]:
-        mesh = trimesh.load(corpus / row["file"], process=False)
-        vertices = 2 * (np.asarray(mesh.vertices) - mesh.bounds.mean(axis=0)) / mesh.extents.max()
-        pieces = to_manifold(vertices, np.asarray(mesh.faces)).decompose()
-        for _ in range(5):
-            pieces = sorted((p for p in pieces if p.volume() > 1e-6), key=lambda piece: -piece.volume())
-            if not pieces:
-                break
-            normal = np.eye(3)[rng.integers(3)]
-            heights = from_manifold(pieces[0]).vertices @ normal
-            offset = heights.min() + np.ptp(heights) * rng.uniform(0.3, 0.7)
-            pieces = [part for half in pieces[0].split_by_plane(normal, offset) for part in half.decompose()] + pieces[
-                1:
-            ]
-        hulls = [h for p in pieces if (h := Hull.of(from_manifold(p).vertices))]
-        if not hulls:
-            continue
-        done += 1
-        kept = np.vstack([from_manifold(p).vertices for p in pieces])
-        assert hull_union(hulls).distance(kept).max() < 1e-9
-        surface = Closed(np.ascontiguousarray(vertices), np.ascontiguousarray(mesh.faces, dtype=np.int32))
-        found = hull_distances(hulls, surface.vertices, surface.faces)
-        exposed, faces = hull_union(hulls).exposed()
-        points = _native.sample_surface(exposed, faces, 20_000, 0)[0]
-        distances = _native.Surface(surface.vertices, surface.faces).distance(points)
-        assert distances.max() <= found.over[1] + 1e-7
-        assert hull_union(hulls).distance(sampled(surface)).max() <= found.under[1] + 1e-7
-        assert found.over[1] - found.over[0] <= 2e-3 + 1e-12
-        assert found.under[1] - found.under[0] <= 2e-3 + 1e-12
-    assert done > 30
-
-
 def test_some_of_the_hulls_are_as_if_they_were_alone() -> None:
     rng = np.random.default_rng(3)
     hulls = [h for c in rng.uniform(-1, 1, (9, 3)) if (h := Hull.of(c + rng.normal(scale=0.4, size=(12, 3))))]
@@ -297,22 +224,11 @@ def test_places_of_the_greatest_distances(seed: int) -> None:
     each = [point_to_triangles(missed, hull.vertices, hull.faces)[0] for hull in hulls if hull]
     assert min(each) == pytest.approx(found.under[0], abs=1e-9)
     for hull in hulls:
-        assert hull is not None
         depth = depth_in(Closed(hull.vertices, hull.faces), np.concatenate([out, missed]))
         assert (depth < 1e-6).all(), "a place inside a hull"
     assert point_to_triangles(missed, surface.vertices, surface.faces) == pytest.approx(0, abs=1e-9)
     threaded = hull_distances([hull for hull in hulls if hull], surface.vertices, surface.faces, threads=4)
     assert threaded == found
-
-
-def test_hausdorff_of_a_shifted_box() -> None:
-    brick, shifted = from_manifold(box(*BRICK)), from_manifold(box(*BRICK).translate((0.3, 0, 0)))
-    lower, upper = _native.directed_hausdorff(
-        brick.vertices, brick.faces, _native.Surface(shifted.vertices, shifted.faces), 1e-4
-    )
-    assert lower <= 0.3 + 1e-12
-    assert upper >= 0.3 - 1e-12
-    assert upper - lower <= 1e-4
 
 
 def test_hausdorff_is_found_between_the_corners() -> None:
@@ -346,24 +262,126 @@ def test_trees_made_by_several_threads_are_the_same() -> None:
     assert (answers[0][3][inside] > 0.9).all()
 
 
-def test_results_do_not_depend_on_threads() -> None:
-    rng = np.random.default_rng(1)
-    hulls = [h for c in rng.uniform(-0.6, 0.6, (15, 3)) if (h := Hull.of(c + rng.normal(scale=0.2, size=(30, 3))))]
-    ball = from_manifold(manifold3d.Manifold.sphere(0.8, 60))
-    one, many = (hull_distances(hulls, ball.vertices, ball.faces, 1e-4, threads) for threads in (1, 7))
-    assert one == many
-    for a, b in zip(hull_union(hulls).exposed(threads=1), hull_union(hulls).exposed(threads=7), strict=True):
-        assert a.tobytes() == b.tobytes()
-    surface = _native.Surface(hulls[0].vertices, hulls[0].faces)
-    assert _native.directed_hausdorff(ball.vertices, ball.faces, surface, 1e-4, 1) == _native.directed_hausdorff(
-        ball.vertices, ball.faces, surface, 1e-4, 7
-    )
-
-
 def test_no_hulls_add_nothing_and_miss_everything() -> None:
-    assert measured_none() == HullDistances((0.0, 0.0), (np.inf, np.inf))
-
-
-def measured_none() -> HullDistances:
     brick = from_manifold(box(*BRICK))
-    return hull_distances([], brick.vertices, brick.faces)
+    assert hull_distances([], brick.vertices, brick.faces) == HullDistances((0.0, 0.0), (np.inf, np.inf))
+
+
+# --- closest points, winding numbers and samples of surfaces of any quality -------------------------------------------
+
+
+coordinates = st.floats(-1, 1, width=32)
+
+
+@st.composite
+def soups(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
+    """Triangle soups with shared corners, slivers and triangles of no area."""
+    vertices = draw(hnp.arrays(np.float64, (draw(st.integers(1, 12)), 3), elements=coordinates))
+    corner = st.integers(0, len(vertices) - 1)
+    faces = draw(hnp.arrays(np.int32, (draw(st.integers(1, 30)), 3), elements=corner))
+    return vertices, faces
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0.0])
+def test_needles_are_as_near_as_their_edges(width: float) -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0.3, width, 0]])
+    surface = _native.Surface(vertices, np.array([[0, 1, 2]], dtype=np.int32))
+    points = np.random.default_rng(0).uniform(-1, 2, (200, 3))
+    on_segment = np.stack([np.clip(points[:, 0], 0, 1), 0 * points[:, 0], 0 * points[:, 0]], axis=1)
+    np.testing.assert_allclose(surface.distance(points), np.linalg.norm(points - on_segment, axis=1), atol=width + 1e-8)
+
+
+def test_winding_tells_inside_from_outside() -> None:
+    mesh = from_manifold(box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)))
+    points = np.random.default_rng(0).uniform(-1.5, 1.5, (4000, 3))
+    reach = np.abs(points).max(axis=1)
+    inside = (reach < 1) & (reach > 0.5)
+    surface = _native.Surface(mesh.vertices, mesh.faces)
+    np.testing.assert_allclose(surface.winding(points, accuracy=np.inf), inside, atol=1e-9)
+    assert np.array_equal(surface.winding(points) > 0.5, inside)
+
+
+@pytest.mark.parametrize("width", [1.0, 1e-9])
+def test_around_a_closed_surface_windings_are_whole_numbers(width: float) -> None:
+    """Two rings through each other, at best as thick as rounding; rays meet their edges, corners, and faces edge on."""
+    ring, other = trimesh.creation.torus(1.0, 0.3), trimesh.creation.torus(1.0, 0.3).apply_translation([0.3, 0, 0])
+    both = trimesh.util.concatenate([ring, other])
+    scale = np.array([1, 1, width])
+    vertices = np.ascontiguousarray(both.vertices * scale)
+    surface = _native.Surface(vertices, np.ascontiguousarray(both.faces, dtype=np.int32))
+    ray = np.array([2, 3, 4]) / np.sqrt(29)
+    at = np.concatenate([vertices, vertices[both.faces].mean(axis=1), vertices[both.edges_unique].mean(axis=1)])
+    points = np.concatenate([at[:, None] - ray * np.array([0.1, 1.0])[:, None], at[:, None] + ray * 0.1], axis=1)
+    points = points.reshape(-1, 3)
+    points = points[surface.distance(points) > 1e-3]
+    exact = surface.winding(points, accuracy=np.inf)
+    assert width < 1 or set(np.round(exact)) == {0, 1, 2}
+    np.testing.assert_array_equal(surface.winding(points, is_closed=True), np.round(exact))
+
+
+def test_winding_of_an_open_surface_is_the_solid_angle_it_covers() -> None:
+    half = trimesh.creation.icosphere(subdivisions=4)
+    half = half.submesh([np.flatnonzero(half.triangles_center[:, 2] < 0)], append=True)
+    surface = _native.Surface(np.ascontiguousarray(half.vertices), np.ascontiguousarray(half.faces, dtype=np.int32))
+    assert surface.winding(np.zeros((1, 3)), accuracy=np.inf)[0] == pytest.approx(0.5, abs=0.02)
+
+
+def test_fast_winding_is_near_the_exact_sum(corpus: Path) -> None:
+    for name in (corpus / "quick.txt").read_text().split()[:8]:
+        mesh = trimesh.load(corpus / name, process=False)
+        vertices = np.ascontiguousarray(2 * (mesh.vertices - mesh.bounds.mean(axis=0)) / mesh.extents.max())
+        faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+        points, _ = _native.sample_surface(vertices, faces, 1000, 0)
+        points += np.random.default_rng(0).normal(scale=0.02, size=points.shape)
+        surface = _native.Surface(vertices, faces)
+        exact = surface.winding(points, accuracy=np.inf)
+        assert np.abs(surface.winding(points) - exact).max() < 0.1
+        assert np.abs(surface.winding(points, accuracy=4) - exact).max() < 0.03
+
+
+@settings(deadline=None, max_examples=100)
+@given(soups(), st.integers(0, 300), st.integers(0, 2**63))
+def test_samples_lie_on_the_faces_they_name(soup: tuple[np.ndarray, np.ndarray], count: int, seed: int) -> None:
+    vertices, faces = soup
+    if count > 0 and _native.mesh_area(vertices, faces) == 0:
+        with pytest.raises(ValueError, match="no area"):
+            _native.sample_surface(vertices, faces, count, seed)
+        return
+    points, on = _native.sample_surface(vertices, faces, count, seed)
+    assert points.shape == (count, 3)
+    again, _ = _native.sample_surface(vertices, faces, count, seed)
+    assert points.tobytes() == again.tobytes()
+    for face in np.unique(on):
+        assert point_to_triangles(points[on == face], vertices, faces[[face]]).max() < 1e-7
+
+
+def test_samples_are_spread_by_area() -> None:
+    mesh = from_manifold(box((0, 0, 0), (1, 2, 3)).refine(3))
+    areas = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).area_faces
+    count = 5000
+    for seed in range(5):
+        points, face = _native.sample_surface(mesh.vertices, mesh.faces, count, seed)
+        expected = count * areas / areas.sum()
+        assert np.abs(np.bincount(face, minlength=len(areas)) - expected).max() < 3
+        np.testing.assert_allclose(points.mean(axis=0), [0.5, 1, 1.5], atol=0.02)  # the surface's centroid
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "says"),
+    [
+        ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "not finite"),
+        ([[0, 0, 0], [1, 0, 0], [0, np.inf, 0]], [[0, 1, 2]], "not finite"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]], "out of range"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.zeros((0, 3)), "no faces"),
+    ],
+)
+def test_bad_surfaces_are_refused(vertices: list[list[float]], faces: list[list[int]], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        _native.Surface(np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int32).reshape(-1, 3))
+
+
+def test_points_that_are_not_finite_are_refused() -> None:
+    surface = _native.Surface(np.eye(3), np.array([[0, 1, 2]], dtype=np.int32))
+    for query in (surface.distance, surface.closest, surface.winding):
+        with pytest.raises(ValueError, match="not finite"):
+            query(np.array([[0, 0, np.nan]]))

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib.util
 import inspect
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from types import ModuleType
 
 import click
 import numpy as np
@@ -20,22 +18,13 @@ import rlacd
 from rlacd.cli.main import app
 from rlacd.options import Options
 from tests.option_table import PAGE, options_table
+from tests.scripts import script
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def script(name: str) -> ModuleType:
-    """A script of examples/ as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_the_sample_is_two_closed_bodies_of_a_few_thousand_triangles() -> None:
-    scene = script("sample").sample()
+    scene = script(ROOT / "examples" / "sample.py").sample()
     assert set(scene.geometry) == {"chair", "jug"}
     assert all(mesh.is_watertight and mesh.body_count == 1 for mesh in scene.geometry.values())
     assert scene.geometry["chair"].euler_number == 2 - 2 * 7, "a chair with seven windows to see through"
@@ -48,14 +37,14 @@ def test_the_sample_is_two_closed_bodies_of_a_few_thousand_triangles() -> None:
 @pytest.mark.nightly
 def test_the_script_that_trains_on_one_mesh_falls_from_random_planes_to_greedys(tmp_path: Path) -> None:
     pytest.importorskip("torch", reason="needs the extra train")
-    points = script("train_one_mesh").main(None, tmp_path / "run")
+    points = script(ROOT / "examples" / "train_one_mesh.py").main(None, tmp_path / "run")
     own = [point["validation_own_plane"] for point in points]
     assert min(own) <= 1 < own[0] < points[0]["validation_random"]
     assert points[-1]["seconds"] < 300
 
 
 def test_the_sample_is_the_same_every_time() -> None:
-    sample = script("sample").sample
+    sample = script(ROOT / "examples" / "sample.py").sample
     assert sample().export(file_type="glb") == sample().export(file_type="glb")
 
 
@@ -84,7 +73,7 @@ def test_some_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> Non
 
 @pytest.mark.nightly
 def test_all_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> None:
-    objects = script("gallery").OBJECTS
+    objects = script(ROOT / "examples" / "gallery.py").OBJECTS
     assert len(gallery()) == len(objects) == 12
     holds(corpus, objects)
 
@@ -96,7 +85,9 @@ def test_the_furnished_room_stays_open_for_a_small_ball_only() -> None:
     inside = []
     for radius in (0.02, 0.10):
         space = rlacd.NavigableSpace(radius, tolerance=0.01)
-        hulls = rlacd.decompose(script("furnished_room").room(), criterion=space, policy="navacd", quality="fast")
+        hulls = rlacd.decompose(
+            script(ROOT / "examples" / "furnished_room.py").room(), criterion=space, policy="navacd", quality="fast"
+        )
         depths = [np.einsum("fi,pfi->pf", h.face_normals, h.triangles[:, 0] - np.array(places)[:, None]) for h in hulls]
         inside.append(np.any([(depth > 0).all(axis=1) for depth in depths], axis=0).tolist())
     assert inside == [[False, False, False], [True, True, False]]
@@ -108,7 +99,7 @@ def test_the_documentation_holds_the_table_of_options() -> None:
 
 @pytest.mark.slow
 def test_five_minutes_shows_what_the_command_prints_for_the_sample(tmp_path: Path) -> None:
-    script("sample").sample().export(tmp_path / "chair.glb")
+    script(ROOT / "examples" / "sample.py").sample().export(tmp_path / "chair.glb")
     shown = (ROOT / "docs" / "start.md").read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
     run = CliRunner().invoke(app, ["decompose", str(tmp_path / "chair.glb")])
     assert run.exit_code == 0
@@ -139,7 +130,6 @@ def test_the_readme_works_outside_the_repository() -> None:
 def test_the_table_names_every_option() -> None:
     table = "".join(line.split("|")[1] for line in options_table().splitlines())
     command = app.get_command(click.Context(app), "decompose")
-    assert command is not None
     options = {
         name for p in command.params if not getattr(p, "hidden", False) for name in p.opts if name.startswith("--")
     } - {
@@ -164,7 +154,6 @@ def test_the_function_has_the_options_as_they_are_stated_once() -> None:
 @pytest.mark.promise("all-options")
 def test_the_command_offers_every_argument_of_the_function() -> None:
     command = app.get_command(click.Context(app), "decompose")
-    assert command is not None
     offered = {parameter.name for parameter in command.params}
     assert (
         set(inspect.signature(rlacd.decompose).parameters) - {"progress", "volume_tolerance"} <= offered
@@ -175,7 +164,7 @@ def test_the_command_offers_every_argument_of_the_function() -> None:
 def test_the_guide_to_tight_fits_shows_the_numbers_that_its_script_prints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    script("tight_fits").main(tmp_path / "hulls.webp")
+    script(ROOT / "examples" / "tight_fits.py").main(tmp_path / "hulls.webp")
     page = (ROOT / "docs/guides/tight_fits.md").read_text(encoding="utf-8")
     printed = capsys.readouterr().out.replace("=None", "=–")
     rows = re.findall(r"^(\S+ mm): (\d+) chords, (\d+) hulls, at least (\d+)$", printed, re.MULTILINE)

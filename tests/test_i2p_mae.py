@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import pickle
@@ -28,6 +27,7 @@ from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_p
 from rlacd.solid.component import Component
 from tests.encoding import TINY, clouds, tiny_encoder
 from tests.learning import small_solids, write_meshes
+from tests.scripts import script
 
 pytestmark = pytest.mark.slow
 
@@ -45,11 +45,7 @@ def reference() -> Path:
 @pytest.fixture(scope="session")
 def stand_in(reference: Path) -> dict[str, torch.Tensor]:
     """Weights of the published names and shapes."""
-    spec = importlib.util.spec_from_file_location("stand_in_weights", reference / "stand_in_weights.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = script(reference / "stand_in_weights.py")
     shapes = json.loads((reference / "parameter_shapes.json").read_text())
     state = module.stand_in_state({name: tuple(shape) for name, shape in shapes.items()})
     return {name: torch.from_numpy(np.asarray(value)) for name, value in state.items()}

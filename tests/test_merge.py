@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
 
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.criteria.navigable import Navigable
-from rlacd.merge import merge_parts
+from rlacd.cut import CutTree
+from rlacd.cut_and_merge import cut_and_merge
+from rlacd.merge import grow_cover, merge_parts
+from rlacd.planes.sweep import SweepCache
+from rlacd.policies import make_policy
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part, Plane
-from rlacd.solid.primitive import Balls
+from tests.shapes import bent_bar, box, dense, from_manifold, own_volume, to_manifold, together
+from tests.test_redistribute import depth_outside
+from tests.test_sweep import SOLIDS
 
 
 def pieces_of(solid: Manifold, *planes: Plane) -> list[Component]:
@@ -78,58 +85,12 @@ def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
     assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
 
 
-def test_same_result_for_any_number_of_workers() -> None:
-    ring = Manifold.cylinder(0.3, 1, 1, 40, True) - Manifold.cylinder(1, 0.8, 0.8, 40, True)
-    parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0.1), 0.0) for a in np.linspace(0, 3, 6)))
-    results = []
-    for count in (1, 3):
-        with Run(count) as pool:
-            results.append(merge_parts(parts, Concavity(0.05), pool))
-    assert len(results[0]) == len(results[1])
-    for a, b in zip(*results, strict=True):
-        assert np.array_equal(a.hull.vertices, b.hull.vertices)
-
-
-class Counting(Navigable):
-    """Counts what it is asked."""
-
-    asked = 0
-
-    def is_met(self, part: Part) -> bool:
-        self.asked += 1
-        return super().is_met(part)
-
-
-class Forgetful(Counting):
-    is_hereditary = False
-
-
-def test_what_a_ball_keeps_apart_is_not_asked_again() -> None:
-    """The result is the same as if every union were tested anew."""
-    random = np.random.default_rng(0)
-    ring = Manifold.cylinder(0.3, 1, 1, 40, True) - Manifold.cylinder(1, 0.8, 0.8, 40, True)
-    parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0.1), 0.0) for a in np.linspace(0, np.pi, 9)))
-    asked = {Counting: 0, Forgetful: 0}
-    for _ in range(5):
-        balls = Balls(random.uniform(-1.2, 1.2, (24, 3)), random.uniform(0.02, 0.2, 24))
-        results = []
-        for kind in asked:
-            criterion = kind(0.02, 0.01, balls)
-            with Run(1) as pool:
-                results.append(merge_parts(parts, criterion, pool))
-            asked[kind] += criterion.asked
-        for a, b in zip(*results, strict=True):
-            assert np.array_equal(a.hull.vertices, b.hull.vertices)
-    assert asked[Counting] < 0.9 * asked[Forgetful]
-
-
 @pytest.mark.parametrize("across", [False, True])
 def test_pairs_of_nearby_boxes(across: bool) -> None:
     random = np.random.default_rng(0)
     for count in (1, 2, 30):
-        places = random.uniform(0, 4, (count, 3))
-        parts = {7 * i: Component(Manifold.cube(tuple(random.uniform(0.1, 1, 3))).translate(tuple(places[i])))
-                 for i in range(count)}  # fmt: skip
+        lower = random.uniform(0, 4, (count, 3))
+        parts = {7 * i: Component(box(tuple(at), tuple(at + random.uniform(0.1, 1, 3)))) for i, at in enumerate(lower)}
         corners = {i: part.box for i, part in parts.items()}
 
         def near(i: int, j: int, corners=corners) -> bool:
@@ -145,3 +106,105 @@ def test_pairs_of_nearby_boxes(across: bool) -> None:
         }
         boxes = _native.Boxes([part.hull.corners for part in parts.values()], list(parts))
         assert boxes.pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize("seed", range(5))
+def test_gluing_undoes_a_cut(name: str, seed: int) -> None:
+    solid = Component(SOLIDS[name]())
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    below, above = solid.cut(Plane(tuple(normal), float(normal @ solid.vertices.mean(axis=0))))
+    glued = Part.glued(below, above)
+    assert glued.volume == pytest.approx(solid.volume)
+    area = _native.mesh_area(glued.vertices, glued.faces)
+    assert area == pytest.approx(_native.mesh_area(solid.vertices, solid.faces), rel=1e-5)
+    assert glued.hull.volume == pytest.approx(solid.hull.volume)
+
+
+def test_only_the_common_area_of_two_faces_vanishes() -> None:
+    base = Component(Manifold.cube((3, 3, 1)))
+    tower = Component(Manifold.cube((1, 1, 2)).translate((1, 1, 1)))
+    glued = Part.glued(base, tower)
+    assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(30 + 10 - 2)
+    glued = Part.glued(Component(box((0, 0, 0), (1, 1, 1))), Component(box((2, 0, 0), (3, 1, 1))))
+    assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(12), "coplanar faces on the same side stay"
+
+
+def test_parts_that_are_all_film_keep_their_surfaces() -> None:
+    """Every face of such a part touches the other one: without a surface there would be nothing to measure."""
+    below = Component(Manifold.cube((1, 1, 2e-9)))
+    above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
+    glued = Part.glued(below, above)
+    assert len(glued.faces) == len(below.faces) + len(above.faces)
+
+
+# --- growing ----------------------------------------------------------------------------------------------------------
+
+
+CRITERION = Concavity(0.05)
+
+
+def bars(count: int, seed: int) -> Component:
+    """A connected solid of long bars at random, in the frame."""
+    draw, solid = np.random.default_rng(seed), []
+    for _ in range(count):
+        half = draw.uniform((0.5, 0.06, 0.06), (1.0, 0.12, 0.12))
+        bar = box(tuple(-half), tuple(half)).rotate(draw.uniform(0, 360, 3))
+        solid.append(bar.translate(draw.uniform(-0.4, 0.4, 3)))
+    return Component(max(Manifold.batch_boolean(solid, OpType.Add).decompose(), key=lambda body: body.volume()))
+
+
+def merged(solid: Component, run: Run) -> list[Part]:
+    tree = CutTree(solid, make_policy("greedy", SweepCache(), None), run)
+    return cut_and_merge(tree, CRITERION, run).parts
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(2, 5), st.integers(0, 1000), st.floats(0.05, 0.1))
+def test_what_grows_holds_its_hull_and_the_solid_comes_no_deeper_into_it(count: int, seed: int, depth: float) -> None:
+    solid = bars(count, seed)
+    with Run(1) as run:
+        piece = max((member for part in merged(solid, run) for member in part.members), key=lambda one: one.volume)
+    spaces = solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth)
+    normals, offsets = spaces[:, :3], spaces[:, 3]
+    assert (piece.hull.vertices @ normals.T <= offsets + 1e-9).all()
+    inside = (offsets - dense(from_manifold(to_manifold(solid.vertices, solid.faces))) @ normals.T).min(axis=1)
+    assert inside.max() <= depth + 1e-9
+
+
+def test_bars_that_cross_take_fewer_parts_that_are_tight_and_lose_nothing() -> None:
+    solid, found = bars(8, 0), []
+    for threads in (1, 2, 3):
+        with Run(threads) as run:
+            before = merged(solid, run)
+            found.append(grow_cover(before, CRITERION, run, solid))
+    after, whole = found[0], to_manifold(solid.vertices, solid.faces)
+    assert len(after) < len(before)
+    for part in after:
+        inside = whole ^ to_manifold(part.hull.vertices, part.hull.faces)
+        assert CRITERION.is_met(Component(inside)), "the solid clipped by another library"
+    assert depth_outside(dense(from_manifold(whole)), after) < 5e-3, "no more than slivers"
+    assert own_volume(after) == pytest.approx(solid.volume, rel=1e-2)
+    for others in found[1:]:
+        assert [part.hull.vertices.tobytes() for part in others] == [part.hull.vertices.tobytes() for part in after]
+
+
+@pytest.mark.parametrize("solid", [together(bent_bar()), Component(box((0, 0, 0), (2, 1, 1)))], ids=["bent", "box"])
+def test_where_nothing_crosses_no_work_is_done(solid: Component) -> None:
+    with Run(1) as run:
+        parts = merged(solid, run)
+        done = run.work.done
+        assert grow_cover(parts, CRITERION, run, solid) is parts
+        assert run.work.done == done
+
+
+@pytest.mark.parametrize("units", [0, 3_000, 30_000])
+def test_without_enough_work_the_merged_parts_stay(units: int) -> None:
+    solid = bars(8, 0)
+    with Run(1) as run:
+        parts = merged(solid, run)
+        with run.limited(units):
+            assert grow_cover(parts, CRITERION, run, solid) is parts
+        assert run.stopped_by is None

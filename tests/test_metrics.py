@@ -9,7 +9,7 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
-from benchmarks.metrics import COVERED, SAMPLES, TOLERANCE, Metrics, is_valid, measure
+from benchmarks.metrics import COVERED, TOLERANCE, Metrics, is_valid, measure
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -21,7 +21,7 @@ from rlacd.repair.repair import repair
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
-from tests.shapes import Closed, box, dense, from_manifold, point_to_triangles, to_manifold
+from tests.shapes import box, dense, from_manifold, point_to_triangles
 
 # The input of most tests: its longest side is 2 and it is centred, so that lengths are the frame's.
 SLAB = ((-1.0, -0.5, -0.25), (1.0, 0.5, 0.25))
@@ -40,52 +40,19 @@ def near(value: float, truth: float) -> bool:
     return truth - 1e-6 <= value <= truth + TOLERANCE + 1e-6
 
 
-def test_two_touching_boxes_are_the_box() -> None:
-    found = measured(box(*SLAB), box(SLAB[0], (0.3, 0.5, 0.25)), box((0.3, -0.5, -0.25), SLAB[1]))
-    assert found.parts == 2
-    assert near(found.hausdorff, 0)  # 0.25 if the faces where they touch counted
-    assert near(found.concavity, 0)
-    assert found.volume == pytest.approx(1)
-    assert (found.uncovered, found.invalid, found.empty) == (0, 0, 0)
-
-
-@pytest.mark.parametrize("gap", [1e-7, 1e-5, 5e-4])
-def test_a_crack_of_a_cut_is_no_surface(gap: float) -> None:
-    halves = box(SLAB[0], (0.3 - gap / 2, 0.5, 0.25)), box((0.3 + gap / 2, -0.5, -0.25), SLAB[1])
-    assert measured(box(*SLAB), *halves).over < 2 * TOLERANCE
-
-
 def test_overlap_is_what_lies_in_several_hulls() -> None:
     """Halves of a slab that overlap by a tenth of its length, and a third hull in one of them."""
     halves = box(SLAB[0], (0.1, 0.5, 0.25)), box((-0.1, -0.5, -0.25), SLAB[1])
-    assert measured(box(*SLAB), *halves).overlap == pytest.approx(0.1)
+    found = measured(box(*SLAB), *halves)
+    assert (found.parts, found.uncovered, found.invalid, found.empty) == (2, 0, 0, 0)
+    assert near(found.hausdorff, 0)
+    assert near(found.concavity, 0)
+    assert found.overlap == pytest.approx(0.1)
+    assert found.volume == pytest.approx(1.1)
     inner = box((-0.9, -0.5, -0.25), (-0.7, 0.5, 0.25))
     assert measured(box(*SLAB), *halves, inner).overlap == pytest.approx(0.2)
-    assert measured(box(*SLAB), box(*SLAB)).overlap == 0
-
-
-def test_a_wide_gap_is_surface() -> None:
-    found = measured(box(*SLAB), box(SLAB[0], (0.2, 0.5, 0.25)), box((0.4, -0.5, -0.25), SLAB[1]))
-    assert near(found.over, 0.25)  # the middle of the walls of the gap
-    assert near(found.under, 0.1)
-
-
-def test_a_box_in_a_box_counts_its_volume_twice_and_no_surface() -> None:
-    found = measured(box(*SLAB), box(*SLAB), box((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2)))
-    assert near(found.hausdorff, 0)
-    assert found.volume == pytest.approx(1.064)
-    assert near(found.concavity, 0)  # the inner box is wholly solid
-
-
-def test_a_missing_part() -> None:
-    found = measured(box(*SLAB), box(SLAB[0], (0.5, 0.5, 0.25)))
-    assert near(found.under, 0.5)
-    assert near(found.over, 0.25)  # the new wall's middle
-    assert near(found.hausdorff, 0.5)
-    assert found.volume == pytest.approx(0.75)
-    area = 2 * (2 * 1 + 2 * 0.5 + 1 * 0.5)
-    missing = 2 * (0.5 * 1 + 0.5 * 0.5) + 1 * 0.5
-    assert found.uncovered == pytest.approx(missing / area, abs=4 * 0.5 / SAMPLES**0.5 + COVERED)
+    found = measured(box(*SLAB), box(*SLAB), box((1.5, 0, 0), (1.7, 0.1, 0.1)))
+    assert (found.overlap, found.empty) == (0, 1), "a hull that holds nothing"
 
 
 @pytest.mark.parametrize("by", [0.01, 0.1])
@@ -98,21 +65,6 @@ def test_a_fattened_hull(by: float) -> None:
     added = 3 * ((2 + 2 * by) * (1 + 2 * by) * (0.5 + 2 * by) - 1) / (4 * np.pi)
     assert near(found.concavity, max(by * 3**0.5, 0.3 * added ** (1 / 3)))
     assert found.exceeding == (found.concavity > 0.021)
-
-
-def test_a_hull_of_an_l_spans_its_corner() -> None:
-    shape = box((-1, -1, 0), (1, 0, 0.2)) + box((-1, 0, 0), (0, 1, 0.2))
-    found = measured(shape, shape.hull(), promised=0.05)
-    # Farthest of the hull's slanted face from the L is its edge's middle: (0.5, 0.5), as far from both arms.
-    assert near(found.over, 0.5)
-    assert near(found.concavity, 0.5)
-    assert found.exceeding == 1
-
-
-def test_hulls_that_hold_nothing_are_counted_and_measured() -> None:
-    found = measured(box(*SLAB), box(*SLAB), box((1.5, 0, 0), (1.7, 0.1, 0.1)))
-    assert found.empty == 1
-    assert near(found.over, np.linalg.norm([0.7]))
 
 
 def test_numbers_do_not_depend_on_the_unit_and_the_place() -> None:
@@ -185,18 +137,6 @@ def test_the_report_of_a_decomposition_says_the_same(corpus: Path) -> None:
     assert found.exceeding == found.invalid == found.empty == 0
     # What of the solid lies in a hull may be more than the part it was made for, so this is no less by definition.
     assert found.concavity <= result.report["concavity"]["max"] + 2 * TOLERANCE
-
-
-def test_the_union_is_the_solid_where_the_parts_are_exact() -> None:
-    """Volume of a boolean union, distances and shares tell the same story: nothing added, nothing missing."""
-    cross = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
-    arms = [box((-1, -0.2, -0.2), (1, 0.2, 0.2)), box((-0.2, -1, -0.2), (0.2, 1, 0.2))]
-    found = measured(cross, *arms)
-    assert near(found.hausdorff, 0)
-    assert found.uncovered == 0
-    assert found.volume == pytest.approx((2 * 2 * 0.4 * 0.4) / cross.volume())
-    closed: Closed = from_manifold(cross)
-    assert to_manifold(closed.vertices, closed.faces).volume() == pytest.approx(cross.volume())
 
 
 @pytest.mark.parametrize("side", [-1, 1])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,16 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rlacd import _native
-from rlacd.criteria import Concavity, Navigable
+from rlacd.criteria import Concavity
 from rlacd.criteria.criterion import Criterion
-from rlacd.cut import CutTree
-from rlacd.io.read.load import load_mesh
-from rlacd.merge import merge_parts
-from rlacd.options.navigable import NavigableSpace
-from rlacd.planes.sweep import SweepCache
-from rlacd.policies import make_policy
-from rlacd.repair.repair import repair
-from rlacd.run import Run
 from rlacd.search.recut import Exchange
 from rlacd.search.redistribute import redistribute
 from rlacd.solid.component import Component, Part
@@ -78,13 +69,6 @@ def test_all_or_nothing() -> None:
     assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid) is not None
 
 
-def test_without_time_pieces_are_not_halved() -> None:
-    left, middle, right = bent_bar()
-    solid = together([left, middle, right])
-    for seed in range(5):
-        assert redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Run(1, -1.0)) is None
-
-
 @settings(max_examples=30, deadline=None)
 @given(stacks(), st.integers(0, 2**32 - 1))
 def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
@@ -95,24 +79,3 @@ def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
     if once is not None and again is not None:
         check(once, part, around, CRITERION)
         assert [p.volume for p in once.into] == [p.volume for p in again.into]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("space", [None, NavigableSpace(0.1, 0.04)], ids=["concavity", "space"])
-@pytest.mark.parametrize("name", ["train/kenney_cc0/furniture_pack__washer.ply", "test/vhacd/beshon.ply"])
-def test_parts_of_a_real_shape(name: str, space: NavigableSpace | None, corpus: Path) -> None:
-    solid = repair(load_mesh(corpus / name))
-    root = Component(solid.manifold)
-    goal: Criterion = CRITERION if space is None else Navigable.of(space, solid, 1)
-    with Run(1) as run:
-        done, left = CutTree(root, make_policy("greedy", SweepCache(), None), run).cut_until(goal)
-        goal = goal.settled([*done, *left])
-        parts = merge_parts([*done, *left], goal, run, solid=root)
-    gone = 0
-    for part in sorted(parts, key=lambda part: part.hull.volume)[:20]:
-        around = [other for other in parts if other is not part]
-        exchange = redistribute(part, around, goal, np.random.default_rng(0), root)
-        if exchange is not None:
-            check(exchange, part, around, goal)
-            gone += 1
-    assert gone > 0 or len(parts) < 10, "something is to be had in a shape of many parts"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
+import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fuzz.light
+import fuzz.warm
 from fuzz import soak
-from fuzz.cases import case_of, inputs, minimised, try_case
+from fuzz.cases import case_of, file_of, minimised, try_case
 from fuzz.faults import Fault, Run, complaints, left_behind
-from fuzz.recipes import Shape
-from fuzz.trials import KINDS, Laboratory, Trial
+from fuzz.light import READ, REFUSED, LightTrials, wrong_in
+from fuzz.mutations import Seed
+from fuzz.soak import reasons
+from fuzz.trials import Laboratory, Trial, seeds_from
+from fuzz.warm import WarmTrials
+from rlacd.solid.input_mesh import InputMesh
 
 CASES = sorted((Path(__file__).parent / "cases").glob("*.json"))
 
@@ -28,8 +36,8 @@ def laboratory() -> Any:
     laboratory.close()
 
 
-def first_of(laboratory: Laboratory, kind: str) -> int:
-    return next(number for number in range(10_000) if laboratory.kind(number) == kind)
+def first_of(trials: Any, kind: str) -> int:
+    return next(number for number in range(10_000) if trials.kind(number) == kind)
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
@@ -41,10 +49,6 @@ def test_what_was_found_stays_mended(path: Path, laboratory: Laboratory) -> None
     assert trial.is_well, trial.said
 
 
-def test_shares_of_trials_add_up() -> None:
-    assert sum(KINDS.values()) == pytest.approx(1)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["file", "shape"])
 def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) -> None:
@@ -52,53 +56,6 @@ def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) ->
     one, two = (laboratory.trial(number) for _ in range(2))
     assert one.is_well, one.said
     assert replace(one, cpu=0) == replace(two, cpu=0)
-
-
-@pytest.mark.slow
-def test_a_command_under_a_fault_is_a_trial(laboratory: Laboratory) -> None:
-    trial = laboratory.trial(first_of(laboratory, "fault"))
-    assert trial.is_well, trial.said
-    assert trial.counts["faults"] == 1
-
-
-class Pretended:
-    """In place of a laboratory: whatever has triangle (0, 1, 2) and options `a` and `b` is wrong."""
-
-    def __init__(self) -> None:
-        vertices = np.random.default_rng(0).normal(size=(30, 3))
-        self.whole = Shape(vertices, np.arange(30).reshape(-1, 3), ("ten triangles",))
-        self.sought = vertices[:3]
-
-    def shape(self, number: int) -> tuple[Shape, dict[str, Any]]:
-        return self.whole, {}
-
-    def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial:
-        found = any((shape.vertices[face] == self.sought).all() for face in shape.faces)
-        wrong = found and {"a", "b"} <= set(options)
-        return replace(
-            trial, end="wrong" if wrong else "done", said=["it is wrong by 3"] if wrong else [], options=options
-        )
-
-
-def test_a_case_is_made_small_and_is_tried_as_it_stands() -> None:
-    options = {"threshold": 0.1, "a": 1, "seed": 3, "b": 2, "threads": 1}
-    pretended: Any = Pretended()
-    case = case_of(Trial(0, 7, "shape", "wrong", ["it is wrong by 3"], ["ten triangles"], options))
-    small = minimised(pretended, case, tries=100)
-    assert set(small["options"]) == {"threshold", "a", "b", "threads"}
-    assert small["faces"] == [[0, 1, 2]]
-    again = json.loads(json.dumps(small))
-    shape, _ = inputs(pretended, again)
-    assert (shape.vertices == pretended.sought).all()
-    assert try_case(pretended, again).end == "wrong"
-
-
-def test_every_option_survives_the_way_through_a_case(laboratory: Laboratory) -> None:
-    for number in range(200):
-        shape, options = laboratory.shape(number) if laboratory.kind(number) == "shape" else (None, {})
-        if shape is not None:
-            case = json.loads(json.dumps(case_of(Trial(0, number, "shape", options=options))))
-            assert inputs(laboratory, case)[1] == options
 
 
 def test_a_soak_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
@@ -178,3 +135,116 @@ OLD, WHOLE = {"out.xml": b"old"}, {"out.xml": b"new", "out/a.obj": b"a"}
 def test_half_a_file_is_seen(fault: Fault, code: int, after: dict[str, bytes], says: str) -> None:
     found = left_behind(fault, code, "out.xml", OLD, after, WHOLE)
     assert (says in " ".join(found)) if says else not found
+
+
+SEEDS = seeds_from(None)
+
+
+@pytest.fixture
+def light(tmp_path: Path) -> LightTrials:
+    return LightTrials(0, SEEDS, tmp_path)
+
+
+def test_a_file_is_read_or_refused_for_a_reason(light: LightTrials) -> None:
+    counts, ends = Counter[str](), Counter[str]()
+    for number in range(200):
+        if light.kind(number) == "read":
+            trial = light.trial(number)
+            assert trial.is_well, trial.said
+            counts += trial.counts
+            ends[trial.end] += 1
+    assert ends["loaded"] > 20
+    assert ends["refused"] > 20
+    read = sum(number for name, number in counts.items() if name.endswith(READ))
+    assert read == ends["loaded"]
+    assert sum(number for name, number in counts.items() if REFUSED in name) == ends["refused"]
+    assert not any(letter.isdigit() for name in counts for letter in name.split(REFUSED)[-1] if REFUSED in name)
+    table = "\n".join(reasons(counts))
+    assert "| obj | " in table
+    assert "| refused | files |" in table
+
+
+def test_a_small_shape_is_decomposed_and_judged(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
+    number = first_of(light, "small")
+    trial = light.trial(number)
+    assert trial.end == "done", trial.said
+    assert trial.counts["decompositions"] == 1
+    assert replace(light.trial(number), cpu=0) == replace(trial, cpu=0)
+    monkeypatch.setattr(fuzz.light, "judge", lambda *_: ["it is wrong"])
+    assert light.trial(number).said == ["it is wrong"]
+
+
+@pytest.mark.parametrize(
+    ("raised", "end", "opened"),
+    [
+        (KeyError("x"), "untyped", ""),
+        (MemoryError(), "memory", ""),
+        (fuzz.light.rlacd.RlacdError("two\nlines"), "wrong", ""),
+        (fuzz.light.rlacd.MeshFileError("refused"), "wrong", "/etc/hostname"),
+    ],
+)
+def test_what_is_no_sentence_or_opens_another_file_is_a_failure(
+    raised: Exception, end: str, opened: str, light: LightTrials, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(path: Path) -> None:
+        Path(opened or path).read_bytes()
+        raise raised
+
+    monkeypatch.setattr(fuzz.light, "load_mesh", fails)
+    trial = light.reread(Trial(0, 0, "read"), "obj", Seed(b"v 0 0 0"))
+    assert trial.end == end
+    assert (f"it opened '{opened}'" in trial.said) == bool(opened)
+
+
+def test_a_mesh_that_is_none_is_seen() -> None:
+    points, face = np.zeros((3, 3)), np.array([[0, 1, 2]])
+    good = InputMesh(points, face, "m", ())
+    assert wrong_in(good) == []
+    assert wrong_in(replace(good, vertices=points + np.nan))
+    assert wrong_in(replace(good, faces=face + 1))
+    assert wrong_in(replace(good, faces=face.astype(np.int32)))
+    assert wrong_in(replace(good, node_of=np.array([0])))
+
+
+@pytest.mark.slow
+def test_a_warm_process_that_dies_hangs_or_grows_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    warm = WarmTrials(0, SEEDS)
+    numbers = [number for number in range(200) if warm.kind(number) == "read"][:4]
+    try:
+        first = [warm.trial(number) for number in numbers[:1]]
+        assert first[0].is_well
+        process = warm._process.pid
+        monkeypatch.setattr(fuzz.warm.LightTrials, "trial", lambda *_: None)  # only here: the process is another
+        os.kill(process, signal.SIGKILL)
+        ends = [warm.trial(number).end for number in range(numbers[0] + 1, numbers[0] + 3)]
+        assert set(ends) <= {"crash", "loaded", "refused", "done"}  # answers sent before it died still count
+        assert warm.trial(numbers[-1]).is_well
+        assert warm._process.pid != process
+        os.kill(warm._process.pid, signal.SIGSTOP)
+        monkeypatch.setattr(fuzz.warm, "PATIENCE", 0.1)
+        while (stopped := warm.trial(warm._next)).is_well:  # those it had finished before
+            time.sleep(0)
+        assert stopped.end == "hang"
+        monkeypatch.setattr(fuzz.warm, "PATIENCE", 600.0)
+        monkeypatch.setattr(fuzz.warm, "LOOK", 0.0)
+        monkeypatch.setattr(fuzz.warm, "MEMORY", 1)
+        assert warm.trial(numbers[0]).end == "memory"
+    finally:
+        warm.close()
+
+
+def test_a_damaged_file_is_a_case_that_is_made_small(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails_on_nan(path: Path) -> None:
+        if b"nan" in path.read_bytes():
+            raise KeyError("what a parser says")
+        raise fuzz.light.rlacd.MeshFileError("refused")
+
+    monkeypatch.setattr(fuzz.light, "load_mesh", fails_on_nan)
+    content = b"v 0 0 0\nv 1 0 0\nv 0 nan 0\n" + b"f 1 2 3\n" * 20
+    trial = light.reread(Trial(0, 5, "read"), "obj", Seed(content, {"a.bin": b"\0"}))
+    assert trial.end == "untyped"
+    laboratory: Any = light
+    case = json.loads(json.dumps(case_of(trial) | file_of("obj", Seed(content, {"a.bin": b"\0"}))))
+    assert try_case(laboratory, case).end == "untyped"
+    small = minimised(laboratory, case, 200)
+    assert small == {**case, "content": "bmFu"}, "only the letters nan are left"

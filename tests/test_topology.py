@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
@@ -16,19 +14,16 @@ from scipy.sparse.csgraph import connected_components
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.repair.union import to_arrays, unite, volume_of
+from rlacd.repair.union import unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.manifold import to_manifold
 from rlacd.solid.topology import (
     Edges,
     bodies_of,
     components,
-    detach_films,
     face_areas,
     first_of_doubled,
     has_marked,
     long_normals,
-    sides_of,
     signed_tetrahedra,
 )
 
@@ -131,23 +126,6 @@ def test_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) ->
     np.testing.assert_allclose(_native.longest_edges(vertices, triangles), edges, rtol=1e-14)
 
 
-@pytest.mark.parametrize("inward", [False, True])
-def test_sides_of_closed_surfaces_join_as_their_wedges_say(inward: bool) -> None:
-    balls = [trimesh.creation.icosphere(2, radius) for radius in (1.0, 0.5, 0.2)]
-    mesh = trimesh.util.concatenate([*balls, trimesh.creation.torus(3.0, 0.2)])
-    faces = np.random.default_rng(0).permutation(np.asarray(mesh.faces, dtype=np.int64))
-    faces = np.ascontiguousarray(faces[:, ::-1]) if inward else faces
-    edges = Edges.of(faces, len(mesh.vertices))
-    sides = sides_of(mesh.vertices, faces, edges)
-    number, label = components(2 * len(faces), *np.ascontiguousarray(sides.facing.T))
-    assert number == len(sides.volume) == 8
-    assert np.array_equal(sides.label, label)
-    assert not sides.sheet.any()
-    assert sorted(np.abs(sides.volume[::2]).round(6)) == sorted(np.abs([b.volume for b in mesh.split()]).round(6))
-    assert np.array_equal(sides.volume[::2], -sides.volume[1::2])
-    assert np.array_equal(sides.area[::2], sides.area[1::2])
-
-
 def test_indices_out_of_range_are_refused() -> None:
     with pytest.raises(ValueError, match="out of range"):
         _native.weld(np.zeros((3, 3)), np.array([[0, 1, 3]]))
@@ -183,7 +161,6 @@ def test_closed_bodies_of_shapes(name: str) -> None:
     if name in ("open", "one turned"):
         assert found is None
         return
-    assert found is not None
     body, volume, area, box, has_no_pinch, least_height, least_fold = found
     parts = mesh.split(only_watertight=False) if name in ("two", "touching") else [mesh]
     assert len(volume) == len(parts) == body.max() + 1
@@ -196,39 +173,6 @@ def test_closed_bodies_of_shapes(name: str) -> None:
     assert least_fold == pytest.approx(2 * np.cos(mesh.face_adjacency_angles / 2).min())
     sides = np.linalg.norm(np.diff(mesh.triangles[:, [0, 1, 2, 0]], axis=1), axis=2)
     assert least_height == pytest.approx((2 * mesh.area_faces / sides.max(axis=1)).min())
-
-
-def test_separate_fans_have_a_vertex_each() -> None:
-    mesh = shapes()["touching"]
-    vertices, faces, _ = _native.weld(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces))
-    more, separate = _native.separate_fans(vertices, faces)
-    assert len(vertices) == 15
-    assert len(more) == 16
-    assert np.array_equal(more[separate], vertices[faces])
-    assert np.array_equal(more[15], [0.5, 0.5, 0.5])
-    found = _native.closed_bodies(more, separate)
-    assert found is not None
-    assert found[4]
-
-
-@pytest.mark.slow
-def test_a_closed_body_is_taken_as_manifold3d_would_take_it(corpus: Path) -> None:
-    taken = 0
-    for name in (corpus / "quick.txt").read_text().split():
-        source = load_mesh(corpus / name)
-        solid = repair(source, threads=1)
-        vertices, faces = solid.surface
-        if isinstance(solid.shape, Manifold) or len(solid.bodies) > 1 or len(faces) != len(solid.faces):
-            continue
-        outward = faces[:, ::-1] if solid.bodies[0].step == "reoriented" else faces
-        expected = to_arrays(to_manifold(vertices, outward.astype(np.int64)))
-        assert np.array_equal(solid.vertices, expected[0])
-        assert np.array_equal(solid.faces, expected[1])
-        there = to_arrays(solid.manifold)
-        assert np.array_equal(there[0], solid.vertices)
-        assert np.array_equal(there[1], solid.faces)
-        taken += 1
-    assert taken >= 5
 
 
 @pytest.mark.parametrize("sliver", [1e-13, 1e-11])
@@ -254,66 +198,6 @@ def test_a_closed_mesh_is_sorted_along_a_curve_as_manifold3d_sorts() -> None:
     assert np.array_equal(sorted_faces, expected.tri_verts)
 
 
-@pytest.mark.parametrize("name", ["box", "ball", "torus", "two", "inside out"])
-def test_mass_of_closed_meshes(name: str) -> None:
-    mesh = shapes()[name].apply_transform(trimesh.transformations.rotation_matrix(0.7, [1, 2, 3]))
-    mesh.apply_translation([3, -1, 2])
-    volume, centre, inertia = _native.mesh_mass(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int32))
-    expected = trimesh.triangles.mass_properties(mesh.triangles)
-    assert volume == pytest.approx(expected.volume)
-    np.testing.assert_allclose(centre, expected.center_mass, atol=1e-12)
-    np.testing.assert_allclose(inertia, expected.inertia, atol=1e-10)
-
-
-def test_dense_folds_are_no_reason_to_leave_a_mesh_to_manifold3d() -> None:
-    ball = trimesh.creation.icosphere(5)
-    rng = np.random.default_rng(1)
-    vertices = np.asarray(ball.vertices) + rng.normal(0, 0.02, (len(ball.vertices), 3))  # as long as edges: faces fold
-    solid = repair(InputMesh(vertices, np.asarray(ball.faces, dtype=np.int64), "ball", ()))
-    assert not isinstance(solid.shape, Manifold)
-    expected = to_arrays(to_manifold(solid.surface[0], solid.surface[1].astype(np.int64)))
-    assert np.array_equal(solid.vertices, expected[0])
-    assert np.array_equal(solid.faces, expected[1])
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_cavities_and_what_stands_in_them_are_filled(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    solids, filled = [], []
-    for place in range(3):
-        solid = Manifold.sphere(2, 24).translate((5.0 * place, 0, 0))
-        filled.append(solid)
-        for side in (-1, 1)[: rng.integers(0, 3)]:
-            inside = (5.0 * place + side, *rng.uniform(-0.1, 0.1, 2))
-            solid -= Manifold.sphere(0.6, 16).translate(inside)
-            if rng.integers(2):
-                solid += Manifold.cube((0.2, 0.2, 0.2), center=True).translate(inside)
-        solids.append(solid)
-    united = unite(solids)
-    vertices, faces = to_arrays(united)
-    expected = Manifold.batch_boolean(filled, OpType.Add)
-    assert volume_of(united) == pytest.approx(expected.volume())
-    assert len(faces) == expected.num_tri()
-    assert len(vertices) == expected.num_vert()
-    assert volume_of(unite(solids, keep_cavities=True)) == pytest.approx(sum(solid.volume() for solid in solids))
-
-
-def test_films_on_closed_bodies_get_vertices_of_their_own() -> None:
-    box = shapes()["two"].split()[0]
-    vertices = np.concatenate([np.asarray(box.vertices, dtype=float), box.vertices[box.faces[0, :1]] + 1.0])
-    leaf = np.array([[*box.faces[0, :2], len(box.vertices)]])
-    for closed in (True, False):
-        faces = np.concatenate([box.faces[0 if closed else 1 :], leaf, leaf[:, ::-1]])
-        welded, kept, is_film = _native.weld(vertices, faces)
-        assert is_film.sum() == 1
-        more, detached = detach_films(welded, kept.astype(np.int64), is_film)
-        assert np.array_equal(more[detached], welded[kept])
-        assert len(more) == len(welded) + (3 if closed else 0)
-    sheet = np.concatenate([leaf, leaf[:, ::-1]])
-    welded, kept, is_film = _native.weld(vertices, sheet)
-    assert detach_films(welded, kept.astype(np.int64), is_film)[0] is welded
-
-
 def test_windings_decide_where_rounding_folds_a_closed_surface() -> None:
     def wall(x: float, y: float, z: float) -> float:
         s, c = np.sin(4 * np.array([x, y, z])), np.cos(4 * np.array([x, y, z]))
@@ -323,21 +207,6 @@ def test_windings_decide_where_rounding_folds_a_closed_surface() -> None:
     rounded = np.asarray(body.vert_properties[:, :3], dtype=np.float32).astype(float)
     exact, solid = Manifold(body).volume(), repair(load_mesh((rounded, body.tri_verts)))
     assert solid.manifold.volume() / solid.frame.scale**3 == pytest.approx(exact, rel=2e-3)
-
-
-def test_a_scan_with_holes_closed_is_taken_as_manifold3d_would_take_it() -> None:
-    ball = trimesh.creation.icosphere(4)
-    bumpy = ball.vertices * (1 + 0.01 * np.random.default_rng(0).normal(size=(len(ball.vertices), 1)))
-    kept = np.ones(len(ball.faces), dtype=bool)
-    kept[[3, 700, 701]] = False
-    solid = repair(InputMesh(bumpy, ball.faces[kept][:, ::-1].astype(np.int64), "ball", ()), threads=1)
-    assert [body.step for body in solid.bodies] == ["capped"]
-    assert not isinstance(solid.shape, Manifold)
-    assert len(solid.faces) == len(ball.faces)
-    expected = to_arrays(to_manifold(solid.vertices, solid.faces))
-    assert np.array_equal(solid.vertices, expected[0])
-    assert np.array_equal(solid.faces, expected[1])
-    assert solid.manifold.volume() > 0
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -107,25 +107,6 @@ def test_every_mesh_gets_hulls_and_a_row_and_is_not_done_again(assets: Path, tmp
     assert not (out / "a.obj.glb").exists()
 
 
-@pytest.mark.nightly
-def test_a_batch_writes_what_decompose_writes(assets: Path, tmp_path: Path) -> None:
-    words = ["--preset", "mujoco", "--threshold", "0.1", "--density", "7"]
-    assert batch(assets, "-o", tmp_path / "out", "--glob", "b/*", *words).exit_code == 0
-    alone = tmp_path / "alone"
-    alone.mkdir()
-    run = CliRunner().invoke(app, ["decompose", str(assets / "b" / "椅子.ply"), "-o", str(alone / "椅子.xml"), *words])
-    assert run.exit_code == 0, run.output
-    assert tree(tmp_path / "out" / "b") == tree(alone)
-
-
-@pytest.mark.nightly
-def test_a_folder_a_mesh(assets: Path, tmp_path: Path) -> None:
-    run = batch(assets, "-o", tmp_path / "out", "--glob", "a.stl", "--folders", "--format", "stl")
-    assert run.exit_code == 0, run.output
-    names = sorted(path.name for path in (tmp_path / "out" / "a.stl").iterdir())
-    assert names[:2] == ["a.stl_000.stl", "a.stl_001.stl"] or names[:2] == ["a_000.stl", "a_001.stl"]
-
-
 def box(path: Path, content: bytes = b"") -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content or trimesh.creation.box().export(file_type=path.suffix[1:]).encode())
@@ -256,6 +237,9 @@ def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> Non
         (["{in}", "-o", "{in}/out", "--format", "fbx"], 2, "unknown format"),
         (["{in}", "-o", "{in}/out", "--jobs", "0"], 2, "--jobs"),
         (["{in}", "-o", "nowhere://x"], 2, "nowhere"),
+        (["{in}", "-o", "{in}/out", "--policy", "nowhere.npz"], 2, "nowhere.npz"),
+        (["{in}", "-o", "{in}/out", "--format", "mjcf", "--folders"], 2, "mjcf"),
+        (["{in}", "-o", "{in}/out", "--one-mesh"], 2, "for .urdf files only"),
     ],
 )
 def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[str], code: int, says: str) -> None:
@@ -411,31 +395,6 @@ def test_ctrl_c_twice_quits_at_once(trouble: dict[str, str], tmp_path: Path) -> 
     assert process.returncode == 130, said
     assert "Traceback" not in said
     assert batch(assets, "-o", out, "--glob", "a.obj", "--dry-run").stderr.startswith("1 mesh: 1 done")
-
-
-@pytest.mark.nightly
-def test_results_can_go_to_any_address(assets: Path) -> None:
-    fsspec = pytest.importorskip("fsspec", reason="the extra fleet is not installed")
-    memory = fsspec.filesystem("memory")
-    memory.store.clear()
-    assert batch(assets, "-o", "memory://bucket/hulls", "--jobs", 1).exit_code == 0
-    names = {"/bucket/hulls/a.obj.glb", "/bucket/hulls/a.stl.glb", "/bucket/hulls/b/椅子.glb"}
-    assert {name for name in memory.find("/bucket/hulls") if name.endswith(".glb")} == names
-    again = batch(assets, "-o", "memory://bucket/hulls")
-    assert (again.exit_code, "3 were done before" in again.stderr) == (0, True)
-
-
-@pytest.mark.nightly
-@pytest.mark.promise("batch-bytes")
-def test_real_meshes_give_the_same_bytes_with_one_job_and_two(corpus: Path, tmp_path: Path) -> None:
-    assets = tmp_path / "assets"
-    assets.mkdir()
-    small = sorted((corpus / "test").rglob("*.ply"), key=lambda path: (path.stat().st_size, path.name))[:8]
-    for path in small:
-        (assets / path.name).symlink_to(path)
-    for jobs in (1, 2):
-        assert batch(assets, "-o", tmp_path / f"out{jobs}", "--jobs", jobs).exit_code == 0
-    assert tree(tmp_path / "out1", TIMES) == tree(tmp_path / "out2", TIMES)
 
 
 @pytest.mark.slow

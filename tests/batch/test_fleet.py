@@ -22,7 +22,7 @@ from rlacd.batch.manifest import Ledger
 from rlacd.batch.store import FolderStore, ResultStore, open_store
 from rlacd.cli.batch import COMMAND
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshFileError, OptionError, OutputError, WeightsError
+from rlacd.errors import OutputError
 from rlacd.options import Options
 from tests.batch.trouble import write_ell
 from tests.hulls import save_hulls
@@ -100,11 +100,6 @@ def test_links_to_files_count_and_links_to_folders_do_not(tmp_path: Path) -> Non
     (tmp_path / "round").symlink_to(tmp_path)
     (tmp_path / "broken.obj").symlink_to(tmp_path / "nowhere")
     assert [asset.name for asset in find_assets(tmp_path)] == ["broken.obj", "link.obj", "real/a.obj"]
-
-
-def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(MeshFileError, match="not a folder"):
-        find_assets(tmp_path / "nothing")
 
 
 # --- the key of a result ----------------------------------------------------------------------------------------------
@@ -192,26 +187,6 @@ def test_an_order_survives_the_way_to_another_process() -> None:
     again = JobSpec(**json.loads(json.dumps(spec.as_plain())))
     assert Options(**again.options).criterion == space
     assert again.key("c", "a.obj") == spec.key("c", "a.obj")
-
-
-@pytest.mark.parametrize(
-    ("options", "kept", "error"),
-    [
-        ({"threshold": -1}, {}, OptionError),
-        ({"preset": "doom"}, {}, OptionError),
-        ({"policy": "nowhere.npz"}, {}, WeightsError),
-        ({}, {"file_format": "fbx"}, OptionError),
-        ({}, {"file_format": "mjcf", "folders": True}, OptionError),
-        ({}, {"density": -1.0}, OptionError),
-        ({}, {"up": "w"}, OptionError),
-        ({}, {"one_mesh": True}, OptionError),
-    ],
-)
-def test_mistakes_are_found_before_there_is_a_mesh(
-    options: dict[str, object], kept: dict[str, object], error: type[Exception]
-) -> None:
-    with pytest.raises(error):
-        JobSpec.of(options, **kept)  # type: ignore[arg-type]
 
 
 # --- places for results -----------------------------------------------------------------------------------------------
@@ -303,9 +278,3 @@ def test_opening_sweeps_up_what_a_killed_run_left(tmp_path: Path) -> None:
     store.open()
     store.close()
     assert sorted(os.listdir(tmp_path / "a")) == ["mesh.stl"]
-
-
-def test_an_unknown_address_is_reported() -> None:
-    pytest.importorskip("fsspec", reason="the extra fleet is not installed")
-    with pytest.raises(OptionError, match="gopher"):
-        open_store("gopher://bucket/out")

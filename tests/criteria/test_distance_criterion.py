@@ -15,7 +15,7 @@ import rlacd
 from rlacd import _native
 from rlacd.cli.main import app
 from rlacd.criteria.concavity import Concavity, Distance
-from tests.shapes import box, dense, from_manifold
+from tests.shapes import box, dense, from_manifold, trimesh_of
 
 RADIUS = 1 / 3  # of the hole, where the block's longest side is 2
 
@@ -23,15 +23,13 @@ RADIUS = 1 / 3  # of the hole, where the block's longest side is 2
 def bored() -> trimesh.Trimesh:
     """A block of 60 x 60 x 30 with a round hole of 20 through it."""
     hole = manifold3d.Manifold.cylinder(40, 10, 10, 128).translate((0, 0, -20))
-    mesh = (box((-30, -30, -15), (30, 30, 15)) - hole).to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    return trimesh_of(box((-30, -30, -15), (30, 30, 15)) - hole)
 
 
 def comb() -> trimesh.Trimesh:
-    mesh = (
+    return trimesh_of(
         box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -2, -0.5), (0.6, 2, 2)) - box((-2, -0.3, 0.2), (2, 0.4, 2))
-    ).to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    )
 
 
 @pytest.mark.parametrize(
@@ -69,15 +67,6 @@ def test_volumes_do_not_count() -> None:
     assert samples - 1e-9 <= measured.value[1]
     assert measured.value[0] <= 0.04 + 1e-9 <= measured.value[1] + 2e-4
     assert measured.volume_radius == 0
-
-
-@pytest.mark.parametrize("shape", [comb, bored])
-def test_a_distance_takes_no_more_hulls_than_a_concavity_of_the_same_number(shape: object) -> None:
-    by_distance, by_concavity = (
-        rlacd.decompose(shape(), criterion=name, quality="fast", threads=1)  # type: ignore[operator, arg-type]
-        for name in ("distance", "concavity")
-    )
-    assert len(by_distance) <= len(by_concavity)
 
 
 def test_a_length_is_a_distance_unless_the_criterion_is_named(tmp_path: Path) -> None:

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
+import json
 from pathlib import Path
 from typing import Any
 
 import manifold3d
 import numpy as np
 import pytest
+import trimesh
+from click.testing import CliRunner, Result
 from scipy.spatial import ConvexHull, cKDTree
 
+import rlacd
 from rlacd import _native
+from rlacd.cli.main import app
 from rlacd.criteria.navigable import LEAST_RADIUS, Balls, Navigable, NavigableSpace
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
-from tests.shapes import Floats, box, from_manifold, point_to_triangles
+from tests.hulls import assert_convex_hull
+from tests.shapes import Floats, box, elbow, from_manifold, point_to_triangles, trimesh_of
 
 # With these the balls are 0.1 wide in a frame 2 wide.
 RADIUS, TOLERANCE = 0.05, 0.02
@@ -80,7 +87,7 @@ def inside_house(nav: Navigable, manifold: Any, turn: int) -> Floats:
     return (np.abs(upright(centres, turn)) < (0.7, 0.7, 0.8)).all(axis=1)
 
 
-def depth_of(hull: Hull, points: Floats) -> Floats:
+def depth_of(hull: Any, points: Floats) -> Floats:
     """Signed distance to a hull, negative inside, by Qhull's planes and brute force."""
     equations = ConvexHull(hull.vertices).equations
     inner = (points @ equations[:, :3].T + equations[:, 3]).max(axis=1)
@@ -108,7 +115,6 @@ def test_balls_are_where_the_definition_says(name: str) -> None:
 def check_balls(nav: Navigable, solid: Solid) -> None:
     mesh = from_manifold(solid.manifold)
     hull = Hull.of(mesh.vertices)
-    assert hull is not None
     centres, radii = nav.balls.centres, nav.balls.radii
     assert len(centres) > 0
     assert (radii >= nav.radius - 1e-8).all()
@@ -132,7 +138,6 @@ def test_the_boundary_is_covered(name: str, radius: float, tolerance: float) -> 
     nav = Navigable.of(NavigableSpace(radius, tolerance), solid)
     mesh = from_manifold(solid.manifold)
     surface, hull = _native.Surface(mesh.vertices, mesh.faces), Hull.of(mesh.vertices)
-    assert hull is not None
     points = np.random.default_rng(5).uniform(-1.2, 1.2, (60_000, 3))
     points = points[surface.winding(points) < 0.5]
     closest, _ = surface.closest(points)
@@ -163,13 +168,6 @@ def test_creases_and_corners_get_a_ball(turn: int) -> None:
         assert along[-1] > 1.3 * solid.frame.scale
 
 
-def test_a_convex_solid_has_no_balls() -> None:
-    nav = prepare(box((-1, -0.5, -0.2), (1, 0.5, 0.2)))
-    assert len(nav.balls) == 0
-    assert nav.warnings == ()
-    assert nav.is_met(Component(box((-1, -0.5, -0.2), (1, 0.5, 0.2))))
-
-
 @pytest.mark.parametrize("turn", [0, 1])
 @pytest.mark.parametrize("hole", [0.2, 0.4])
 @pytest.mark.parametrize(("share", "is_open"), [(0.97, True), (1.1, False)])
@@ -182,16 +180,6 @@ def test_the_hole_of_a_torus_is_open_when_the_ball_fits(turn: int, hole: float, 
     assert (np.linalg.norm(centres, axis=1) < 0.43 * hole).any() == is_open
 
 
-@pytest.mark.parametrize("turn", [0, 1])
-@pytest.mark.parametrize(("share", "is_open"), [(0.99, True), (1.01, False)])
-def test_a_tube_is_open_exactly_when_the_ball_fits(turn: int, share: float, is_open: bool) -> None:
-    hole = manifold3d.Manifold.cylinder(4, 0.2, circular_segments=256, center=True)
-    solid = solid_of(turned(manifold3d.Manifold.cylinder(2, 0.5, circular_segments=64, center=True) - hole, turn))
-    nav = Navigable.of(NavigableSpace(radius_abs=0.15 * share, tolerance_abs=0.05 * share), solid)
-    centres = solid.frame.to_input(nav.balls.centres)
-    assert (np.linalg.norm(centres, axis=1) < 0.15).any() == is_open
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("turn", range(4))
 @pytest.mark.parametrize("wall", [0.01, 0.06, 0.3])
@@ -200,18 +188,6 @@ def test_a_door_lets_in_what_is_narrower(turn: int, wall: float, share: float) -
     diameter = 0.2
     home = turned(house(share * diameter, wall), turn)
     nav = Navigable.of(NavigableSpace(radius_abs=diameter / 2, tolerance_abs=0.02), solid_of(home))
-    assert inside_house(nav, home, turn).any() == (share > 1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("turn", range(2))
-@pytest.mark.parametrize("share", [0.97, 0.985, 1.015, 1.03])
-@pytest.mark.parametrize("wall", [0.02, 0.4])
-def test_a_round_hole_lets_in_what_is_narrower(turn: int, share: float, wall: float) -> None:
-    radius = 0.1
-    hole = manifold3d.Manifold.cylinder(2, share * radius, circular_segments=256).rotate((0, 90, 0))
-    home = turned(house(None, wall) - hole.translate((0.5, 0.2, 0.23)), turn)
-    nav = Navigable.of(NavigableSpace(radius_abs=radius, tolerance_abs=0.01), solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
@@ -228,12 +204,6 @@ def test_a_winding_passage_is_followed(turn: int, share: float) -> None:
     home = turned(house(None, 0.6) - manifold3d.Manifold.batch_boolean(legs, manifold3d.OpType.Add), turn)
     nav = Navigable.of(NavigableSpace(radius_abs=0.1, tolerance_abs=0.01), solid_of(home))
     assert inside_house(nav, home, turn).any() == (share > 1)
-
-
-def test_of_two_doors_the_wider_one_counts() -> None:
-    home = house(0.98 * 0.2) - box((-2, -0.2, -0.1), (0, -0.2 + 1.02 * 0.2, 0.4))
-    nav = Navigable.of(NavigableSpace(radius_abs=0.1, tolerance_abs=0.01), solid_of(home))
-    assert inside_house(nav, home, 0).any()
 
 
 def test_a_sealed_house_is_one_part_and_its_inside_counts_when_asked_for() -> None:
@@ -281,28 +251,6 @@ def test_the_ground_keeps_balls_above_it() -> None:
     assert len(prepare(crate, closed_planes=[ground]).balls) == 0
 
 
-def test_a_table_leg_seen_from_the_ground_up() -> None:
-    """Between the legs, just above the ground, a hull is met by balls that stand on the ground."""
-    solid = solid_of(table())
-    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE, closed_planes=[((0, 0, 1), -0.8)]), solid)
-    lowest = solid.manifold.bounding_box()[2]
-    feet = from_manifold(solid.manifold.trim_by_plane((0, 0, -1), -lowest - 0.02)).vertices
-    hull = Hull.of(feet)
-    assert hull is not None
-    assert not nav.is_met(part_of(hull))
-
-
-@pytest.mark.parametrize("reachable_only", [True, False])
-def test_the_number_of_threads_changes_nothing(reachable_only: bool) -> None:
-    solid = solid_of(turned(house(0.21), 1))
-    space = NavigableSpace(0.05, 0.01, reachable_only=reachable_only)
-    first = Navigable.of(space, solid, threads=1)
-    for threads in (2, 5):
-        other = Navigable.of(space, solid, threads=threads)
-        np.testing.assert_array_equal(first.balls.centres, other.balls.centres)
-        np.testing.assert_array_equal(first.balls.radii, other.balls.radii)
-
-
 @pytest.mark.parametrize(
     ("given", "says"),
     [
@@ -344,11 +292,16 @@ def test_a_seed_without_room_is_reported(seed: tuple[float, float, float], says:
         prepare(table(), seeds=[seed], closed_planes=[((0, 0, 1), -0.8)])
 
 
-def test_a_ball_larger_than_the_object_leaves_one_hull_and_says_so() -> None:
-    nav = prepare(table(), 1.5)
+@pytest.mark.parametrize(
+    ("solid", "radius", "says"),
+    [(table(), 1.5, "larger than the object"), (box((-1, -0.5, -0.2), (1, 0.5, 0.2)), RADIUS, "")],
+)
+def test_what_no_ball_is_near_is_one_hull(solid: Any, radius: float, says: str) -> None:
+    nav = prepare(solid, radius)
     assert len(nav.balls) == 0
-    assert any("larger than the object" in warning for warning in nav.warnings)
-    assert nav.is_met(Component(solid_of(table()).manifold))
+    assert says in "".join(nav.warnings)
+    assert bool(nav.warnings) == bool(says)
+    assert nav.is_met(Component(solid_of(solid).manifold))
 
 
 def test_a_radius_too_small_for_the_grid_is_reported() -> None:
@@ -358,16 +311,11 @@ def test_a_radius_too_small_for_the_grid_is_reported() -> None:
 
 
 def test_what_was_open_is_reported() -> None:
-    vertices, faces = _cup()
-    nav = Navigable.of(NavigableSpace(), repair(load_mesh((vertices, faces))))
+    cube = trimesh.creation.box()
+    cup = trimesh.Trimesh(cube.vertices, cube.faces[cube.face_normals[:, 2] < 0.5])
+    nav = Navigable.of(NavigableSpace(), repair(load_mesh(cup)))
     assert any("open bod" in warning for warning in nav.warnings)
     assert len(nav.balls) > 0
-
-
-def _cup() -> tuple[Floats, Any]:
-    mesh = from_manifold(box((-1, -1, -1), (1, 1, 1)))
-    top = (mesh.vertices[mesh.faces][:, :, 2] > 0.5).all(axis=1)
-    return mesh.vertices, mesh.faces[~top]
 
 
 # The criterion.
@@ -387,9 +335,7 @@ def some_balls(count: int = 400, seed: int = 3) -> Navigable:
 
 def some_hull(seed: int, size: float = 0.4) -> Hull:
     rng = np.random.default_rng(seed)
-    hull = Hull.of(rng.uniform(-1, 1, 3) * 0.7 + size * rng.uniform(-1, 1, (20, 3)))
-    assert hull is not None
-    return hull
+    return Hull.of(rng.uniform(-1, 1, 3) * 0.7 + size * rng.uniform(-1, 1, (20, 3)))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -407,31 +353,10 @@ def test_error_is_the_deepest_intrusion(seed: int) -> None:
         assert coarser.error(part_of(hull)) == nav.error(part_of(hull))
 
 
-def test_scaling_twice_is_scaling_by_the_product() -> None:
-    nav = some_balls()
-    assert nav.scaled(2).scaled(3).allowance == pytest.approx(nav.scaled(6).allowance)
-
-
-def test_children_are_judged_as_if_they_had_no_parents() -> None:
-    solid = solid_of(turned(table(), 1))
-    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE), solid)
-    generation = [Component(solid.manifold)]
-    for axis in (0, 1, 2, 0, 1):
-        for component in generation:
-            alone = Navigable.of(NavigableSpace(RADIUS, TOLERANCE), solid)
-            assert nav.is_met(component) == alone.is_met(part_of(component.hull))
-            assert nav.error(component) == alone.error(part_of(component.hull))
-        normal = tuple(float(axis == i) for i in range(3))
-        cut = [c.cut(Plane(normal, float(c.box[:, axis].mean()))) for c in generation]
-        generation = [side for pair in cut for side in pair if side is not None]
-    assert len(generation) > 8
-
-
 def test_a_part_smaller_than_half_the_tolerance_is_done() -> None:
     nav = Navigable(0.2, 0.2, Balls(np.zeros((1, 3)), np.array([0.2])))
     for side, done in ((0.09, True), (0.11, False)):
         hull = Hull.of(side * np.array(list(itertools.product((0, 1), repeat=3)), dtype=float))
-        assert hull is not None
         assert nav.is_met(part_of(hull)) == done
         assert (nav.error(part_of(hull)) == 0) == done
 
@@ -454,15 +379,142 @@ def test_balls_give_way_to_finished_parts(seed: int) -> None:
     assert nav.settled([]) is nav
 
 
+# --- in decompose -----------------------------------------------------------------------------------------------------
+
+
+AIR = np.array([[-0.6, 0.5, 0.6]])
+"""A place in the house where nothing stands."""
+
+
+def intrusion(result: rlacd.Decomposition) -> float:
+    """Deepest that any hull reaches into any ball, in the input's unit."""
+    balls = result.balls
+    return max(float((balls.radii - depth_of(hull, balls.centres)).max(initial=0.0)) for hull in result)
+
+
+def test_a_door_wider_than_the_ball_opens_the_inside() -> None:
+    space = rlacd.NavigableSpace(radius_abs=0.1, tolerance_abs=0.02)
+    shut, opened = (rlacd.decompose(trimesh_of(house(door, 0.15)), criterion=space) for door in (0.19, 0.21))
+    assert min(depth_of(hull, AIR) for hull in shut) < 0 < min(depth_of(hull, AIR) for hull in opened)
+    assert len(shut) < 6 < len(opened)
+    assert intrusion(opened) <= 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ball", [0.9, 1.1])
+@pytest.mark.promise("navigable")
+def test_the_hole_of_a_torus_is_free_exactly_when_the_ball_fits(ball: float) -> None:
+    torus = trimesh.creation.torus(0.75, 0.25, major_sections=96, minor_sections=64)  # a hole of radius 0.5
+    size, tolerance = 2.0, 0.02
+    result = rlacd.decompose(torus, criterion=rlacd.NavigableSpace((0.5 - tolerance) * ball / size, tolerance / size))
+    in_the_hole = np.linalg.norm(result.balls.centres, axis=1).min() < 0.27
+    assert in_the_hole == (ball < 1)
+
+
+def test_the_report_and_a_file_tell_of_the_balls(tmp_path: Path) -> None:
+    result = rlacd.decompose(elbow(), criterion=rlacd.NavigableSpace(0.05, 0.02), policy="navacd")
+    report = result.report
+    space = report["navigable"]
+    assert space["balls"] == len(result.balls) > 0
+    assert space["radius"] == pytest.approx(0.1)
+    assert space["intrusion"]["max"] == 0
+    assert len(space["intrusion"]["per_part"]) == len(result)
+    assert len(result.save_balls(tmp_path / "balls.csv").read_text().splitlines()) == 1 + len(result.balls)
+    assert "concavity" not in report
+    assert report["options"]["criterion"]["radius"] == 0.05
+    json.dumps(report, allow_nan=False)
+    for hull in result:
+        assert_convex_hull(hull)
+
+
+def test_a_threshold_does_not_go_with_it() -> None:
+    with pytest.raises(rlacd.OptionError, match="has radius and tolerance instead"):
+        rlacd.decompose(elbow(), criterion=rlacd.NavigableSpace(), threshold=0.1)
+
+
+def test_lengths_in_the_meshs_own_unit() -> None:
+    mesh = elbow()
+    by_share = rlacd.decompose(mesh, criterion=rlacd.NavigableSpace(0.05, 0.02))
+    mesh.apply_scale(1000)
+    by_length = rlacd.decompose(mesh, criterion=rlacd.NavigableSpace(radius_abs=100.0, tolerance_abs=40.0))
+    assert len(by_share) == len(by_length) == 2
+    assert np.allclose(by_share.balls.centres * 1000, by_length.balls.centres, atol=1e-3)
+
+
+@pytest.mark.slow
+def test_max_hulls_gives_way_by_as_little_as_it_can() -> None:
+    result = rlacd.decompose(trimesh_of(house(0.5)), criterion=rlacd.NavigableSpace(0.05, 0.01), max_hulls=4)
+    assert len(result) <= 4
+    assert result.report["navigable"]["intrusion"]["max"] > 0
+    assert any("ball" in warning for warning in result.report["warnings"])
+
+
+def bumpy_ball() -> trimesh.Trimesh:
+    ball = trimesh.creation.icosphere(3)
+    x, y = ball.vertices[:, :1], ball.vertices[:, 1:2]
+    ball.vertices *= 1 + 0.35 * np.sin(5 * x) * np.cos(4 * y)
+    return ball
+
+
+@pytest.mark.slow
+def test_one_pass_eliminates_parts_that_others_can_hold_together() -> None:
+    """A policy that stands for a published method does not: the same cuts, merged, are more hulls."""
+    space, mesh = rlacd.NavigableSpace(0.1, 0.02), bumpy_ball()
+    divided = [rlacd.decompose(mesh, criterion=space, quality="fast", threads=threads) for threads in (1, 3)]
+    merged = rlacd.decompose(mesh, criterion=space, quality="fast", policy="greedy-excess-norm+edges")
+    assert len(divided[0]) < len(merged)
+    assert intrusion(divided[0]) < 1e-6
+    assert divided[0].report["hausdorff"]["under"] < 5e-3
+    for one, other in zip(*divided, strict=True):
+        assert one.vertices.tobytes() == other.vertices.tobytes()
+    assert "search" in divided[0].report["seconds"]
+    assert "search" not in merged.report["seconds"]
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    elbow().export(tmp_path / "ell.stl")
+    return tmp_path / "ell.stl"
+
+
+@pytest.mark.slow
+def test_the_command_writes_the_balls(mesh: Path, tmp_path: Path) -> None:
+    words = ["decompose", mesh, "-o", tmp_path / "out.glb", "--criterion", "navigable"]
+    for ending in ("csv", "glb"):
+        report = tmp_path / "report.json"
+        assert run(*words, "--balls", tmp_path / f"balls.{ending}", "--report", report).exit_code == 0
+    with (tmp_path / "balls.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    spheres = trimesh.load(tmp_path / "balls.glb").to_geometry()
+    assert len(rows) == len(spheres.split())
+    assert all(float(row["radius"]) > 0 for row in rows)
+    assert len(rows) == json.loads(report.read_text(encoding="utf-8"))["navigable"]["balls"] > 0
+    places = np.array([[float(row[name]) for name in "xyz"] for row in rows])
+    hulls = trimesh.load_scene(tmp_path / "out.glb").to_mesh().split()
+    reach = np.min([point_to_triangles(places, hull.vertices, hull.faces) for hull in hulls], axis=0)
+    assert (reach >= np.array([float(row["radius"]) for row in rows]) - 1e-4).all(), "a hull reaches into a ball"
+
+
+def test_the_command_takes_seeds_and_planes(mesh: Path, tmp_path: Path) -> None:
+    words = ["--criterion", "navigable", "--radius-abs", 0.2, "--tolerance-abs", 0.05, "--report", "-", "-q"]
+    place = ["--seed-point", "1.5,0.2,1.5", "--closed-plane", "0,0,1,0"]
+    done = run("decompose", mesh, "-o", tmp_path / "out.glb", *words, *place)
+    assert done.exit_code == 0, done.output
+    options = json.loads(done.stdout)["options"]["criterion"]
+    assert options["seeds"] == [[1.5, 0.2, 1.5]]
+    assert options["closed_planes"] == [[[0, 0, 1], 0]]
+
+
 @pytest.mark.nightly
-def test_on_real_meshes(corpus: Path) -> None:
+@pytest.mark.promise("navigable")
+def test_no_hull_overlaps_a_final_ball_on_real_meshes(corpus: Path) -> None:
     for name in (corpus / "quick.txt").read_text().split()[::4]:
-        solid = repair(load_mesh(corpus / name))
-        for radius, tolerance in ((0.025, 0.05), (0.05, 0.01)):
-            nav = Navigable.of(NavigableSpace(radius, tolerance), solid)
-            mesh = from_manifold(solid.manifold)
-            surface = _native.Surface(mesh.vertices, mesh.faces)
-            distance = surface.distance(nav.balls.centres)
-            np.testing.assert_allclose(nav.balls.radii, distance - nav.tolerance, atol=1e-7)
-            assert (nav.balls.radii >= nav.radius - 1e-8).all()
-            assert (surface.winding(nav.balls.centres, accuracy=np.inf) < 0.01).all()
+        result = rlacd.decompose(corpus / name, criterion=rlacd.NavigableSpace(0.05, 0.01), policy="navacd")
+        assert result.report["navigable"]["intrusion"]["max"] == 0, name
+        assert result.balls is not None
+        scale = np.ptp(result.source.vertices, axis=0).max()
+        assert intrusion(result) <= 1e-7 * scale, name

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import manifold3d
-import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
@@ -17,19 +16,14 @@ from rlacd.compat.vhacd import compute_vhacd
 from rlacd.errors import OptionError
 from tests.hulls import assert_convex_hull
 from tests.models import table
-
-
-def manifold_of(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
-    vertices, faces = np.array(mesh.vertices, order="C"), np.array(mesh.faces, dtype=np.uint64, order="C")
-    return manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
+from tests.shapes import to_manifold, trimesh_of
 
 
 def cup() -> trimesh.Trimesh:
     solid = manifold3d.Manifold.cylinder(2, 1, 1, 24) - manifold3d.Manifold.cylinder(2, 0.9, 0.9, 24).translate(
         (0, 0, 0.1)
     )
-    mesh = solid.to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    return trimesh_of(solid)
 
 
 def torus() -> trimesh.Trimesh:
@@ -43,11 +37,11 @@ def torus() -> trimesh.Trimesh:
 def test_no_hull_adds_more_than_the_share(shape: object, tolerance: float) -> None:
     mesh: trimesh.Trimesh = shape()  # type: ignore[operator]
     result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=tolerance, threads=1)
-    solid = manifold_of(mesh)
+    solid = to_manifold(mesh.vertices, mesh.faces)
     least = 1e-3 * mesh.convex_hull.volume
     for hull in result:
         assert_convex_hull(hull)
-        inside = (manifold_of(hull) ^ solid).volume()
+        inside = (to_manifold(hull.vertices, hull.faces) ^ solid).volume()
         assert hull.volume - inside <= tolerance * max(inside, least) * (1 + 1e-6) + 1e-9
     measured = result.report["volume"]
     assert len(measured["per_part"]) == len(result)
@@ -71,13 +65,6 @@ def test_a_limit_on_hulls_may_exceed_the_share_and_says_by_how_much() -> None:
     assert len(result) <= 6
     assert result.report["volume"]["max"] > 0.01
     assert any("add more than 1 % of volume" in warning for warning in result.report["warnings"])
-
-
-def test_the_same_bytes_for_any_threads() -> None:
-    results = [rlacd.decompose(torus(), criterion="volume", threads=threads) for threads in (1, 3)]
-    assert len(results[0]) == len(results[1])
-    for one, other in zip(*results, strict=True):
-        assert np.array_equal(one.vertices, other.vertices)
 
 
 def test_the_command_line_takes_a_share(tmp_path: Path) -> None:

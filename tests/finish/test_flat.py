@@ -1,4 +1,4 @@
-"""What can rest on a flat side rests on the hulls at the same height, whatever corners they leave out."""
+"""What can rest on a flat side rests on the hulls too; hulls grow to what of the input lies just outside them."""
 
 from __future__ import annotations
 
@@ -6,24 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from manifold3d import Manifold
 
 import rlacd
-from rlacd.finish.limit import FLUSH, resting_sides
+from rlacd.criteria import Concavity
+from rlacd.finish.limit import resting_sides, take_in
 from rlacd.io.read.load import load_mesh
-from rlacd.options.presets import HullLimits
 from rlacd.repair.repair import repair
-from rlacd.solid.component import Component
-from rlacd.solid.hull import limit_hull
+from rlacd.solid.component import Component, Part
+from rlacd.solid.distance import hull_union
 from tests.shapes import box
 
 DEEP = 1e-4
 """How far hulls may reach through the ground (the longest side is 2)."""
-
-
-def cup() -> Manifold:
-    outer = Manifold.cylinder(1.2, 0.5, 0.6, 48)
-    return outer - Manifold.cylinder(1.2, 0.4, 0.5, 48).translate([0, 0, 0.1])
 
 
 def test_a_box_rests_on_every_side_and_a_sphere_on_none() -> None:
@@ -36,15 +32,6 @@ def test_it_does_not_rest_where_its_centre_of_mass_is_not_above() -> None:
     sides = resting_sides(wedge)
     assert not (sides[:, 2] < -0.99).any()
     assert (sides[:, 2] > 0.99).any()
-
-
-@pytest.mark.parametrize("corners", [8, 12, 24])
-def test_a_simpler_hull_stays_above_the_ground(corners: int) -> None:
-    solid = Component(cup())
-    ground = np.array([[0.0, 0.0, -1.0, FLUSH]])
-    simple = limit_hull(solid.hull, HullLimits(corners, None), 0.02, ground)
-    assert len(simple.vertices) <= corners
-    assert simple.vertices[:, 2].min() >= -2 * FLUSH
 
 
 @pytest.mark.promise("flat")
@@ -62,3 +49,39 @@ def test_real_objects_stand_where_they_stood(corpus: Path, name: str, options: d
     assert len(sides) > 0
     for *normal, offset in sides:
         assert abs((points @ normal).max() - offset) <= DEEP
+
+
+def brick(x: float, bottom: float = 0.0, top: float = 1.0) -> Component:
+    """A box from x to x + 1."""
+    mesh = trimesh.creation.box(bounds=[(x, -0.5, bottom), (x + 1, 0.5, top)])
+    return Component((np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)))
+
+
+def outside(parts: list[Part], points: np.ndarray) -> float:
+    return float(hull_union([part.hull for part in parts], 1).distance(points, 1).max())
+
+
+def test_each_point_goes_to_the_hull_that_has_to_grow_least() -> None:
+    parts: list[Part] = [brick(0), brick(1), brick(5)]
+    points = np.array([(0.2, 0.1, 1.002), (1.9, 0.1, 1.001), (1.5, 0, 1.003)])
+    grown = take_in(parts, points, Concavity(0.05))
+    assert outside(grown, points) <= 1e-9
+    assert grown[0].hull.vertices[:, 2].max() == pytest.approx(1.002)
+    assert grown[1].hull.vertices[:, 2].max() == pytest.approx(1.003)
+    assert grown[2] is parts[2]
+
+
+@pytest.mark.promise("covered")
+def test_a_hull_grows_only_if_its_part_then_meets_the_criterion() -> None:
+    parts, points = [brick(0), brick(1)], np.array([(0.5, 0, 1.004), (1.5, 0, 1.001)])
+    grown = take_in(parts, points, Concavity(0.05))
+    errors = [Concavity(0.05).error(part) for part in grown]
+    assert errors[0] > errors[1]
+    grown = take_in(parts, points, Concavity(sum(errors) / 2))
+    assert grown[0] is parts[0]
+    assert outside(grown, points[1:]) <= 1e-9
+
+
+def test_a_hull_that_is_going_to_be_dropped_does_not_keep_others_from_growing() -> None:
+    sliver, points = brick(0, bottom=1.0, top=1.001), np.array([(0.5, 0, 1.001)])
+    assert outside(take_in([brick(0), sliver], points, Concavity(0.05))[:1], points) <= 1e-9

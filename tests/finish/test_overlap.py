@@ -23,6 +23,7 @@ from rlacd.options import Options
 from rlacd.result import Result
 from rlacd.solid.component import Component, Plane
 from tests.hulls import assert_convex_hull
+from tests.shapes import trimesh_of
 
 Array = npt.NDArray[np.float64]
 
@@ -31,7 +32,7 @@ OVERLAP = 0.04
 
 def ell() -> trimesh.Trimesh:
     """An L whose longest side is 2: it is cut in two."""
-    return solid(Manifold.cube((2.0, 0.6, 0.5)) + Manifold.cube((0.5, 0.6, 1.5)))
+    return trimesh_of(Manifold.cube((2.0, 0.6, 0.5)) + Manifold.cube((0.5, 0.6, 1.5)))
 
 
 def stool() -> trimesh.Trimesh:
@@ -39,12 +40,7 @@ def stool() -> trimesh.Trimesh:
     legs = [Manifold.cube((0.2, 0.2, 1.5)).translate((x, y, 0.0)) for x in (0.0, 1.8) for y in (0.0, 1.0)]
     rail = Manifold.cube((1.7, 0.1, 0.2)).translate((0.15, 0.05, 0.5))
     seat = Manifold.cube((2.0, 1.2, 0.2)).translate((0.0, 0.0, 1.5))
-    return solid(legs[0] + legs[1] + legs[2] + legs[3] + rail + seat)
-
-
-def solid(shape: Manifold) -> trimesh.Trimesh:
-    mesh = shape.to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
+    return trimesh_of(legs[0] + legs[1] + legs[2] + legs[3] + rail + seat)
 
 
 def depths(hulls: list[trimesh.Trimesh], points: Array) -> Array:
@@ -115,14 +111,12 @@ def halves(height: float = 1.0) -> tuple[Component, list[Component]]:
     """A box two units wide, cut in its middle."""
     box = Component(Manifold.cube((2.0, 1.0, height), center=True))
     below, above = box.cut(Plane((1.0, 0.0, 0.0), 0.0))
-    assert below is not None
-    assert above is not None
     return box, [below, above]
 
 
 def flush_body(shape: Manifold) -> tuple[_native.FlushBody, Array]:
     """The kernel's view of a convex solid, and its planes as rows (normal, offset)."""
-    mesh = solid(shape)
+    mesh = trimesh_of(shape)
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
     normals = mesh.face_normals
     return _native.FlushBody(vertices, faces), np.column_stack([normals, (vertices @ normals.T).max(axis=0)])
@@ -193,7 +187,7 @@ def test_parts_that_do_not_touch_or_share_only_an_edge_stay_as_they_are() -> Non
 @pytest.mark.promise("overlap")
 def test_a_seam_without_room_is_told() -> None:
     """Two blocks of a stair: what either takes in of the other spans the step between them."""
-    mesh = solid(Manifold.cube((1.0, 1.0, 1.0)) + Manifold.cube((1.0, 1.0, 1.0)).translate((1.0, 0.5, 0.5)))
+    mesh = trimesh_of(Manifold.cube((1.0, 1.0, 1.0)) + Manifold.cube((1.0, 1.0, 1.0)).translate((1.0, 0.5, 0.5)))
     result = rlacd.decompose(mesh, threshold=0.003, overlap=0.1, quality="fast", threads=1)
     overlap = result.report["overlap"]
     assert overlap["short"] > 0
@@ -207,19 +201,6 @@ def test_a_seam_without_room_is_told() -> None:
         assert between.min() > -0.003 / result.report["scale"], "a place on both hulls"
         assert seam["depth_abs"] < 0.1 / result.report["scale"]
     assert result.report["concavity"]["max"] <= 0.003
-
-
-def test_where_a_layer_at_all_seams_is_too_much_one_at_this_seam_is_taken() -> None:
-    """Four slanted blocks: of 3 seams, 2 are short if a hull always grows at all its seams at once."""
-    random = np.random.default_rng(23)
-    blocks = Manifold()
-    for _ in range(4):
-        low, size = random.integers(0, 8, 3) / 4, random.integers(1, 7, 3) / 4
-        turned = float(random.uniform(-40, 40)), 0.0, float(random.uniform(-40, 40))
-        blocks += Manifold.cube(size.tolist()).rotate(turned).translate(low.tolist())
-    result = rlacd.decompose(solid(blocks), overlap=0.05, quality="fast", policy="navacd", threads=1)
-    assert result.report["overlap"]["seams"] >= 3
-    assert result.report["overlap"]["short"] == 0
 
 
 def test_nodes_that_move_do_not_overlap_each_other() -> None:

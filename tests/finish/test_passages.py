@@ -14,7 +14,7 @@ from rlacd import _native
 from rlacd.cli.options import decompose_options
 from rlacd.errors import OptionError
 from rlacd.solid.passages import passage_balls
-from tests.shapes import Closed, Floats, box, from_manifold, point_to_triangles
+from tests.shapes import Closed, Floats, box, from_manifold, point_to_triangles, trimesh_of
 
 
 def bore(radius: float, x: float, y: float, sides: int = 64) -> Manifold:
@@ -27,11 +27,6 @@ def plate(*bores: Manifold) -> Manifold:
     for one in bores:
         solid -= one
     return solid
-
-
-def mesh_of(solid: Manifold, scale: float = 1.0) -> trimesh.Trimesh:
-    closed = from_manifold(solid)
-    return trimesh.Trimesh(scale * closed.vertices, closed.faces, process=False)
 
 
 def clearance(hulls: list[trimesh.Trimesh], points: Floats) -> Floats:
@@ -89,7 +84,7 @@ def test_what_walls_do_not_hold_between_them_is_no_passage(solid: Manifold) -> N
 def test_each_hole_that_narrows_is_listed_with_its_place_and_what_is_left_of_it() -> None:
     places = [(x, y) for x in (-0.75, -0.25, 0.25, 0.75) for y in (-0.3, 0.3)]
     scale = 50.0
-    mesh = mesh_of(plate(*(bore(0.1, x, y) for x, y in places)), scale)
+    mesh = trimesh_of(plate(*(bore(0.1, x, y) for x, y in places))).apply_scale(scale)
     result = rlacd.decompose(mesh, threshold=0.2, quality="fast", threads=1)
     listed = result.report["passages"]
     seen = {min(range(8), key=lambda i: np.hypot(*(np.array(p["at_abs"][:2]) / scale - places[i]))) for p in listed}
@@ -111,14 +106,14 @@ def test_each_hole_that_narrows_is_listed_with_its_place_and_what_is_left_of_it(
 @pytest.mark.promise("passages")
 def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     block = box((0, 0, 0), (100, 40, 30)) - box((5, 19.5, 10), (95, 20.5, 40))
-    report = rlacd.decompose(mesh_of(block), quality="fast", threads=1).report
+    report = rlacd.decompose(trimesh_of(block), quality="fast", threads=1).report
     (slot,) = report["passages"]
     assert (slot["radius_abs"], slot["left_abs"]) == pytest.approx((0.5, 0.0), abs=0.01)
     assert any(
         "1 passage narrows by" in said and "1 to nothing" in said and "from a radius of 0.4997 to 0;" in said
         for said in report["warnings"]
     )
-    assert rlacd.decompose(mesh_of(block), threshold_abs=0.3, quality="fast", threads=1).report["passages"] == []
+    assert rlacd.decompose(trimesh_of(block), threshold_abs=0.3, quality="fast", threads=1).report["passages"] == []
 
 
 CRITERIA: list[dict[str, Any]] = [
@@ -135,7 +130,7 @@ CRITERIA: list[dict[str, Any]] = [
 @pytest.mark.promise("keep-open")
 @pytest.mark.parametrize("given", CRITERIA, ids=str)
 def test_a_share_of_every_wide_hole_stays_open_whatever_decides_the_hulls(given: dict[str, Any]) -> None:
-    mesh, wide = mesh_of(plate(*(bore(*hole) for hole in HOLES))), [hole for hole in HOLES if hole[0] > 0.05]
+    mesh, wide = trimesh_of(plate(*(bore(*hole) for hole in HOLES))), [hole for hole in HOLES if hole[0] > 0.05]
     result = rlacd.decompose(mesh, keep_open=0.9, quality="fast", threads=1, **given)
     for radius, x, y in wide:
         assert clearance(result.hulls, axis(x, y)).min() >= 0.985 * 0.9 * radius * np.cos(np.pi / 64)
@@ -144,7 +139,7 @@ def test_a_share_of_every_wide_hole_stays_open_whatever_decides_the_hulls(given:
 
 @pytest.mark.promise("keep-open")
 def test_a_ball_of_a_given_radius_still_passes_and_narrower_holes_may_close() -> None:
-    mesh = mesh_of(plate(*(bore(*hole) for hole in HOLES)), 50.0)
+    mesh = trimesh_of(plate(*(bore(*hole) for hole in HOLES))).apply_scale(50.0)
     given: dict[str, Any] = {"threshold": 0.3, "quality": "fast", "threads": 1}
     free, kept = rlacd.decompose(mesh, **given), rlacd.decompose(mesh, keep_open_abs=5.8, **given)
     at = [50 * axis(x, y) for _, x, y in HOLES]
@@ -154,7 +149,7 @@ def test_a_ball_of_a_given_radius_still_passes_and_narrower_holes_may_close() ->
 
 
 def test_where_a_limit_forbids_it_a_warning_says_so() -> None:
-    mesh = mesh_of(plate(bore(0.3, 0, 0)))
+    mesh = trimesh_of(plate(bore(0.3, 0, 0)))
     report = rlacd.decompose(mesh, keep_open=0.95, max_hulls=2, quality="fast", threads=1).report
     told = ("1 passage narrows by more than --keep-open allows", "limits on the hulls")
     assert any(all(words in said for words in told) for said in report["warnings"])
@@ -175,7 +170,7 @@ def test_a_peg_falls_through_its_hole_in_mujoco_and_jams_without(shape: str) -> 
     if shape == "carrier":
         for x, y in places:
             solid -= bore(12, x, y).scale((1, 1, 20))
-    mesh = mesh_of(solid, 1e-3)
+    mesh = trimesh_of(solid).apply_scale(1e-3)
 
     def fallen(result: rlacd.Decomposition) -> list[bool]:
         top = mesh.bounds[1, 2]

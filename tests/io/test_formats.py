@@ -6,7 +6,6 @@ import contextlib
 import errno
 import json
 import os
-import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -59,11 +58,13 @@ def test_every_hull_comes_back_under_its_name(tmp_path: Path, ending: str) -> No
         assert same_points(mesh.vertices, hull.vertices, 1e-6 if ending == "glb" else 0.0)
 
 
-def test_each_array_of_a_glb_has_a_view_of_its_own(tmp_path: Path) -> None:
+def test_hulls_of_a_glb_have_arrays_of_their_own_and_a_colour_each(tmp_path: Path) -> None:
     """glTF 2.0, 3.6.2.4: a view that vertex attributes share must define a stride."""
     written, _, _ = read_glb(save_hulls(THREE, tmp_path / "out.glb"))
     views = [accessor["bufferView"] for accessor in written["accessors"]]
     assert len(set(views)) == len(views) == 2 * len(THREE)
+    assert len({str(one["pbrMetallicRoughness"]["baseColorFactor"]) for one in written["materials"]}) == len(THREE)
+    assert not any("matrix" in node or "translation" in node for node in written["nodes"])
 
 
 def test_ply_keeps_hulls_apart_exact_and_coloured(tmp_path: Path) -> None:
@@ -85,24 +86,6 @@ def test_a_second_parser_reads_the_same(tmp_path: Path, ending: str) -> None:
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(THREE[0].volume, rel=1e-5)
     assert len(faces) == len(THREE[0].faces)
-
-
-def test_obj_text_holds_every_digit(tmp_path: Path) -> None:
-    lines = save_hulls(THREE, tmp_path / "out.obj").read_text().splitlines()
-    written = [[float(word) for word in line.split()[1:4]] for line in lines if line.startswith("v ")]
-    assert np.array_equal(written, np.concatenate([hull.vertices for hull in THREE]))
-    assert [line.split()[1] for line in lines if line.startswith("o ")] == NAMES
-
-
-def test_glb_has_a_named_coloured_node_a_hull(tmp_path: Path) -> None:
-    data = save_hulls(THREE, tmp_path / "out.glb").read_bytes()
-    magic, version, length, size = struct.unpack("<4sIII", data[:16])
-    assert (magic, version, length) == (b"glTF", 2, len(data))
-    tree = json.loads(data[20 : 20 + size])
-    assert sorted(tree["meshes"][node["mesh"]]["name"] for node in tree["nodes"] if "mesh" in node) == NAMES
-    colors = [tuple(material["pbrMetallicRoughness"]["baseColorFactor"]) for material in tree["materials"]]
-    assert len(set(colors)) == 3
-    assert not any("matrix" in node or "translation" in node for node in tree["nodes"])
 
 
 def test_one_stl_hull_is_binary_and_many_are_solids(tmp_path: Path) -> None:
@@ -148,13 +131,6 @@ def in_place(path: Path) -> trimesh.Trimesh:
     return mesh if np.allclose(scene.graph[node][0], np.eye(4)) else hull_of(moved_back.vertices)
 
 
-def test_far_from_the_origin_a_glb_keeps_the_shape(tmp_path: Path) -> None:
-    box = hull_of(trimesh.creation.box((0.01, 0.02, 0.03)).vertices + np.array([5e5, -5e5, 1e4]))
-    (mesh,) = load(save_hulls([box], tmp_path / "far.glb")).values()
-    assert mesh.extents == pytest.approx(box.extents, rel=1e-5)
-    assert mesh.bounds == pytest.approx(box.bounds, abs=1e-8)
-
-
 @pytest.mark.promise("convex-in-files")
 def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_work(tmp_path: Path) -> None:
     # Thinner than the spacing of float32 numbers at its corners, on a slant so that no axis helps.
@@ -169,20 +145,6 @@ def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_
         assert_convex_hull(mesh)
 
 
-@pytest.mark.parametrize("ending", FORMATS)
-def test_same_hulls_same_bytes(tmp_path: Path, ending: str) -> None:
-    first, second = (save_hulls(THREE, tmp_path / f"{name}.{ending}").read_bytes() for name in "ab")
-    assert first == second
-
-
-def test_colours_of_neighbours_in_the_list_differ() -> None:
-    colors = hull_colors(200).astype(float)
-    assert np.array_equal(hull_colors(7), hull_colors(200)[:7])
-    for step in (1, 2, 3, 4):
-        assert np.linalg.norm(colors[step:] - colors[:-step], axis=1).min() > 30.0
-    assert len(np.unique(colors, axis=0)) == 200
-
-
 # --- places -----------------------------------------------------------------------------------------------------------
 
 
@@ -192,11 +154,7 @@ def test_an_unknown_ending_is_refused_with_the_known_ones(tmp_path: Path, name: 
         save_hulls(THREE, tmp_path / name)
 
 
-def test_endings_in_capitals_are_known(tmp_path: Path) -> None:
-    assert save_hulls(THREE, tmp_path / "HULLS.STL").stat().st_size > 0
-
-
-@pytest.mark.parametrize("place", ["new/out.glb", "new/deep/out.stl", "new/", "new/deep/er/"])
+@pytest.mark.parametrize("place", ["new/out.glb", "new/deep/OUT.STL", "new/", "new/deep/er/"])
 def test_missing_folders_are_made_with_the_file(tmp_path: Path, place: str) -> None:
     hull_target(f"{tmp_path}/{place}")
     assert list(tmp_path.iterdir()) == [], "checking makes nothing"
@@ -217,19 +175,11 @@ def test_places_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
         hull_target(tmp_path / "file" / "out.glb")
     with pytest.raises(OptionError, match="no name"):
         hull_target("")
+    for name in ("\0.glb", "y" * 300 + ".stl"):
+        with pytest.raises(OutputError):
+            save_hulls(THREE, tmp_path / name)
     with pytest.raises(OutputError, match="no hulls"):
         save_hulls([], tmp_path / "out.glb")
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_without_permission_is_refused_before_work(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(OutputError, match="you may not"):
-        hull_target(tmp_path / "out.glb")
-    tmp_path.chmod(0o700)
-
-
-def test_contradicting_formats_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="contradicts"):
         hull_target(tmp_path / "out.glb", OutputOptions(file_format="obj"))
     with pytest.raises(OptionError, match="unknown format"):
@@ -241,32 +191,19 @@ def test_contradicting_formats_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", FORMATS)
 @pytest.mark.parametrize("stage", ["fsync", "replace"])
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()], ids=repr)
 @pytest.mark.promise("whole-files")
-def test_a_failing_disk_leaves_the_old_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, stage: str
+def test_a_failing_disk_or_an_interrupt_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, stage: str, error: BaseException
 ) -> None:
     path = tmp_path / f"out.{ending}"
     path.write_bytes(b"old")
 
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
+    def fail(*_: object) -> None:
+        raise error
 
-    monkeypatch.setattr(os, stage, full)
-    with pytest.raises(OutputError, match="disk is full"):
-        save_hulls(THREE, path)
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "out.obj"
-    path.write_bytes(b"old")
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(os, "fsync", interrupt)
-    with pytest.raises(KeyboardInterrupt):
+    monkeypatch.setattr(os, stage, fail)
+    with pytest.raises((OutputError, KeyboardInterrupt), match=r"disk is full|^$"):
         save_hulls(THREE, path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
@@ -294,7 +231,7 @@ def files_of(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("ending", [None, *FORMATS])
 def test_a_folder_gets_one_file_a_hull(tmp_path: Path, ending: str | None) -> None:
-    folder = save_hulls(THREE, f"{tmp_path}/hulls/", stem="chair", file_format=ending)
+    folder = save_hulls(THREE, f"{tmp_path}/hulls{'' if ending else '/'}", stem="chair", file_format=ending)
     known = ending or "obj"
     assert files_of(folder) == [*(f"chair_{i:03d}.{known}" for i in range(3)), "chair_hulls.json"]
     assert files_of(tmp_path) == ["hulls"]
@@ -302,11 +239,6 @@ def test_a_folder_gets_one_file_a_hull(tmp_path: Path, ending: str | None) -> No
         (mesh,) = load(folder / f"chair_{index:03d}.{known}").values()
         assert_convex_hull(mesh)
         assert same_points(mesh.vertices, hull.vertices, 1e-6)
-
-
-def test_a_format_makes_a_name_without_ending_a_folder(tmp_path: Path) -> None:
-    folder = save_hulls(THREE[:1], tmp_path / "hulls", stem="chair", file_format="ply")
-    assert files_of(folder) == ["chair_000.ply", "chair_hulls.json"]
 
 
 @pytest.mark.promise("own-files")

@@ -32,7 +32,6 @@ def shape() -> trimesh.Trimesh:
 
 
 def damaged(kind: str, number: int, folder: Path) -> Path:
-    """The file of a number."""
     write = written_by_extras if kind in APART else written
     seeds: list[Any] = [seed for of, seed in write(shape()) if of == APART.get(kind, kind)]
     rng = np.random.default_rng([7, number])
@@ -77,9 +76,3 @@ def test_a_damaged_file_that_is_read_apart_is_read_or_refused(
     pytest.importorskip(module)
     monkeypatch.setattr(apart, "LIMITS", ProcessLimits(seconds=5.0))  # OpenCASCADE may never end
     assert untyped(kind, tmp_path) == {}
-
-
-def test_a_number_always_makes_the_same_file(tmp_path: Path) -> None:
-    for kind in ("obj", "3mf", "gltf"):
-        first, second = (damaged(kind, 3, tmp_path).read_bytes() for _ in range(2))
-        assert first == second

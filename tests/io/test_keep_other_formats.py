@@ -12,7 +12,6 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.io.read import obj
 from rlacd.io.read.beside import mesh_files
 from tests.assets import Json, painted_obj, png, read_glb, view_of
 from tests.hulls import assert_convex_hull
@@ -132,22 +131,13 @@ def test_pictures_and_opacities_of_materials_are_read_as_exporters_write_them(tm
 def test_a_picture_outside_the_folder_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     path = painted_obj(tmp_path / "in")
+    assert sorted(mesh_files(path)) == ["crate.mtl", "crate.obj", "wood.png"], "what is sent along with it"
     (tmp_path / "in" / "wood.png").rename(tmp_path / "wood.png")
     paints = tmp_path / "in" / "crate.mtl"
     paints.write_text(paints.read_text().replace("wood.png", "../wood.png"))
     header, _, _ = kept(path, tmp_path / "out.glb")
     assert "images" not in header
     assert sorted(mesh_files(path)) == ["crate.mtl", "crate.obj"]
-
-
-def test_materials_and_pictures_are_sent_along_with_an_obj(tmp_path: Path) -> None:
-    assert sorted(mesh_files(painted_obj(tmp_path))) == ["crate.mtl", "crate.obj", "wood.png"]
-
-
-def test_too_many_materials_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(obj, "MOST_PARTS", 1)
-    header, _, _ = kept(painted_obj(tmp_path), tmp_path / "out.glb")
-    assert len(header["meshes"][0]["primitives"]) == 1
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "binary"])

@@ -65,14 +65,6 @@ def test_a_length_needs_no_unit_and_another_than_metres_is_warned_of(tmp_path: P
     assert "warning: the unit of stand.step is 1 m, by its format or by what it says; --unit mm overrides" in run.stderr
 
 
-@pytest.mark.slow
-def test_an_iges_file_that_is_kept_is_as_large_as_its_hulls(tmp_path: Path) -> None:
-    result = rlacd.decompose(BALL, quality="fast", threads=1)
-    scene = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True))
-    assert len(scene.geometry) == 2
-    assert np.allclose(scene.extents, 0.06, rtol=0.01)
-
-
 def test_parts_that_lie_in_other_files_are_missed(tmp_path: Path) -> None:
     text, brep = STAND.read_text(), r"ADVANCED_BREP_SHAPE(_REPRESENTATION\('',\(#\d+),#\d+"
     (tmp_path / "one.step").write_text(re.sub(brep, r"SHAPE\1", text, count=1))

@@ -17,10 +17,7 @@ import trimesh
 import rlacd
 from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.apart import answer_of
-from rlacd.io.read.draco import DECODER
 from rlacd.io.read.load import load_mesh
-from rlacd.pool import Request, WorkerDiedError
-from rlacd.pool.local import Worker
 from tests.assets import Rig, read_glb
 from tests.io.hostile.gltf import gltf_tree
 
@@ -154,37 +151,6 @@ def test_damaged_draco_is_refused_in_one_sentence(compressed: Path, damage: str)
         load_mesh(path)
 
 
-@pytest.mark.slow
-def test_hundreds_of_damaged_streams_end_in_arrays_or_our_error(compressed: Path) -> None:
-    import DracoPy
-
-    ball = trimesh.creation.icosphere(1)
-    seeds = [
-        DracoPy.encode(ball.vertices.astype("f4"), ball.faces.astype("u4"), compression_level=level) for level in (1, 7)
-    ]
-    rng = np.random.default_rng(0)
-    worker, ends = Worker(), {"read": 0, "refused": 0, "died": 0}
-    try:
-        for number in range(400):
-            stream = bytearray(seeds[number % 2])
-            for _ in range(rng.integers(1, 5)):
-                stream[rng.integers(len(stream))] = rng.integers(256)
-            values = {"path": "a.glb", "asked": {"a": (0, False, 3)}}
-            try:
-                answer = worker.ask(Request(DECODER, values, {"a": bytes(stream[: rng.integers(1, 2 * len(stream))])}))
-                corners = np.frombuffer(answer.blobs["a.corners"], "<u4")
-                assert len(corners) == 0 or corners.max() < len(answer.blobs["a.points"]) // 12
-                ends["read"] += 1
-            except MeshFileError:
-                ends["refused"] += 1
-            except WorkerDiedError:  # what the reader makes an error of ours
-                ends["died"] += 1
-    finally:
-        worker.close()
-    assert ends["read"] > 10
-    assert ends["refused"] > 100
-
-
 class Aborts:
     """A decoder that a file crashes."""
 
@@ -197,7 +163,7 @@ class Aborts:
 
 def test_a_decoder_that_crashes_is_an_error_of_ours() -> None:
     with pytest.raises(MeshFileError, match=r"a\.glb cannot be read as glTF: it is damaged.*export it again"):
-        answer_of("tests.test_load_encoded:Aborts", Path("a.glb"), "glTF", {}, {})
+        answer_of("tests.io.test_load_encoded:Aborts", Path("a.glb"), "glTF", {}, {})
 
 
 @pytest.mark.parametrize("kind", [np.int8, np.int16, np.uint8, np.uint16])

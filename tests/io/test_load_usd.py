@@ -86,15 +86,6 @@ def test_primitives_are_read_as_meshes(tmp_path: Path, axis: str) -> None:
         assert trimesh.Trimesh(points, mesh.of_node(index).faces).is_volume
 
 
-def test_hulls_that_were_written_are_not_read_again(tmp_path: Path) -> None:
-    box = trimesh.creation.box((1, 2, 3))
-    path = rlacd.decompose(box, quality="fast", threads=1).save(tmp_path / "box.usda", up="y")
-    again = load_mesh(path)
-    assert len(again.nodes) == 1
-    assert again.up == "y"
-    assert np.allclose(np.ptp(again.vertices, axis=0), (1, 2, 3))
-
-
 def test_instances_are_read_each_where_it_stands(tmp_path: Path) -> None:
     add = Usd.Stage.CreateNew(str(tmp_path / "wheel.usda"))
     add_mesh(add, "/Wheel/tyre", trimesh.creation.box())

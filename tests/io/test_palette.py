@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import colorsys
-
 import numpy as np
 import pytest
 
@@ -82,7 +80,3 @@ def test_every_colour_stands_out_from_white_paper_and_dark_ink() -> None:
 def test_srgb_and_back() -> None:
     colors = np.random.default_rng(0).integers(0, 256, (200, 3)).astype(np.uint8)
     assert np.array_equal(srgb_from_linear(linear_from_srgb(colors)), colors)
-    grey = oklab_from_linear(linear_from_srgb(np.array([[128, 128, 128], [255, 255, 255]], dtype=np.uint8)))
-    assert grey[:, 1:] == pytest.approx(0.0, abs=1e-6)
-    assert grey[1, 0] == pytest.approx(1.0, abs=1e-6)
-    assert colorsys.rgb_to_hls(*(hull_colors(1)[0] / 255.0))[0] == pytest.approx(0.59, abs=0.02), "the first is blue"

@@ -74,6 +74,7 @@ def test_hulls_lie_where_the_mesh_lay_and_nothing_else_changes(tmp_path: Path, b
     assert list(stage.GetRootLayer().subLayerPaths) == ["./in.usda"]
     assert UsdGeom.GetStageMetersPerUnit(stage) == 0.01
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    assert body != "/robot" or findings(stage) == []
     hulls = colliders(stage)
     assert len(hulls) == len(done.meshes[0].files) > 1
     for hull in hulls:
@@ -139,11 +140,6 @@ def findings(stage: Any) -> list[str]:
     """What all validators of OpenUSD say."""
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     return [error.GetMessage() for error in UsdValidation.ValidationContext(validators).Validate(stage)]
-
-
-def test_the_validators_of_usd_find_nothing(tmp_path: Path) -> None:
-    rlacd.rewrite_robot(write_stage(tmp_path / "in.usda"), tmp_path / "out.usda", threads=1, quality="fast")
-    assert findings(Usd.Stage.Open(str(tmp_path / "out.usda"))) == []
 
 
 def test_instances_that_collide_are_opened_and_each_gets_the_hulls(tmp_path: Path) -> None:

@@ -63,11 +63,3 @@ def test_setting_attributes_changes_nothing_else(text: str, data: st.DataObject)
     assert after.file.data.startswith(before[: element.start])
     assert after.file.data.endswith(before[element.end :])
     assert before[element.head : element.end] in after.file.data
-
-
-@pytest.mark.slow
-@given(documents)
-def test_replacing_nothing_is_nothing(text: str) -> None:
-    root = parse(NOWHERE, text.encode())
-    same = [Edit(root.file, element.end, element.end, b"") for element in root.walk()]
-    assert edited(root, same) == root.file.data

@@ -7,7 +7,6 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.errors import OptionError
 from rlacd.finish.report import engine_shortcomings
 from rlacd.options.presets import PRESETS, find_preset
 from rlacd.solid.hull import Hull
@@ -54,8 +53,3 @@ def test_every_broken_limit_is_counted() -> None:
         "3 hulls have up to 1280 triangles, more than 62, the limit for PhysX on a GPU.",
     ]
     assert engine_shortcomings(find_preset("mujoco"), known[:1]) == []
-
-
-def test_an_unknown_preset_lists_the_known_ones() -> None:
-    with pytest.raises(OptionError, match=r"'havok'; it has to be one of mujoco, physx, physx-gpu"):
-        rlacd.decompose(ball(), preset="havok")

@@ -19,13 +19,6 @@ AS_SOLID = [
     "train/kenney_cc0/furniture_pack__toilet.ply",  # rooms behind sheets, on a body
     "train/quaternius_cc0/ultimate_space_pack__Tree_Floating_2.ply",
 ]
-CROSSING = [
-    "test/ikea_assembled/bed_dalselv_0270.ply",
-    "test/ikea_assembled/bookcase_hensvik_0565.ply",
-    "test/ikea_assembled/cabinet_akurum_0011.ply",
-    "test/ikea_assembled/cabinet_akurum_0021.ply",
-    "test/vhacd/hornbug.ply",
-]
 
 
 def finely(mesh, times, noise=0.0):
@@ -52,7 +45,6 @@ def box_with_room():
 
 @pytest.mark.parametrize(("times", "noise"), [(0, 0.0), (4, 0.0), (4, 1e-3)])
 def test_a_room_of_sheets_on_a_box_is_filled_and_the_box_stays(times, noise):
-    """The sheets that only bound the room gave way to its filling, and the box, of the same body, went with them."""
     mesh = finely(box_with_room(), times, noise)
     solid = solid_of(mesh)
     assert volume(solid) == pytest.approx(12, rel=0.02)
@@ -81,27 +73,38 @@ def solid_as_read(mesh):
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", AS_SOLID)
 def test_noisy_copies_of_real_meshes_are_as_solid(corpus, name):
-    """Their solids had 0.2 to 0.6 of the volume: what was solid became sheets."""
     before, after = map(solid_as_read, noisy_copy(corpus, name))
     assert volume(after) == pytest.approx(volume(before), rel=0.1)
+
+
+LOST = [
+    *("test/capod/class5__m54.ply", "test/capod/class5__m55.ply", "test/capod/class5__m58.ply"),  # plants, wrapped
+    "train/kenney_cc0/space_kit__spaceCraft1.ply",  # films around a room that is filled
+    "test/gazebo_models/speed_limit_sign__speed_limit_sign.ply",  # caps turn it inside out in places
+    "train/kenney_cc0/furniture_pack__cabinetBedDrawer.ply",  # its first skin leads away from it
+]
+CROSSING = [f"test/ikea_assembled/{name}.ply" for name in ("bed_dalselv_0270", "bookcase_hensvik_0565")]
+CROSSING += [f"test/ikea_assembled/cabinet_akurum_{name}.ply" for name in ("0011", "0021")]
+CROSSING += ["test/vhacd/hornbug.ply", "train/kenney_cc0/furniture_pack__kitchenCabinetUpper.ply"]
+CROSSING += ["train/kaykit_cc0/restaurant__crate_ham.ply"]
+"""Noisy copies of these have skins that cross themselves."""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", [*LOST, *CROSSING])
+@pytest.mark.promise("covered")
+def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name):
+    report = rlacd.decompose(noisy_copy(corpus, name)[1] if name in CROSSING else corpus / name, quality="fast").report
+    assert report["hausdorff"]["under"] <= 1e-3
+    assert report["concavity"]["max"] <= 0.0501
+    assert max(body["deviation"] for body in report["repair"]) < 0.03
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["kitchenCabinetUpper", "kitchenMicrowave"])
 def test_slits_too_thin_to_have_a_volume_need_no_cuts(corpus, name):
-    """Between what fills a room and its noisy walls: 2 and 3 hulls became 32 and 17."""
     mesh, copy = noisy_copy(corpus, f"train/kenney_cc0/furniture_pack__{name}.ply")
     before, after = (
         len(rlacd.decompose(trimesh.Trimesh(m.vertices, m.faces, process=False), quality="fast")) for m in (mesh, copy)
     )
     assert after <= before + 4
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", CROSSING)
-def test_skins_that_cross_themselves_lose_no_face(corpus, name):
-    """What came out inside out was no part of the solid: up to 0.022 of the surface lay outside the hulls."""
-    _, copy = noisy_copy(corpus, name)
-    report = rlacd.decompose(copy, quality="fast").report
-    assert report["hausdorff"]["under"] <= 1e-3
-    assert max(body["deviation"] for body in report["repair"]) < 0.03

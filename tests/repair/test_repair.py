@@ -8,15 +8,18 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from rlacd.errors import EmptyMeshError
+from rlacd import _native
 from rlacd.io.read.load import load_mesh
+from rlacd.repair.cracks import close_cracks, free_edges
 from rlacd.repair.distance import points_covering
 from rlacd.repair.holes import HOLE
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.topology import Edges, IntArray
 from tests.repair.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
 
 
@@ -88,27 +91,11 @@ def test_doubled_faces_in_both_orientations_are_one_box():
     assert len(solid.surface[1]) == 12
 
 
-def test_equal_bodies_count_once():
-    assert volume(solid_of(join(soup(BOX), soup(BOX)))) == pytest.approx(8)
-
-
 @pytest.mark.parametrize("offset", [(2, 2, 0), (2, 2, 2), (2, 0, 0)], ids=["edge", "vertex", "face"])
 def test_boxes_that_touch_stay_two_boxes_worth(offset):
     solid = solid_of(join(BOX, moved(BOX, *offset)))
     assert volume(solid) == pytest.approx(16)
     assert max(body.deviation for body in solid.bodies) < 1e-9
-
-
-def test_a_wall_between_two_rooms_goes():
-    left, right = (
-        trimesh.creation.box(bounds=[[0, 0, 0], [1, 1, 1]]),
-        trimesh.creation.box(bounds=[[1, 0, 0], [2, 1, 1]]),
-    )
-    mesh = join(left, right)
-    mesh.merge_vertices()
-    solid = solid_of(mesh)
-    assert volume(solid) == pytest.approx(2)
-    assert len(solid.manifold.decompose()) == 1
 
 
 def test_six_separate_sides_make_one_box():
@@ -145,30 +132,6 @@ def test_planks_that_touch_along_faces_that_do_not_match():
     mesh = join(*planks)
     mesh.merge_vertices()
     assert volume(solid_of(mesh)) == pytest.approx(3 + 4 + 3 + 4)
-
-
-def test_a_body_that_crosses_itself_is_a_result():
-    twisted = SHAPES["ring"].copy()
-    twisted.vertices[:, 0] *= np.sign(twisted.vertices[:, 1]) * 0.9 + 0.1
-    solid = solid_of(twisted)
-    assert solid.manifold.num_tri() > 0
-
-
-def test_no_point_is_an_error():
-    mesh = load_mesh(([[0, 0, 0]], np.empty((0, 3), int)))
-    empty = type(mesh)(mesh.vertices[:0], mesh.faces, "nothing", ())
-    with pytest.raises(EmptyMeshError):
-        repair(empty)
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1e9])
-@pytest.mark.parametrize("far", [0.0, 100.0])
-def test_unit_and_place_do_not_matter(unit, far):
-    solid = solid_of(trimesh.Trimesh((BOX.vertices + far) * unit, BOX.faces, process=False))
-    assert steps(solid) == ["closed"]
-    assert volume(solid) == pytest.approx(8 * unit**3, rel=1e-9)
-    vertices, _ = to_arrays(solid.manifold)
-    np.testing.assert_allclose(np.ptp(solid.frame.to_input(vertices), axis=0), 2 * unit)
 
 
 @pytest.mark.nightly
@@ -220,3 +183,44 @@ def test_points_cover_every_face_and_share_corners(spacing: float) -> None:
     np.testing.assert_allclose(trimesh.triangles.closest_point(vertices[faces[on]], points), points, atol=1e-12)
     if spacing == 1.0:
         assert len(points) < len(vertices) + 50
+
+
+TOLERANCES = (2e-5, 5e-4)
+
+
+def cracked(mesh: trimesh.Trimesh, seed: int, cut: float, missing: float) -> tuple[FloatArray, IntArray]:
+    """Some faces get corners of their own, a little away; some are split on one side only; some are missing."""
+    rng = np.random.default_rng(seed)
+    faces = np.array(mesh.faces, dtype=np.int64)
+    vertices = np.array(mesh.vertices)
+    apart = np.flatnonzero(rng.random(len(faces)) < cut)
+    own = vertices[faces[apart]].reshape(-1, 3)
+    own = own + rng.choice([0, 1e-5, 3e-4, 2e-3], (len(own), 1)) * rng.normal(size=own.shape)
+    faces[apart] = len(vertices) + np.arange(len(own)).reshape(-1, 3)
+    vertices = np.concatenate([vertices, own])
+    whole = np.flatnonzero(rng.random(len(faces)) < cut)
+    a, b, c = faces[whole].T
+    middle = len(vertices) + np.arange(len(whole))
+    vertices = np.concatenate([vertices, (vertices[a] + vertices[b]) / 2])
+    faces[whole] = np.stack([a, middle, c], axis=1)
+    faces = np.concatenate([faces, np.stack([middle, b, c], axis=1)])
+    faces = faces[rng.random(len(faces)) >= missing]
+    points, welded, _ = _native.weld(vertices, rng.permutation(faces))
+    return points, welded.astype(np.int64)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cracks_are_closed(seed: int) -> None:
+    ball = trimesh.creation.icosphere(3)
+    vertices, faces = cracked(ball, seed, 0.05, 0.0)
+    before = len(free_edges(faces, Edges.of(faces, len(vertices))))
+    found, _ = close_cracks(vertices, faces, Edges.of(faces, len(vertices)), (*TOLERANCES, 2e-2))
+    left = len(free_edges(found, Edges.of(found, len(vertices))))
+    assert left < before / 4
+
+
+def test_a_body_that_crosses_itself_is_a_result():
+    twisted = SHAPES["ring"].copy()
+    twisted.vertices[:, 0] *= np.sign(twisted.vertices[:, 1]) * 0.9 + 0.1
+    solid = solid_of(twisted)
+    assert solid.manifold.num_tri() > 0

@@ -16,9 +16,8 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd import _native, decompose_mesh
+from rlacd import _native
 from rlacd.io.read.load import load_mesh
-from rlacd.merge.slivers import SLIVER_RADIUS
 from rlacd.run import Run
 from rlacd.solid.cover import MOST_HULLS, cover
 from rlacd.solid.distance import hull_distances
@@ -86,38 +85,6 @@ def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: s
     assert {"repair", "cut"} <= stages
 
 
-def test_what_an_engine_does_not_take_is_said_when_no_time_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    begin_finishing = Run.begin_finishing
-
-    def at_once(self: Run) -> None:
-        begin_finishing(self)
-        self.stop.trip()
-
-    monkeypatch.setattr(Run, "begin_finishing", at_once)
-    plate = trimesh.creation.box((1, 1, 1.2 * SLIVER_RADIUS))
-    result = rlacd.decompose(plate, preset="physx-gpu", quality="fast", threads=1)
-    assert result.report["hausdorff"] == {"over": None, "under": None}
-    assert_covers(result, np.array(plate.vertices), np.array(plate.faces))
-
-
-def test_the_nodes_of_hulls_may_stay_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = trimesh.Scene()
-    for index in range(3):
-        scene.add_geometry(
-            trimesh.creation.box(),
-            node_name=f"box {index}",
-            transform=trimesh.transformations.translation_matrix([2 * index, 0, 0]),
-        )
-
-    def late(*_: object) -> list[int]:
-        raise _native.Stopped
-
-    assert {row["node"] for row in rlacd.decompose(scene).report["provenance"]} == {"box 0", "box 1", "box 2"}
-    monkeypatch.setattr(decompose_mesh, "owners", late)
-    result = rlacd.decompose(scene)
-    assert [row["node"] for row in result.report["provenance"]] == [None] * 3
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
@@ -164,15 +131,6 @@ def test_hulls_of_bodies_that_had_no_repair_hold_them() -> None:
     assert result.report["concavity"] == {"per_part": None, "max": None}
 
 
-def test_corners_in_one_place_make_one_body() -> None:
-    vertices, faces = boxes(1)
-    loose = vertices[faces].reshape(-1, 3)
-    soup = np.concatenate([loose, loose + 5, -0.0 * loose[:3]])
-    triangles = np.arange(len(soup), dtype=np.int32).reshape(-1, 3)
-    assert _native.point_bodies(soup, triangles).tolist() == [0] * 36 + [1] * 36 + [0] * 3
-    assert _native.point_bodies(soup, triangles[12:]).tolist() == [-1] * 36 + [0] * 36 + [1] * 3
-
-
 def test_bodies_by_the_thousand_share_hulls_with_those_near_them() -> None:
     rng = np.random.default_rng(0)
     corners = rng.random((3 * MOST_HULLS, 1, 3)) + 1e-3 * rng.random((3 * MOST_HULLS, 3, 3))
@@ -214,10 +172,9 @@ def test_a_timeout_ends_the_work_however_large_the_input(name: str) -> None:
     assert result.report["stopped_by"] == "timeout"
     # All corners: for the surface between them there is no time here either.
     corners = mesh[0][:: max(1, len(mesh[0]) // 2000)]
-    planes = [hull for hull in result]
     left = np.ones(len(corners), dtype=bool)
     slack = 2e-3 * np.ptp(mesh[0], axis=0).max()
-    for hull in planes:
+    for hull in result:
         lower, upper = hull.bounds
         some = np.flatnonzero(left & (corners >= lower - slack).all(axis=1) & (corners <= upper + slack).all(axis=1))
         height = np.einsum("pj,fj->pf", corners[some], hull.face_normals) - np.einsum(
@@ -352,7 +309,6 @@ def test_ctrl_c_twice_ends_a_command_that_no_handler_of_python_can_interrupt() -
     """
     run = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     try:
-        assert run.stdout is not None
         assert run.stdout.readline() == "busy\n"
         time.sleep(0.2)
         run.send_signal(signal.SIGINT)

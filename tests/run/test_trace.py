@@ -21,15 +21,6 @@ def test_what_needs_no_lock_is_divided_among_the_cores(threads: int, seconds: fl
     assert replayed(tasks(8, 0.0, 1.0), threads) == pytest.approx(seconds, rel=0.01)
 
 
-def test_no_core_makes_up_for_the_lock_and_for_what_one_thread_does_alone() -> None:
-    assert replayed(tasks(8, 0.5, 0.5), 8) == pytest.approx(4.0, rel=0.05)
-    alone = [Step("do", [Cost(0.0, 1.0, 0.0, 0.0, 1)])]
-    assert replayed(alone, 8) == pytest.approx(1.0, rel=0.01)
-    begun = [Step("begin", [Cost(0.0, 1.0, 0.0, 0.0, 1)], 0), *alone, Step("wait", [], 0)]
-    assert replayed(begun, 2) == pytest.approx(1.0, rel=0.01)
-    assert replayed([Step("do", [Cost(0.0, 1.0, 1.0, 1.0, 1)])], 4) == pytest.approx(0.25, rel=0.01)
-
-
 def test_a_trace_holds_the_work_of_all_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     torus = trimesh.creation.torus(1.0, 0.4, major_sections=24, minor_sections=12)
     monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "missing" / "torus.json"))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,11 +14,9 @@ from manifold3d import Manifold, OpType
 
 import rlacd
 from rlacd import cut_and_merge
-from rlacd.criteria import Concavity
-from rlacd.merge import merge_parts
 from rlacd.run import Run, Work
-from rlacd.solid.component import Component
-from tests.shapes import box
+from tests.shapes import box, trimesh_of
+from tests.shapes_large import sponge
 
 PRICES = st.lists(st.floats(0, 50), max_size=40)
 
@@ -45,22 +43,9 @@ def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: 
     assert run.cut_short == ({"cut"} if used_up else set())
 
 
-def grate() -> Manifold:
+def grate() -> trimesh.Trimesh:
     holes = [box((i, j, -1), (i + 0.7, j + 0.7, 1)) for i in range(6) for j in range(6)]
-    return box((-0.3, -0.3, 0), (6, 6, 0.2)) - Manifold.batch_boolean(holes, OpType.Add)
-
-
-def sponge() -> Manifold:
-    holes: list[Manifold] = []
-    for width in (3, 1):
-        for i, j in itertools.product(range(width, 9, 3 * width), repeat=2):
-            ends = (i, j), (i + width, j + width)
-            for axis in range(3):
-                low, high = (
-                    np.insert(np.array(end, float), axis, out) for end, out in zip(ends, (-1, 10), strict=True)
-                )
-                holes.append(box(tuple(low), tuple(high)))
-    return box((0, 0, 0), (9, 9, 9)) - Manifold.batch_boolean(holes, OpType.Add)
+    return trimesh_of(box((-0.3, -0.3, 0), (6, 6, 0.2)) - Manifold.batch_boolean(holes, OpType.Add))
 
 
 def boxes() -> trimesh.Trimesh:
@@ -72,13 +57,12 @@ def boxes() -> trimesh.Trimesh:
     )
 
 
-@pytest.mark.parametrize("shape", [*(pytest.param(shape, marks=pytest.mark.slow) for shape in (grate, sponge)), boxes])
+@pytest.mark.parametrize(
+    "shape", [*(pytest.param(shape, marks=pytest.mark.slow) for shape in (grate, lambda: sponge(2))), boxes]
+)
 @pytest.mark.promise("bounded")
-def test_the_default_stays_within_its_account(shape: Callable[[], Manifold | trimesh.Trimesh]) -> None:
+def test_the_default_stays_within_its_account(shape: Callable[[], Any]) -> None:
     solid = shape()
-    if isinstance(solid, Manifold):
-        mesh = solid.to_mesh64()
-        solid = trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
     one, three = (rlacd.decompose(solid, threads=threads) for threads in (1, 3))
     fast = rlacd.decompose(solid, quality="fast")
     search = one.report["search"]
@@ -91,23 +75,9 @@ def test_the_default_stays_within_its_account(shape: Callable[[], Manifold | tri
         assert (a.faces == b.faces).all()
 
 
-@pytest.mark.parametrize("most", [0, 2e3, 2e4])
-def test_merging_cut_short_is_the_same_for_any_number_of_threads(most: float) -> None:
-    parts = [Component(Manifold.cube().translate((x, y, 0))) for x in range(4) for y in range(4)]
-    counts = []
-    for threads in (1, 3):
-        with Run(threads) as run, run.limited(most):
-            merged = merge_parts(parts, Concavity(0.05), run)
-        assert sum(part.volume for part in merged) == pytest.approx(16)
-        counts.append([part.volume for part in merged])
-    assert counts[0] == counts[1]
-    assert 1 <= len(counts[0]) <= 16
-
-
 @pytest.mark.slow
 def test_a_pass_whose_merging_is_cut_short_meets_the_threshold_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh = sponge().to_mesh64()
-    solid = mesh.vert_properties[:, :3], mesh.tri_verts
+    solid = sponge(2)
     whole = rlacd.decompose(solid, quality="fast")
     monkeypatch.setattr(cut_and_merge, "MOST_MERGING", 1e5)
     short = rlacd.decompose(solid, quality="fast")

@@ -68,6 +68,11 @@ def head(path: str, *lines: str, method: str = "GET") -> bytes:
     return "\r\n".join([f"{method} {path} HTTP/1.1", "Host: 127.0.0.1", *lines, "", ""]).encode()
 
 
+def upload(length: int) -> bytes:
+    kind = "Content-Type: application/octet-stream"
+    return head("/open?name=a.stl", kind, f"Content-Length: {length}", method="POST")
+
+
 @pytest.mark.slow
 def test_sixty_streams_hold_no_more_than_their_threads(viewer: ViewServer) -> None:
     before = threading.active_count()
@@ -147,15 +152,7 @@ def test_a_request_that_trickles_in_is_ended(
         (head("/decompose", "Content-Type: application/json", "Content-Length: -1", method="POST"), 411),
         (head("/decompose", "Content-Type: application/json", "Content-Length: many", method="POST"), 411),
         (head("/decompose", "Content-Type: application/json", "Transfer-Encoding: chunked", method="POST"), 411),
-        (
-            head(
-                "/open?name=a.stl",
-                "Content-Type: application/octet-stream",
-                f"Content-Length: {2**28 + 1}",
-                method="POST",
-            ),
-            413,
-        ),
+        (upload(2**28 + 1), 413),
         (head("/", method="DELETE"), 501),
         (head("/", "Host: 127.0.0.1"), 403),
         (b"GET / HTTP/1.1\r\n\r\n", 403),
@@ -176,10 +173,9 @@ def test_what_is_too_long_or_no_request_is_refused(viewer: ViewServer, request_:
 
 
 def test_slow_uploads_keep_nothing_else_waiting(viewer: ViewServer) -> None:
-    upload = head("/open?name=a.stl", "Content-Type: application/octet-stream", "Content-Length: 1000", method="POST")
     with ExitStack() as stack:
         for _ in range(UPLOADS):
-            stack.enter_context(connected(viewer)).sendall(upload + b"x")
+            stack.enter_context(connected(viewer)).sendall(upload(1000) + b"x")
         wait_until(lambda: viewer.connections == UPLOADS)
         with connected(viewer) as page:
             page.sendall(head("/scene", "Connection: close"))
@@ -203,9 +199,7 @@ def test_the_command_leaves_at_once_and_in_silence_while_at_work(rough: Path, se
     command = [sys.executable, "-c", "from rlacd.cli.main import main; main()", "view", str(rough), "--no-browser"]
     with subprocess.Popen([*command, "--quality", "best"], stderr=subprocess.PIPE, text=True) as process:
         try:
-            assert process.stderr is not None
             address = re.search(r"http://\S+", process.stderr.readline())
-            assert address is not None
             port = port_of(address[0])
             with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as stream:
                 stream.sendall(head("/events"))

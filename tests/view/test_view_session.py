@@ -5,14 +5,17 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
 from rlacd.run import Progress, ProgressCallback
+from rlacd.view.controls import read_subject
 from rlacd.view.session import Session, SessionState
 from tests.hulls import hull_of
 
@@ -68,13 +71,7 @@ def until(session: Session, state: str, run: int | None = None) -> SessionState:
 
 
 def options_of(session: Session) -> dict[str, Any]:
-    assert session.result is not None
     return session.result[1].report["options"]
-
-
-def test_it_begins_idle_with_nothing(session: Session) -> None:
-    assert session.state == SessionState()
-    assert session.result is None
 
 
 def test_progress_and_then_the_result(session: Session, work: Work) -> None:
@@ -105,7 +102,6 @@ def test_stopping_keeps_what_is_reached(session: Session, work: Work) -> None:
     session.stop()
     work.go_on()
     until(session, "idle", run=1)
-    assert session.result is not None
     assert session.result[1].report["complete"] is False
 
 
@@ -114,7 +110,6 @@ def test_stopping_does_not_reach_into_the_next_run(session: Session, work: Work)
     session.decompose({})
     work.go_on()
     until(session, "idle", run=1)
-    assert session.result is not None
     assert session.result[1].report["complete"] is True
 
 
@@ -189,3 +184,33 @@ def test_another_input_drops_the_hulls(session: Session, work: Work) -> None:
     assert session.result is None
     work.go_on()
     assert until(session, "idle", run=2).version == 3
+
+
+# --- the mesh that is shown -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("ending", "ground", "expected", "is_guess"),
+    [
+        ("obj", 1, "y", True),
+        ("obj", 2, "z", True),
+        ("obj", None, "z", True),
+        ("stl", 1, "y", True),
+        ("glb", 2, "y", False),
+        ("3mf", 1, "z", False),
+    ],
+)
+def test_up_is_guessed_where_the_file_does_not_say_it(
+    tmp_path: Path, ending: str, ground: int | None, expected: str, is_guess: bool
+) -> None:
+    """A box with its middle at the origin, or on the ground along one axis."""
+    box = trimesh.creation.box((1, 2, 3))
+    if ground is not None:
+        box.apply_translation(np.eye(3)[ground] * box.extents[ground] / 2)
+    path = tmp_path / f"box.{ending}"
+    trimesh.Scene(box).export(path)
+    subject = read_subject(path)
+    assert (subject.up, subject.up_is_guess) == (expected, is_guess)
+    asked = read_subject(path, "x")
+    assert (asked.up, asked.up_is_guess) == ("x", False)
+    assert subject.unit == {"glb": "m", "3mf": "mm"}.get(ending, "")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bz2
 import io
-import os
 import struct
 import zipfile
 
@@ -55,11 +54,6 @@ def _() -> bytes:
     return file.getvalue()
 
 
-@refused("a gigabyte in a picture.3mf", "unpacks to")
-def _() -> bytes:
-    return threemf(model(), **{f"Metadata/{i}.png": bytes(2**26) for i in range(16)})
-
-
 @refused("a short member that bzip2 knows to be long.3mf", "bzip2|compressed in a way")
 def _() -> bytes:
     content = zipped({"3D/3dmodel.model": model(), "a.png": bz2.compress(bytes(2**29))}, zipfile.ZIP_STORED)
@@ -86,9 +80,7 @@ def _() -> bytes:
     return file.getvalue()
 
 
-@refused("an archive in an archive.3mf", "again")
-def _() -> bytes:
-    return zipped({"inner.3mf": threemf(model())})
+refused("an archive in an archive.3mf", "again", lambda: zipped({"inner.3mf": threemf(model())}))
 
 
 @refused("parts of parts, forty times two.3mf", "triangles|places")
@@ -115,14 +107,7 @@ def _() -> bytes:
     return threemf(model(f'<object id="1">{MESH}</object>{chain}', '<item objectid="10000"/>'))
 
 
-@refused("a million items.3mf", "places|unpacks to")
-def _() -> bytes:
-    return threemf(model(items='<item objectid="1"/>' * 1_000_000))
-
-
-@refused("two hundred thousand items.3mf", "places")
-def _() -> bytes:
-    return threemf(model(items='<item objectid="1"/>' * 200_000, doctype=f"<!-- {os.urandom(10**6).hex()} -->"))
+refused("a million items.3mf", "places|unpacks to", lambda: threemf(model(items='<item objectid="1"/>' * 1_000_000)))
 
 
 @harmless("a name of a megabyte.3mf")

@@ -8,6 +8,7 @@ from pathlib import Path
 from trimesh import creation
 
 Build = Callable[[Path], Path]
+Content = Callable[[], bytes]
 
 REFUSED: dict[str, tuple[Build, str]] = {}
 """Files that have to be refused, and words of the sentence that says why."""
@@ -18,25 +19,27 @@ HARMLESS: dict[str, Build] = {}
 BOX = creation.box()
 
 
-def refused(name: str, says: str) -> Callable[[Callable[[], bytes]], Callable[[], bytes]]:
-    """Register what makes the content of a file; its ending is the last part of `name`."""
+def refused(name: str, says: str, content: Content | None = None) -> Callable[[Content], None]:
+    """Register what makes the content of a file, given here or decorated; its ending is the last part of `name`."""
 
-    def register(content: Callable[[], bytes]) -> Callable[[], bytes]:
+    def register(content: Content) -> None:
         REFUSED[name] = (_writer(name, content), says)
-        return content
 
+    if content is not None:
+        register(content)
     return register
 
 
-def harmless(name: str) -> Callable[[Callable[[], bytes]], Callable[[], bytes]]:
-    def register(content: Callable[[], bytes]) -> Callable[[], bytes]:
+def harmless(name: str, content: Content | None = None) -> Callable[[Content], None]:
+    def register(content: Content) -> None:
         HARMLESS[name] = _writer(name, content)
-        return content
 
+    if content is not None:
+        register(content)
     return register
 
 
-def _writer(name: str, content: Callable[[], bytes]) -> Build:
+def _writer(name: str, content: Content) -> Build:
     def write(folder: Path) -> Path:
         path = folder / f"mesh.{name.rpartition('.')[2]}"
         path.write_bytes(content())
