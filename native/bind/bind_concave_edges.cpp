@@ -1,49 +1,10 @@
-// Python bindings of concave edges and their planes.
+// Python binding of candidate planes.
 
 #include "base/arrays.hpp"
 #include "cut/concave_edges.hpp"
 
 namespace rlacd {
-namespace {
-
-auto to_rows(const std::vector<ReflexEdge>& edges) {
-  std::vector<std::array<std::int32_t, 2>> ends, faces;
-  std::vector<std::array<Vec3, 2>> normals;
-  std::vector<double> angles;
-  for (const ReflexEdge& edge : edges) {
-    ends.push_back({edge.end[0], edge.end[1]});
-    faces.push_back({edge.face[0], edge.face[1]});
-    normals.push_back({edge.normal[0], edge.normal[1]});
-    angles.push_back(edge.angle);
-  }
-  return std::tuple(rows<std::int32_t>(std::move(ends)), rows<std::int32_t>(std::move(faces)),
-                    rows<double>(std::move(normals)), rows<double>(std::move(angles)));
-}
-
-}  // namespace
-
 void bind_concave_edges(nb::module_& m) {
-  m.def(
-      "reflex_edges",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        const Mesh mesh = to_mesh(vertices, faces);
-        std::vector<ReflexEdge> edges = reflex_edges(mesh);
-        return to_rows(edges);
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"),
-      "Edges whose dihedral angle exceeds a straight one by more than 10 degrees: (vertices [E, 2], the faces on both\n"
-      "sides [E, 2], their outward unit normals [E, 6], by how much the angle exceeds a straight one [E]).");
-  m.def(
-      "concave_edges",
-      [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull_vertices, const FacesIn& hull_faces,
-         std::size_t count) {
-        const Mesh mesh = to_mesh(vertices, faces), hull = to_mesh(hull_vertices, hull_faces);
-        std::vector<ReflexEdge> edges = choose_concave_edges(mesh, hull, count);
-        return to_rows(edges);
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
-      nb::arg("count"),
-      "Up to `count` of the reflex edges, deep, sharp ones of long creases first, and spread out; as `reflex_edges`.");
   m.def(
       "candidate_planes",
       [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull_vertices, const FacesIn& hull_faces,

@@ -135,12 +135,10 @@ void bind_concavity(nb::module_& m) {
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,
              double reach, double grain, int threads) {
-            if (vertices.empty() || vertices.size() != faces.size())
-              throw std::invalid_argument("there must be one array of faces for each array of vertices");
+            if (vertices.empty()) throw std::invalid_argument("there are no hulls");
             if (!(grain > 0)) throw std::invalid_argument("the grain must be positive");
-            std::vector<Mesh> hulls;
-            for (std::size_t i = 0; i < vertices.size(); ++i) hulls.push_back(to_finite_mesh(vertices[i], faces[i]));
-            std::vector<std::vector<Vec3>> points = self.uncovered(hulls, reach, grain, threads);
+            std::vector<std::vector<Vec3>> points =
+                self.uncovered(to_finite_meshes(vertices, faces), reach, grain, threads);
             std::vector<Rows<double, Vec3>> result;
             for (std::vector<Vec3>& own : points) result.push_back(rows<double>(std::move(own)));
             return result;

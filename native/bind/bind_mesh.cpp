@@ -12,7 +12,6 @@
 #include "mesh/edges.hpp"
 #include "mesh/least_bent.hpp"
 #include "mesh/near_boxes.hpp"
-#include "mesh/point_bodies.hpp"
 #include "mesh/point_tree.hpp"
 #include "mesh/spread_points.hpp"
 #include "mesh/wedges.hpp"
@@ -264,17 +263,6 @@ void bind_mesh(nb::module_& m) {
           "Pairs [P, 2] of numbers, ascending, of a fresh box and any other: those within reach of each other, or "
           "with\n"
           "`across` of a common third one.");
-  m.def(
-      "point_bodies",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        const Mesh mesh = to_mesh(vertices, faces);
-        std::vector<std::int32_t> body = point_bodies(mesh);
-        return rows<std::int32_t>(std::move(body));
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"),
-      "The body [V] of each vertex of a mesh of any quality, numbered from 0 by their first faces, -1 for those of "
-      "none:\n"
-      "faces are connected where they share a corner, or have corners in one place.");
   nb::class_<PointTree>(m, "PointTree", "Finds those of some points [N, 3] that lie in a ball.")
       .def(
           "__init__",

@@ -41,20 +41,12 @@ std::vector<Edge> net(std::vector<Edge> edges) {
   return left;
 }
 
-double doubled_area(PlanePoint a, PlanePoint b, PlanePoint c) {
-  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
 class Reunion {
  public:
   explicit Reunion(const std::vector<Mesh>& solids) {
     for (std::size_t i = 0; i < solids.size(); ++i)
       for (std::size_t j = i + 1; j < solids.size(); ++j) add_touching_planes(planes_, solids[i], solids[j]);
-    for (const Mesh& solid : solids) {
-      const auto first = static_cast<std::int32_t>(mesh_.vertices.size());
-      mesh_.vertices.insert(mesh_.vertices.end(), solid.vertices.begin(), solid.vertices.end());
-      for (const Triangle& f : solid.faces) mesh_.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
-    }
+    for (const Mesh& solid : solids) append(mesh_, solid);
   }
 
   std::optional<Mesh> united() {
@@ -254,17 +246,11 @@ class Reunion {
       std::vector<std::int32_t> loop;
       std::vector<Vec3> points;
       for (const Edge& e : sides) loop.push_back(e[0]), points.push_back(mesh_.vertices[e[0]]);
-      const Vec3 normal = cross_of(f);
-      for (const Triangle& t : triangulate({on_plane(points, normal)}, loop))
+      for (const Triangle& t : triangulate({on_plane(points, long_normal(mesh_, f))}, loop))
         faces.push_back({loop[t[0]], loop[t[1]], loop[t[2]]});
     }
     faces.insert(faces.end(), caps_.begin(), caps_.end());
     mesh_.faces = std::move(faces);
-  }
-
-  Vec3 cross_of(const Triangle& f) const {
-    const Vec3 a = mesh_.vertices[f[0]];
-    return rlacd::cross(mesh_.vertices[f[1]] - a, mesh_.vertices[f[2]] - a);
   }
 
   // Stops along an edge from its first vertex, or from its smaller one if that is how they were found.

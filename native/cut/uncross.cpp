@@ -24,11 +24,6 @@ double noise(std::uint64_t i) {
   return static_cast<double>((i ^ (i >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-// Twice the area of a triangle, positive if it is counter-clockwise.
-double doubled_area(PlanePoint a, PlanePoint b, PlanePoint c) {
-  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
 std::uint64_t directed(std::int32_t from, std::int32_t to) {
   return static_cast<std::uint64_t>(from) << 32 | static_cast<std::uint32_t>(to);
 }

@@ -36,8 +36,6 @@ struct Sample {
   std::int32_t witness = -1;
 };
 
-using Corners = std::array<Vec3, 3>;
-
 struct Cell {
   Corners corner;
   std::array<Sample, 3> sample;
@@ -117,10 +115,6 @@ std::array<Cell, 2> bisect(const Field& field, const Cell& cell, double enough) 
     halves[side].upper = std::min(cell.upper, upper_bound(field, halves[side]));
   }
   return halves;
-}
-
-inline Corners corners_of(const Mesh& mesh, const Triangle& face) {
-  return {mesh.vertices[face[0]], mesh.vertices[face[1]], mesh.vertices[face[2]]};
 }
 
 // One thread, the cell with the greatest upper bound first.

@@ -53,7 +53,6 @@ class Collapser {
 
  private:
   Vec3 at(std::int32_t v) const { return mesh_.vertices[v]; }
-  Vec3 normal(const Triangle& f) const { return cross(at(f[1]) - at(f[0]), at(f[2]) - at(f[0])); }
 
   std::vector<std::int32_t> neighbours(std::int32_t v) const {
     std::vector<std::int32_t> found;
@@ -74,9 +73,9 @@ class Collapser {
         ++shared;
         continue;
       }
-      const Vec3 before = normal(face);
+      const Vec3 before = long_normal(mesh_, face);
       std::replace(face.begin(), face.end(), v, u);
-      const Vec3 after = normal(face);
+      const Vec3 after = long_normal(mesh_, face);
       if (std::fabs(dot(before, to)) > kFlat * norm(before)) return false;
       if (!(dot(before, after) > 0) || norm2(cross(before, after)) > kFlat * kFlat * norm2(before)) return false;
     }

@@ -52,12 +52,6 @@ std::vector<std::int32_t> order_of(std::vector<std::uint32_t> place) {
   return order;
 }
 
-Box box_of(const std::vector<Vec3>& points) {
-  Box box;
-  for (const Vec3 p : points) box.extend(p);
-  return box;
-}
-
 }  // namespace
 
 std::vector<std::int32_t> order_along_a_curve(const std::vector<Vec3>& points, const Box& box) {
@@ -74,14 +68,14 @@ std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
     const Vec3 sum = mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c];
     middles.push_back({sum.x / 3, sum.y / 3, sum.z / 3});
   }
-  return order_along_a_curve(middles, box_of(mesh.vertices));
+  return order_along_a_curve(middles, Box::of(mesh.vertices));
 }
 
 Mesh along_a_curve(const Mesh& mesh) {
   Mesh sorted;
   sorted.vertices.reserve(mesh.vertices.size());
   std::vector<std::int32_t> number(mesh.vertices.size());
-  for (const std::int32_t v : order_along_a_curve(mesh.vertices, box_of(mesh.vertices))) {
+  for (const std::int32_t v : order_along_a_curve(mesh.vertices, Box::of(mesh.vertices))) {
     number[v] = static_cast<std::int32_t>(sorted.vertices.size());
     sorted.vertices.push_back(mesh.vertices[v]);
   }

@@ -9,12 +9,12 @@ import pytest
 from manifold3d import Manifold
 
 import rlacd
-from rlacd.finish.limit import FLUSH, resting_sides
+from rlacd.finish.limit import resting_sides
 from rlacd.io.read.load import load_mesh
 from rlacd.options.presets import HullLimits
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
-from rlacd.solid.hull import limit_hull
+from rlacd.solid.hull import TOLERANCE, limit_hull
 from tests.shapes import box
 
 DEEP = 1e-4
@@ -41,10 +41,10 @@ def test_it_does_not_rest_where_its_centre_of_mass_is_not_above() -> None:
 @pytest.mark.parametrize("corners", [8, 12, 24])
 def test_a_simpler_hull_stays_above_the_ground(corners: int) -> None:
     solid = Component(cup())
-    ground = np.array([[0.0, 0.0, -1.0, FLUSH]])
+    ground = np.array([[0.0, 0.0, -1.0, TOLERANCE]])
     simple = limit_hull(solid.hull, HullLimits(corners, None), 0.02, ground)
     assert len(simple.vertices) <= corners
-    assert simple.vertices[:, 2].min() >= -2 * FLUSH
+    assert simple.vertices[:, 2].min() >= -2 * TOLERANCE
 
 
 @pytest.mark.promise("flat")

@@ -22,6 +22,7 @@ from rlacd.merge.slivers import SLIVER_RADIUS
 from rlacd.run import Run
 from rlacd.solid.cover import MOST_HULLS, cover
 from rlacd.solid.distance import hull_distances
+from rlacd.solid.topology import point_bodies
 from tests.hulls import assert_covers
 from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain
 
@@ -169,8 +170,9 @@ def test_corners_in_one_place_make_one_body() -> None:
     loose = vertices[faces].reshape(-1, 3)
     soup = np.concatenate([loose, loose + 5, -0.0 * loose[:3]])
     triangles = np.arange(len(soup), dtype=np.int32).reshape(-1, 3)
-    assert _native.point_bodies(soup, triangles).tolist() == [0] * 36 + [1] * 36 + [0] * 3
-    assert _native.point_bodies(soup, triangles[12:]).tolist() == [-1] * 36 + [0] * 36 + [1] * 3
+    assert point_bodies(soup, triangles).tolist() == [0] * 36 + [1] * 36 + [0] * 3
+    _, parts = cover(load_mesh((soup, triangles[12:])), Run(1))
+    assert len(parts) == 2, "what no face uses is no body"
 
 
 def test_bodies_by_the_thousand_share_hulls_with_those_near_them() -> None:

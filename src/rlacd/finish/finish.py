@@ -12,7 +12,7 @@ from rlacd import _native
 from rlacd.find_parts import Reached
 from rlacd.finish.in_input import as_carried, in_input
 from rlacd.finish.limit import (
-    MOST_GROWTH,
+    SHARE_OF_OVERHANG,
     kept_within,
     limit_part,
     limit_roughly,
@@ -29,14 +29,11 @@ from rlacd.options import SIMPLE
 from rlacd.run import Run
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
+from rlacd.solid.frame import GROWTH_TO_SPARE
 from rlacd.solid.hull import NO_SIDES
 from rlacd.solid.primitive import Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
-
-GROWTH_TO_SPARE = 2e-4
-"""Hulls may grow by this more than they must to take in the input."""
-
 
 FEW_TO_DOUBT = 2000
 """Solids of at most this many triangles are sampled at as many points after a stop: do the hulls cover them?"""
@@ -126,7 +123,7 @@ def _cleaned(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
         shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
         if shaped is not part:
             return shaped
-        near = within_reach(sides, part.hull, MOST_GROWTH)
+        near = within_reach(sides, part.hull, SHARE_OF_OVERHANG * goal.overhang)
         part = kept_within(part, near, goal)
         return limit_part(
             simple_part(part, goal, limits, near) if options.detail == SIMPLE else part, limits, goal, near

@@ -17,13 +17,10 @@ from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
-from rlacd.solid.hull import NO_SIDES, Hull, keeps, limit_hull
+from rlacd.solid.hull import NO_SIDES, TOLERANCE, Hull, keeps, limit_hull
 
 SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
-
-MOST_GROWTH = 0.02
-"""Nor by more than this (the longest side of the input is 2), however large the threshold."""
 
 GROWTHS_TRIED = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
@@ -37,7 +34,7 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
     """
     if not math.isfinite(criterion.overhang):
         return part
-    growth = min(SHARE_OF_OVERHANG * criterion.overhang, MOST_GROWTH)
+    growth = SHARE_OF_OVERHANG * criterion.overhang
     for _ in range(GROWTHS_TRIED):
         hull = limit_hull(part.hull, limits, growth, sides)
         if hull is part.hull:
@@ -76,9 +73,6 @@ def limit_roughly(part: Part, limits: HullLimits) -> Part:
 SIDE_AREA = 0.02
 """A side has at least this share of the area of the convex hull: the facets of curved surfaces have less."""
 
-FLUSH = 1e-6
-"""What lies within this of a side's plane is in it, and hulls stay within it."""
-
 
 def resting_sides(solid: Component) -> FloatArray:
     """Find the sides of a solid's convex hull over which its centre of mass lies.
@@ -86,7 +80,8 @@ def resting_sides(solid: Component) -> FloatArray:
     Returns
     -------
     FloatArray
-        Half-spaces n.x <= d around the solid: rows of unit n, and d, [P, 4].
+        Half-spaces n.x <= d around the solid: rows of unit n, and d, [P, 4]. What lies within `TOLERANCE` of a side's
+        plane is in it.
     """
     hull, (_, centre, _) = solid.hull, _native.mesh_mass(solid.vertices, solid.faces)
     corners = hull.vertices[hull.faces]
@@ -101,10 +96,10 @@ def resting_sides(solid: Component) -> FloatArray:
             continue
         normal = normals[face] / areas[face]
         offset = dots(corners[face], normal).max()
-        coplanar = (dots(corners, normal) > offset - FLUSH).all(axis=1)
+        coplanar = (dots(corners, normal) > offset - TOLERANCE).all(axis=1)
         seen |= coplanar
         if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
-            sides.append([*normal, offset + FLUSH])
+            sides.append([*normal, offset + TOLERANCE])
     return np.array(sides).reshape(-1, 4)
 
 

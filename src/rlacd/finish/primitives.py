@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
@@ -184,7 +183,7 @@ class _Shadow:
         self._axes = axes
         self._points = points @ axes
         seen = np.ascontiguousarray(self._points[:, :2])
-        self.outline: FloatArray = seen[_native.outline(seen)]
+        self.outline: FloatArray = seen[outline(seen)]
         x, y = (self.outline - seen[0]).T
         self.area = float(np.roll(y, -1) @ x - np.roll(x, -1) @ y) / 2
         along = self._points[:, 2]
@@ -228,6 +227,30 @@ class _Shadow:
             return Primitive("capsule", place, self._axes, (wider, max(last - first, 0.0)))
 
         return _least(map(of_radius, (radius * RADII).tolist()))
+
+
+def outline(points: FloatArray) -> list[int]:
+    """Indices of the corners of the convex hull of points [N, 2], counter-clockwise, but for those on its sides.
+
+    Fewer than three if the points lie on a line up to rounding (A. M. Andrew, "Another efficient algorithm for convex
+    hulls in two dimensions", 1979).
+    """
+    least = 1e-14 * np.abs(points - points[:1]).max(initial=0.0) ** 2  # twice the area of a triangle that is none
+    order, place = np.lexsort(points.T[::-1]).tolist(), points.tolist()
+
+    def turns_left(a: int, b: int, c: int) -> bool:
+        (px, py), (qx, qy), (rx, ry) = place[a], place[b], place[c]
+        return bool((qx - px) * (ry - py) - (qy - py) * (rx - px) > least)
+
+    corners: list[int] = []
+    for side in (order, order[::-1]):  # from left to right below the points, and back above them
+        first = len(corners)
+        for point in side:
+            while len(corners) >= first + 2 and not turns_left(corners[-2], corners[-1], point):
+                corners.pop()
+            corners.append(point)
+        del corners[-1:]  # the other side begins with it
+    return corners
 
 
 def _candidate_axes(hull: Hull) -> FloatArray:

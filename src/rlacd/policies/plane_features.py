@@ -10,12 +10,11 @@ from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.planes.sweep import Sweep, paper_planes, sweep, valid_planes
 from rlacd.policies.greedy import excess_norm
 from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray
+from rlacd.solid.component import NEGLIGIBLE_VOLUME as TINY
 from rlacd.solid.component import Component
 
 STEPS = (1, 2)
 """Distances of the neighbours that are looked at, in planes of the same direction."""
-
-TINY = 1e-12
 
 FEATURES = 38
 
@@ -46,8 +45,16 @@ def plane_features(
     cost = excess_norm(s) / excess**1.3
     saved = (s.hull_below + s.hull_above - volume) / excess
     lowest = cost[valid].min() if valid.any() else 0.0
-    area, round_ = s.section_area / longest**2, 4 * np.pi * s.section_area / np.maximum(s.section_perimeter, TINY) ** 2
-    fill = np.stack([s.solid_below / np.maximum(s.hull_below, TINY), s.solid_above / np.maximum(s.hull_above, TINY)])
+    area, round_ = (
+        s.section_area / longest**2,
+        4 * np.pi * s.section_area / np.maximum(s.section_perimeter, TINY) ** 2,
+    )
+    fill = np.stack(
+        [
+            s.solid_below / np.maximum(s.hull_below, TINY),
+            s.solid_above / np.maximum(s.hull_above, TINY),
+        ]
+    )
     scale = length or 0.05
     planes, along = np.arange(len(cost)), 6 * OFFSETS_PER_AXIS
     axes = np.where(planes < along, planes // OFFSETS_PER_AXIS, planes)
@@ -56,7 +63,10 @@ def plane_features(
         _rank(np.where(valid, cost, np.inf)),
         _rank(np.where(valid, saved, np.inf)),
         _rank(np.where(valid, large, np.inf)),
-        *(np.minimum(s.solid_below, s.solid_above) / max(volume, TINY), np.minimum(s.hull_below, s.hull_above) / hull),
+        *(
+            np.minimum(s.solid_below, s.solid_above) / max(volume, TINY),
+            np.minimum(s.hull_below, s.hull_above) / hull,
+        ),
         *(area, s.section_perimeter / longest, round_, fill.min(axis=0), fill.max(axis=0)),
         np.minimum(s.thickness_below, s.thickness_above) / np.maximum(s.thickness_below + s.thickness_above, TINY),
         np.log(np.cbrt(small) / scale + 0.01),
@@ -102,7 +112,7 @@ def surface_points(component: Component, count: int) -> Float32Array:
     return seen
 
 
-PLANES = 150
+PLANES = 6 * OFFSETS_PER_AXIS
 
 
 def sweep_features(component: Component, threshold: float) -> Float32Array:

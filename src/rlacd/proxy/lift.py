@@ -20,16 +20,12 @@ from rlacd.policies import Policy
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part, reunite
+from rlacd.solid.frame import GROWTH_TO_SPARE, HALF_THICKNESS
 from rlacd.solid.hull import TOLERANCE, Hull, limit_hull
 
-GROWTH_TO_COVER = 5e-4
-"""Hulls may grow by this more than they must to cover the solid (the longest side is 2)."""
-
-SIMPLE_FIRST = 2e-3
-"""The hulls of a proxy's parts are simplified within this first: they have to grow anyway."""
-
-TRIM = 1e-3
-"""Grown hulls are simplified within this: noise gives them many corners."""
+SIMPLE_FIRST = 2 * HALF_THICKNESS
+"""The hulls of a proxy's parts are simplified within this first: they have to grow anyway. Grown hulls are simplified
+within half of it: noise gives them many corners."""
 
 TIGHTENING = 0.8
 """Parts that fail on the solid are cut again under a criterion tighter by this factor, and by its powers."""
@@ -72,7 +68,7 @@ class _Lifted:
         """
         grown = Hull.of(np.concatenate([self.hull.vertices, points]))
         assert grown is not None, "a hull stays solid when it grows"
-        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.on_proxy is None else TRIM)
+        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.on_proxy is None else SIMPLE_FIRST / 2)
         self.part = self.part.with_hull(self.hull) if self.on_proxy is None and self.part is not None else None
         self.is_met = False
 
@@ -163,7 +159,7 @@ class Lift:
             [each.hull.vertices for each in lifted],
             [each.hull.faces for each in lifted],
             2 * self.deviation + SIMPLE_FIRST,
-            GROWTH_TO_COVER,
+            GROWTH_TO_SPARE,
             self.run.threads,
         )
         for each, own in zip(lifted, points, strict=True):

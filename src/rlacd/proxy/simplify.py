@@ -23,6 +23,7 @@ from rlacd.repair.union import CrossingsError, unite
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component
 from rlacd.solid.solid import Shape, mesh_of
+from rlacd.solid.topology import point_bodies
 
 FEW_TRIANGLES = 10_000
 """Solids with fewer triangles are decomposed as they are: little time is to be gained, and a few parts to be lost."""
@@ -169,7 +170,7 @@ def _smallest(
 
 def _samples(mesh: Mesh, samples: int) -> IntArray:
     """Indices of one vertex of each body and of some others, the same ones every time."""
-    _, firsts = np.unique(_native.point_bodies(*mesh), return_index=True)
+    _, firsts = np.unique(point_bodies(*mesh), return_index=True)
     count = len(mesh[0])
     others = np.random.default_rng(0).choice(count, min(samples, count), replace=False)
     return np.concatenate([firsts, others]).astype(np.int32)

@@ -7,10 +7,9 @@ from manifold3d import Manifold
 
 from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
-from rlacd.repair.soup import Soup, boxes_of, face_normals, no_faces
+from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.tangles import MOST_TANGLED, is_tangle, tangled_bodies
 from rlacd.repair.union import (
-    MOST_UNITED,
     area_of,
     as_manifold,
     size_of,

@@ -73,7 +73,10 @@ class Frame:
 
 
 HALF_THICKNESS = 1e-3
-"""Half the thickness of the slab a sheet becomes, in frame units."""
+"""Half the thickness of the slab a sheet becomes, in frame units; other lengths are multiples of it."""
+
+GROWTH_TO_SPARE = HALF_THICKNESS / 2
+"""Hulls may grow by this more than they must to take in a surface: fewer, larger triangles are looked at."""
 
 
 def thickened(points: FloatArray) -> FloatArray:

@@ -63,7 +63,7 @@ LONG_BOOLEAN = 50_000
 """A number of triangles that manifold3d processes in some tenths of a second."""
 
 LATE = 0.3
-"""Seconds by which a boolean may overrun the time left."""
+"""Seconds by which a boolean, or hulls of what was not repaired, may overrun the time left."""
 
 _SEGMENTS = 64
 

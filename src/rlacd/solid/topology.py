@@ -75,6 +75,13 @@ def components(count: int, a: IntArray, b: IntArray) -> tuple[int, IntArray]:
     return _native.components(count, a, b)
 
 
+def point_bodies(vertices: FloatArray, faces: NDArray[np.integer]) -> IntArray:
+    """The body ``[V]`` of each vertex: faces are connected by corners they share, or that are in one place."""
+    first = _native.first_in_place(vertices)
+    a, b, c = first[faces].T
+    return components(len(vertices), np.concatenate([a, a]), np.concatenate([b, c]))[1][first]
+
+
 @dataclass(frozen=True)
 class Edges:
     """The undirected edges of a face list.
