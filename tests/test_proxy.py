@@ -14,7 +14,8 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
-from rlacd.proxy import Lift, simplify
+from rlacd.proxy.model import Lift
+from rlacd.proxy.simplify import simplify
 from rlacd.repair.union import unite
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -10,14 +11,16 @@ import trimesh
 
 from rlacd import _native
 from rlacd.find_parts import Reached
-from rlacd.finish.in_input import as_carried, in_input
 from rlacd.finish.limit import (
+    LARGEST,
     SHARE_OF_OVERHANG,
     kept_within,
     limit_part,
     limit_roughly,
+    plain_hull,
     resting_sides,
     simple_part,
+    step_of,
     take_in,
     within_reach,
 )
@@ -26,12 +29,15 @@ from rlacd.finish.primitives import PRIMITIVE_SLACK, primitive_part
 from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
 from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
+from rlacd.options.navigable import LARGEST_COORDINATE
+from rlacd.options.presets import HullLimits
 from rlacd.run import Run
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
-from rlacd.solid.frame import GROWTH_TO_SPARE
-from rlacd.solid.hull import NO_SIDES
-from rlacd.solid.primitive import Balls
+from rlacd.solid.frame import GROWTH_TO_SPARE, Frame
+from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
+from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
 
@@ -143,3 +149,53 @@ def _bodies(solid: Solid, hulls: list[trimesh.Trimesh]) -> list[int] | list[None
         return [0] * len(hulls)
     vertices, faces = solid.surface
     return owners(hulls, solid.frame.to_input(vertices), faces, solid.body_of)
+
+
+def in_input(hull: Hull, frame: Frame, limits: HullLimits = NO_LIMITS) -> trimesh.Trimesh:
+    """Carry a hull from the frame to the input's unit: vertices are rounded first, so the result is exactly convex.
+
+    Parameters
+    ----------
+    hull : Hull
+        In the frame, inside the limits.
+    frame : Frame
+    limits : HullLimits, optional
+        For the replacement of a hull that is thinner than the coordinates can resolve.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        Convex and closed, with positive volume. If the hull stands for a primitive, ``metadata`` describes it.
+    """
+    with np.errstate(over="ignore"):  # a limited hull can reach beyond the input, and so beyond the largest number
+        points = np.clip(frame.to_input(hull.vertices), -LARGEST, LARGEST)
+    there = Hull.of(points)
+    if there is None:
+        there = _thickened(points, limits)
+    metadata = {} if hull.primitive is None else {PRIMITIVE: hull.primitive.in_input(frame).as_plain()}
+    return trimesh.Trimesh(there.vertices, there.faces, process=False, metadata=metadata)
+
+
+def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
+    """Get the part with the hull that `in_input` made of its own, in the frame: what has to be measured.
+
+    The same part if no vertex moved by more than `TOLERANCE`, as always unless the coordinates resolve little.
+    """
+    points = frame.to_frame(there.vertices)
+    if part.hull.primitive is not None or np.abs(points).max() > LARGEST_COORDINATE:
+        return part
+    if points.shape == part.hull.vertices.shape and np.abs(points - part.hull.vertices).max() <= TOLERANCE:
+        return part
+    if all(np.abs(part.hull.vertices - point).max(axis=1).min() <= TOLERANCE for point in points):
+        return part
+    hull = Hull.of(points)
+    return part if hull is None else part.with_hull(hull)
+
+
+def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
+    """A hull of flat points [N, 3] that has a volume and is within the limits."""
+    step = step_of(points)
+    lower, upper = np.maximum(points, step - LARGEST) - step, np.minimum(points, LARGEST - step) + step
+    corners = itertools.product(*zip(lower.T, upper.T, strict=True))
+    hull = Hull.of(np.concatenate([np.stack(corner, axis=1) for corner in corners]))
+    return hull if hull is not None and keeps(hull, limits) else plain_hull(points, limits)

@@ -5,6 +5,7 @@ They grow to points just outside them, where repair moved the surface or a slive
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -12,12 +13,14 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria import Criterion
-from rlacd.finish.in_input import plain_hull
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import NO_SIDES, TOLERANCE, Hull, keeps, limit_hull
+
+LARGEST = float(np.finfo(np.float64).max)
+"""The largest coordinate."""
 
 SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
@@ -162,3 +165,37 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
         if criterion.is_met(larger) or not criterion.is_met(part):
             grown[i] = larger
     return grown
+
+
+def plain_hull(points: FloatArray, limits: HullLimits) -> Hull:
+    """Get a box around points [N, 3], or a tetrahedron if a box has too many vertices or triangles."""
+    hull = Hull.of(_box_around(points) if limits.allow(vertices=8, faces=12) else _tetrahedron_around(points))
+    assert hull is not None
+    return hull
+
+
+def _box_around(points: FloatArray) -> FloatArray:
+    """Corners [8, 3] of a box around the points, padded on every side by the resolution of their largest coordinate.
+
+    One floating-point step along an axis may vanish next to a large coordinate on another axis.
+    """
+    step = step_of(points)
+    lower = np.maximum(points.min(axis=0), step - LARGEST) - step
+    upper = np.minimum(points.max(axis=0), LARGEST - step) + step
+    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
+
+
+def step_of(points: FloatArray) -> float:
+    """The resolution of the points' largest coordinate."""
+    limits = np.finfo(np.float64)
+    return float(np.abs(points).max() * limits.eps + limits.smallest_subnormal)
+
+
+def _tetrahedron_around(points: FloatArray) -> FloatArray:
+    """Corners [4, 3] of a tetrahedron around that box: one of its corners and three on the extended edges."""
+    box = _box_around(points)
+    lower, upper = box[0], box[-1]
+    to_lower = lower / 2 + upper / 2 > 0  # edges lead towards the origin, where coordinates do not overflow
+    corner, edge = np.where(to_lower, upper, lower), np.where(to_lower, lower - upper, upper - lower)
+    # 1/4 + 1/4 + 1/4 < 1: the far corner of the box stays inside in spite of rounding.
+    return np.concatenate([corner[None], corner + np.diag(4 * edge)])

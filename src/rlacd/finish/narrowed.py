@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.kept_open import least_kept
+from rlacd.criteria.limited import least_kept
 from rlacd.find_parts import Reached
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots

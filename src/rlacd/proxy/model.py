@@ -1,4 +1,9 @@
-"""What is cut in place of a solid: the solid itself, or a simpler copy of a dense one."""
+"""What is cut in place of a solid: the solid itself, or a simpler copy of a dense one, whose parts are carried back.
+
+Every hull takes in what of the solid's surface it misses (`Filling.uncovered`), so that together the hulls cover the
+solid; its part is then the solid clipped to it. Each part is tested on the solid itself. One that fails is cut again:
+on the proxy under a tighter criterion, at last, or where the proxy cannot be cut, on the solid.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +11,195 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion
+from rlacd.cut import CutTree
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import merge_lifted
 from rlacd.policies import Policy
-from rlacd.proxy.lift import Lift
 from rlacd.proxy.simplify import FEW_TRIANGLES, Proxy, simplify
 from rlacd.run import Run
-from rlacd.solid.component import Component, Part
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import Component, Part, reunite
+from rlacd.solid.frame import GROWTH_TO_SPARE, HALF_THICKNESS
+from rlacd.solid.hull import TOLERANCE, Hull, limit_hull
 from rlacd.solid.solid import Shape
+
+SIMPLE_FIRST = 2 * HALF_THICKNESS
+"""The hulls of a proxy's parts are simplified within this first: they have to grow anyway. Grown hulls are simplified
+within half of it: noise gives them many corners."""
+
+TIGHTENING = 0.8
+"""Parts that fail on the solid are cut again under a criterion tighter by this factor, and by its powers."""
+
+ROUNDS = 3
+"""Number of times that parts are cut again on the proxy."""
+
+
+@dataclass
+class _Lifted:
+    """A part on its way to the solid.
+
+    Attributes
+    ----------
+    hull : Hull
+    on_proxy : Part or None
+        The part of the proxy it comes from; None if it was cut on the solid.
+    part : Part or None
+        Its part of the solid, if that is known for this hull.
+    is_met : bool
+        Whether that is known to meet the goal.
+    """
+
+    hull: Hull
+    on_proxy: Part | None
+    part: Part | None = None
+    is_met: bool = False
+
+    @property
+    def on_solid(self) -> Part:
+        """Its part of the solid, which is known."""
+        assert self.part is not None, "clipped first"
+        return self.part
+
+    def grow(self, points: FloatArray) -> None:
+        """Take in points.
+
+        A part that was cut on the solid stays what it is, without the slivers that were left out, and its hull is not
+        simplified: there may be no room for it below the threshold.
+        """
+        grown = Hull.of(np.concatenate([self.hull.vertices, points]))
+        assert grown is not None, "a hull stays solid when it grows"
+        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.on_proxy is None else SIMPLE_FIRST / 2)
+        self.part = self.part.with_hull(self.hull) if self.on_proxy is None and self.part is not None else None
+        self.is_met = False
+
+
+@dataclass(frozen=True)
+class Lift:
+    """Carries parts of a proxy to the solid.
+
+    Attributes
+    ----------
+    solid : Component
+    deviation : float
+        Of the proxy.
+    goal : Criterion
+        Tests the parts on the solid.
+    on_proxy : Criterion
+        The criterion for parts on the proxy.
+    policy : Policy
+        Chooses the planes where parts are cut again.
+    run : Run
+        When it stops, the parts stay those of the proxy, with hulls that cover the solid.
+    """
+
+    solid: Component
+    deviation: float
+    goal: Criterion
+    on_proxy: Criterion
+    policy: Policy
+    run: Run
+
+    def __call__(self, parts: Sequence[Part], mend: bool = True) -> list[Part]:
+        """Get the parts of the solid; together they cover it.
+
+        Parameters
+        ----------
+        parts : sequence of Part
+            They cover the proxy.
+        mend : bool
+            Cut parts again if they meet their criterion on the proxy only.
+        """
+        with self.run.shielded():
+            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), part) for part in parts]
+            self._cover(lifted)
+            hulls = [each.hull for each in lifted]
+        try:
+            return self._tested(lifted) if mend else self.run.map(self._clipped, hulls)
+        except Stopped:
+            self.run.note_stop()
+            return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
+
+    def _tested(self, lifted: list[_Lifted]) -> list[Part]:
+        """Clip the solid to the hulls and cut parts again until all meet the goal."""
+        criterion = self.on_proxy
+        for left in range(ROUNDS, -1, -1):
+            self._clip(lifted)
+            failing = self._failing(lifted)
+            if not failing:
+                break
+            criterion = criterion.scaled(TIGHTENING)
+            for i in reversed(failing):
+                lifted[i : i + 1] = self._cut_again(lifted[i], criterion, left)
+            self._cover(lifted)
+        self._clip(lifted)
+        return [each.on_solid for each in lifted]
+
+    def _cut_again(self, failing: _Lifted, criterion: Criterion, left: int) -> list[_Lifted]:
+        """Cut a part on the proxy, under a criterion that is tightened until that takes a cut; else on the solid."""
+        origin = failing.on_proxy
+        if origin is not None and left and self.on_proxy.is_met(origin):  # else the proxy could not be cut there
+            trees = self._trees(origin)
+            for _ in range(left):
+                new = [part for tree in trees for part in self._cut(tree, criterion)]
+                if len(new) > 1:
+                    return [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), part) for part in new]
+                criterion = criterion.scaled(TIGHTENING)
+        part = failing.on_solid
+        new = self._cut(self._tree(Component((part.vertices, part.faces))), self.goal) or [part]
+        return [_Lifted(part.hull, None, part) for part in new]
+
+    def confirmed(self, hull: Hull) -> Part | None:
+        """Get what the solid fills of a hull; None if it does not meet the goal."""
+        part = self._clipped(hull)
+        return part if self.goal.is_met(part) else None
+
+    def _cover(self, lifted: Sequence[_Lifted]) -> None:
+        """Grow hulls where necessary to cover the solid's surface; those that need not grow stay the same."""
+        points = self.solid.filling.uncovered(
+            [each.hull.vertices for each in lifted],
+            [each.hull.faces for each in lifted],
+            2 * self.deviation + SIMPLE_FIRST,
+            GROWTH_TO_SPARE,
+            self.run.threads,
+        )
+        for each, own in zip(lifted, points, strict=True):
+            if len(own):
+                each.grow(own)
+
+    def _clip(self, lifted: Sequence[_Lifted]) -> None:
+        """Get what the solid fills of hulls that have changed."""
+        changed = [each for each in lifted if each.part is None]
+        for each, part in zip(changed, self.run.map(self._clipped, [each.hull for each in changed]), strict=True):
+            each.part = part
+
+    def _clipped(self, hull: Hull) -> Part:
+        """What the solid fills of a hull; the hull itself if that is nothing."""
+        part = self.solid.inside(hull)
+        return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
+
+    def _failing(self, lifted: Sequence[_Lifted]) -> list[int]:
+        """Indices of the parts that fail on the solid, but for those that were cut there before."""
+        fresh = [i for i, each in enumerate(lifted) if each.on_proxy is not None and not each.is_met]
+        verdicts = self.run.map(self.goal.is_met, [lifted[i].on_solid for i in fresh])
+        for i, is_met in zip(fresh, verdicts, strict=True):
+            lifted[i].is_met = is_met
+        return [i for i in fresh if not lifted[i].is_met]
+
+    def _trees(self, part: Part) -> list[CutTree]:
+        """The cuts of a part of the proxy, made once for all criteria; of its pieces if these do not become one."""
+        whole = reunite(part.members)
+        return [self._tree(root) for root in ([whole] if whole is not None else part.members)]
+
+    def _tree(self, root: Component) -> CutTree:
+        return CutTree(root, self.policy, self.run)
+
+    def _cut(self, tree: CutTree, criterion: Criterion) -> list[Part]:
+        return cut_and_merge(tree, criterion, self.run).parts
+
 
 MARGIN = 1.5
 """Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""

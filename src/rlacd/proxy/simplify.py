@@ -2,8 +2,8 @@
 
 What a decomposition costs grows with the triangles, what it needs only with the shape. Noise costs parts too, and a
 proxy averages it: its faces lie in the middle of those they replace (M. Garland and P. Heckbert, "Surface
-Simplification Using Quadric Error Metrics", SIGGRAPH 1997). Nothing is promised about a proxy: `rlacd.proxy.lift` makes
-and checks every hull on the solid itself.
+Simplification Using Quadric Error Metrics", SIGGRAPH 1997). Nothing is promised about a proxy: `rlacd.proxy.model`
+makes and checks every hull on the solid itself.
 
 Where noisy walls of two bodies touch, their union is riddled with tunnels, sometimes thousands, which no simplification
 removes. So the pieces that repair united are simplified one by one, and united again.

@@ -20,13 +20,11 @@ from functools import cached_property
 import numpy as np
 
 from rlacd._native import poll_stop
-from rlacd.repair.caps import caps_of, smooth_share
 from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
-from rlacd.repair.rims import Rims, rims_of
+from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
 from rlacd.repair.soup import FLAPS, Soup
-from rlacd.repair.tangles import is_tangle
-from rlacd.repair.windings import trust_windings
+from rlacd.repair.windings import is_tangle, trust_windings
 from rlacd.repair.work import Work
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS

@@ -20,15 +20,13 @@ from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, probes
 from rlacd.repair.holes import close_holes, may_have_holes
-from rlacd.repair.record import STEPS as NAMES
-from rlacd.repair.record import measure
 from rlacd.repair.soup import MOST_PATCHES, Soup
-from rlacd.repair.tangles import MOST_TANGLED, is_tangle
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import are_unbuilt, build_slabs, build_walls, has_sheets, skins
-from rlacd.repair.windings import are_crowded, are_oriented, sort_out, take_as_they_are
-from rlacd.repair.work import Piece, Wanted, Work, query_of
+from rlacd.repair.windings import MOST_TANGLED, are_crowded, are_oriented, is_tangle, sort_out, take_as_they_are
+from rlacd.repair.work import STEPS as NAMES
+from rlacd.repair.work import Piece, Wanted, Work, measure, query_of
 from rlacd.repair.wraps import (
     fill_rooms,
     fill_slits,

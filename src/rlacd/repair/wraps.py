@@ -8,7 +8,6 @@ from manifold3d import Manifold
 from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
-from rlacd.repair.tangles import MOST_TANGLED, is_tangle, tangled_bodies
 from rlacd.repair.union import (
     area_of,
     as_manifold,
@@ -20,6 +19,7 @@ from rlacd.repair.union import (
 )
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.repair.walls import skins
+from rlacd.repair.windings import MOST_TANGLED, is_tangle, tangled_bodies
 from rlacd.repair.work import Piece, Work, query_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS
