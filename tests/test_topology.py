@@ -14,23 +14,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from rlacd import _native
+from rlacd._native import components, face_areas, long_normals, signed_tetrahedra
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays, unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import (
-    Edges,
-    bodies_of,
-    components,
-    detach_films,
-    face_areas,
-    first_of_doubled,
-    has_marked,
-    long_normals,
-    sides_of,
-    signed_tetrahedra,
-)
+from rlacd.solid.topology import Edges, bodies_of, detach_films, first_of_doubled, has_marked, sides_of
 
 
 def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:

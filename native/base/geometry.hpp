@@ -43,6 +43,16 @@ inline double doubled_area(PlanePoint a, PlanePoint b, PlanePoint c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
+// Whether the segments a-b and c-d cross between their ends, and where: shares of the way along each.
+inline bool do_cross(PlanePoint a, PlanePoint b, PlanePoint c, PlanePoint d, std::array<double, 2>& along) {
+  const double c_side = doubled_area(a, b, c), d_side = doubled_area(a, b, d);
+  if (!(c_side < 0 ? d_side > 0 : c_side > 0 && d_side < 0)) return false;
+  const double a_side = doubled_area(c, d, a), b_side = doubled_area(c, d, b);
+  if (!(a_side < 0 ? b_side > 0 : a_side > 0 && b_side < 0)) return false;
+  along = {a_side / (a_side - b_side), c_side / (c_side - d_side)};
+  return true;
+}
+
 struct Mesh {
   std::vector<Vec3> vertices;
   std::vector<Triangle> faces;
@@ -55,6 +65,14 @@ inline Corners corners_of(const Mesh& mesh, const Triangle& face) {
 // Normal to a triangle, twice as long as its area.
 inline Vec3 long_normal(const Corners& t) { return cross(t[1] - t[0], t[2] - t[0]); }
 inline Vec3 long_normal(const Mesh& mesh, const Triangle& face) { return long_normal(corners_of(mesh, face)); }
+
+// The side from corner k to the next that is longest, the first of several.
+inline int longest_side(const Corners& t) {
+  int longest = 0;
+  for (int k = 1; k < 3; ++k)
+    if (norm2(t[(k + 1) % 3] - t[k]) > norm2(t[(longest + 1) % 3] - t[longest])) longest = k;
+  return longest;
+}
 
 inline void append(Mesh& out, const Mesh& other) {
   const auto first = static_cast<std::int32_t>(out.vertices.size());

@@ -104,7 +104,7 @@ Mesh joint_hull(const std::vector<Vec3>& first, const std::vector<Vec3>& second)
 }
 
 struct Cell {
-  Vec3 corner[3];
+  Corners corner;
   Vec3 middle;
   double radius;
   std::int32_t hint;                                      // the slot of a nearby face of the solid
@@ -218,10 +218,7 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
     const Cell cell = open.top();
     open.pop();
     // Across the longest side, so that cells stay well shaped.
-    int from = 0;
-    for (int k = 1; k < 3; ++k)
-      if (norm2(cell.corner[(k + 1) % 3] - cell.corner[k]) > norm2(cell.corner[(from + 1) % 3] - cell.corner[from]))
-        from = k;
+    const int from = longest_side(cell.corner);
     const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
     const Vec3 between = 0.5 * (p + q);
     if (look_at(Cell(p, between, tip, cell.hint)) || look_at(Cell(between, q, tip, cell.hint))) return true;

@@ -12,14 +12,6 @@ namespace {
 
 constexpr double kRounding = 1e-12;  // points this far outside a plane count as on it
 
-// The side from corner k to corner k + 1 that is longest.
-int longest_side(const Corners& corner) {
-  int longest = 0;
-  for (int k = 1; k < 3; ++k)
-    if (norm2(corner[(k + 1) % 3] - corner[k]) > norm2(corner[(longest + 1) % 3] - corner[longest])) longest = k;
-  return longest;
-}
-
 std::array<Corners, 2> halves(const Corners& corner) {
   const int k = longest_side(corner);
   const Vec3 p = corner[k], q = corner[(k + 1) % 3], tip = corner[(k + 2) % 3], middle = 0.5 * (p + q);

@@ -1,4 +1,4 @@
-// Orders along a space-filling curve (Morton's), of 2^10 cells along each axis of a box. Linear time.
+// Orders along a space-filling curve (Morton's), of 2^10 cells along each axis of a box.
 #pragma once
 
 #include <cstdint>

@@ -18,7 +18,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -66,6 +67,7 @@ class Conflicts:
     most: float = 0.0
 
 
+@dataclass(frozen=True, repr=False)
 class Navigable(Criterion):
     """The navigable space of one solid, as a criterion.
 
@@ -85,23 +87,17 @@ class Navigable(Criterion):
         Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
     """
 
-    def __init__(
-        self,
-        radius: float,
-        tolerance: float,
-        balls: Balls,
-        warnings: tuple[str, ...] = (),
-        conflicts: Conflicts | None = None,
-        hull: Hull | None = None,
-    ) -> None:
-        self.radius = radius
-        self.tolerance = tolerance
-        self.balls = balls
-        self.allowance = 0.0
-        self.warnings = warnings
-        self.conflicts = conflicts or Conflicts()
-        self.hull = hull
-        self._intrusions = Intrusions(balls)
+    radius: float
+    tolerance: float
+    balls: Balls
+    warnings: tuple[str, ...] = ()
+    conflicts: Conflicts = Conflicts()
+    hull: Hull | None = None
+    allowance: float = 0.0
+
+    @cached_property
+    def _intrusions(self) -> Intrusions:
+        return Intrusions(self.balls)
 
     def __repr__(self) -> str:
         return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
@@ -241,9 +237,8 @@ class Navigable(Criterion):
 
     def scaled(self, factor: float) -> Navigable:
         """Coarser: hulls may reach into the balls by so much that tolerance plus allowance grow by `factor`."""
-        other = Navigable.__new__(Navigable)
-        other.__dict__.update(self.__dict__)
-        other.allowance = max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance)
+        other = replace(self, allowance=max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance))
+        vars(other)["_intrusions"] = self._intrusions  # the balls are the same
         return other
 
     def settled(self, parts: Sequence[Part]) -> Navigable:
@@ -261,16 +256,7 @@ class Navigable(Criterion):
         )
         if conflicts == Conflicts():
             return self
-        settled = Navigable(
-            self.radius,
-            self.tolerance,
-            Balls(self.balls.centres[kept], radii[kept]),
-            self.warnings,
-            conflicts,
-            self.hull,
-        )
-        settled.allowance = self.allowance
-        return settled
+        return replace(self, balls=Balls(self.balls.centres[kept], radii[kept]), conflicts=conflicts)
 
     def _is_small(self, part: Part) -> bool:
         small = (self.tolerance + self.allowance) / 2

@@ -183,7 +183,7 @@ class _Shadow:
         self._axes = axes
         self._points = points @ axes
         seen = np.ascontiguousarray(self._points[:, :2])
-        self.outline: FloatArray = seen[outline(seen)]
+        self.outline = outline(seen)
         x, y = (self.outline - seen[0]).T
         self.area = float(np.roll(y, -1) @ x - np.roll(x, -1) @ y) / 2
         along = self._points[:, 2]
@@ -229,28 +229,14 @@ class _Shadow:
         return _least(map(of_radius, (radius * RADII).tolist()))
 
 
-def outline(points: FloatArray) -> list[int]:
-    """Indices of the corners of the convex hull of points [N, 2], counter-clockwise, but for those on its sides.
-
-    Fewer than three if the points lie on a line up to rounding (A. M. Andrew, "Another efficient algorithm for convex
-    hulls in two dimensions", 1979).
-    """
-    least = 1e-14 * np.abs(points - points[:1]).max(initial=0.0) ** 2  # twice the area of a triangle that is none
-    order, place = np.lexsort(points.T[::-1]).tolist(), points.tolist()
-
-    def turns_left(a: int, b: int, c: int) -> bool:
-        (px, py), (qx, qy), (rx, ry) = place[a], place[b], place[c]
-        return bool((qx - px) * (ry - py) - (qy - py) * (rx - px) > least)
-
-    corners: list[int] = []
-    for side in (order, order[::-1]):  # from left to right below the points, and back above them
-        first = len(corners)
-        for point in side:
-            while len(corners) >= first + 2 and not turns_left(corners[-2], corners[-1], point):
-                corners.pop()
-            corners.append(point)
-        del corners[-1:]  # the other side begins with it
-    return corners
+def outline(points: FloatArray) -> FloatArray:
+    """Corners [K, 2] of the convex hull of points [N, 2], counter-clockwise; none if they lie on a line."""
+    prism = Hull.of(np.column_stack([np.tile(points, (2, 1)), np.repeat([0.0, 1.0], len(points))]))
+    if prism is None:
+        return points[:0]
+    corners = prism.vertices[prism.vertices[:, 2] == 0, :2]
+    x, y = (corners - corners.mean(axis=0)).T
+    return corners[np.argsort(np.arctan2(y, x))]
 
 
 def _candidate_axes(hull: Hull) -> FloatArray:

@@ -45,16 +45,8 @@ def plane_features(
     cost = excess_norm(s) / excess**1.3
     saved = (s.hull_below + s.hull_above - volume) / excess
     lowest = cost[valid].min() if valid.any() else 0.0
-    area, round_ = (
-        s.section_area / longest**2,
-        4 * np.pi * s.section_area / np.maximum(s.section_perimeter, TINY) ** 2,
-    )
-    fill = np.stack(
-        [
-            s.solid_below / np.maximum(s.hull_below, TINY),
-            s.solid_above / np.maximum(s.hull_above, TINY),
-        ]
-    )
+    area, round_ = s.section_area / longest**2, 4 * np.pi * s.section_area / np.maximum(s.section_perimeter, TINY) ** 2
+    fill = np.stack([s.solid_below / np.maximum(s.hull_below, TINY), s.solid_above / np.maximum(s.hull_above, TINY)])
     scale = length or 0.05
     planes, along = np.arange(len(cost)), 6 * OFFSETS_PER_AXIS
     axes = np.where(planes < along, planes // OFFSETS_PER_AXIS, planes)
@@ -63,10 +55,7 @@ def plane_features(
         _rank(np.where(valid, cost, np.inf)),
         _rank(np.where(valid, saved, np.inf)),
         _rank(np.where(valid, large, np.inf)),
-        *(
-            np.minimum(s.solid_below, s.solid_above) / max(volume, TINY),
-            np.minimum(s.hull_below, s.hull_above) / hull,
-        ),
+        *(np.minimum(s.solid_below, s.solid_above) / max(volume, TINY), np.minimum(s.hull_below, s.hull_above) / hull),
         *(area, s.section_perimeter / longest, round_, fill.min(axis=0), fill.max(axis=0)),
         np.minimum(s.thickness_below, s.thickness_above) / np.maximum(s.thickness_below + s.thickness_above, TINY),
         np.log(np.cbrt(small) / scale + 0.01),

@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rlacd._native import poll_stop
+from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
 from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
@@ -29,15 +29,7 @@ from rlacd.repair.work import Work
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.solid import Hole
-from rlacd.solid.topology import (
-    BoolArray,
-    IntArray,
-    components,
-    face_areas,
-    first_of_doubled,
-    marked,
-    signed_tetrahedra,
-)
+from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled, marked
 
 HOLE, HOLE_SHARE = 0.1, 0.02
 """A nearly closed body, with holes of at most this share of its area, is closed with caps up to this far away: a scan

@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import poll_stop
+from rlacd._native import face_areas, poll_stop, signed_tetrahedra
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, probes
@@ -42,16 +42,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import (
-    NO_FILM,
-    BoolArray,
-    IntArray,
-    bodies_of,
-    compacted,
-    detach_films,
-    face_areas,
-    signed_tetrahedra,
-)
+from rlacd.solid.topology import NO_FILM, BoolArray, IntArray, bodies_of, compacted, detach_films
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""

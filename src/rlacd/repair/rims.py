@@ -19,19 +19,10 @@ from dataclasses import dataclass
 import mapbox_earcut
 import numpy as np
 
-from rlacd._native import least_bent, poll_stop
+from rlacd._native import components, least_bent, long_normals, poll_stop
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
 from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import (
-    BoolArray,
-    IntArray,
-    both_sides,
-    components,
-    has_marked,
-    long_normals,
-    marked,
-    nondegenerate,
-)
+from rlacd.solid.topology import BoolArray, IntArray, both_sides, has_marked, marked, nondegenerate
 
 _NEXT = np.array([1, 2, 0])
 

@@ -7,20 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from rlacd._native import poll_stop
+from rlacd._native import components, face_areas, long_normals, poll_stop
 from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import (
-    NO_FILM,
-    BoolArray,
-    Edges,
-    IntArray,
-    Sides,
-    components,
-    face_areas,
-    has_marked,
-    long_normals,
-    sides_of,
-)
+from rlacd.solid.topology import NO_FILM, BoolArray, Edges, IntArray, Sides, has_marked, sides_of
 
 FLAT = 1e-6
 """A closed body with less volume per area is flat: there is nothing to cut."""

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd._native import poll_stop
+from rlacd._native import components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.union import one_body, slab_of_faces, split_labels, to_arrays, volume_of
@@ -22,7 +22,7 @@ from rlacd.solid.arrays import FloatArray, angles, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from rlacd.solid.topology import BoolArray, IntArray, Sides, components, marked, nondegenerate
+from rlacd.solid.topology import BoolArray, IntArray, Sides, marked, nondegenerate
 
 
 def are_unbuilt(work: Work) -> bool:

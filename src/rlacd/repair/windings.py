@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rlacd import _native
+from rlacd._native import signed_tetrahedra
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.soup import FLAPS, FLAT, Soup, face_normals
 from rlacd.repair.union import split_labels
@@ -19,7 +20,7 @@ from rlacd.repair.work import Piece, Work
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import BoolArray, IntArray, is_balanced, marked, signed_tetrahedra
+from rlacd.solid.topology import BoolArray, IntArray, is_balanced, marked
 
 BESIDE = HALF_THICKNESS / 5
 """Distance from a face at which the winding number is evaluated."""

@@ -11,7 +11,7 @@ from manifold3d import Manifold
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd._native import poll_stop
+from rlacd._native import face_areas, poll_stop
 from rlacd.repair.cracks import close_cracks
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
 from rlacd.repair.soup import Soup, no_faces
@@ -20,7 +20,7 @@ from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.solid import BodyRepair, Hole, Shape, Solid
-from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, face_areas, marked
+from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, marked
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
 """The possible steps for a body, from the least change to the most."""

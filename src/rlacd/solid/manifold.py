@@ -13,9 +13,8 @@ import numpy as np
 from manifold3d import Error, Manifold, Mesh64
 from numpy.typing import NDArray
 
-from rlacd._native import Stopped, poll_stop, seconds_left
+from rlacd._native import Stopped, face_areas, poll_stop, seconds_left, signed_tetrahedra
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import face_areas, signed_tetrahedra
 
 Faces: TypeAlias = NDArray[np.int64] | NDArray[np.int32]
 
