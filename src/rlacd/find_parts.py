@@ -246,9 +246,6 @@ COARSER = 1.5
 LONG_MERGING = 8e6
 """Units of work (see `rlacd.run.work`) after which it grows by the fourth power of that: only tangles take so long."""
 
-MEASURING = 5e6
-"""Units of work for measuring pairs of parts, under each threshold: a coarser one has fewer."""
-
 
 def best_within(
     most: int,
@@ -280,7 +277,7 @@ def best_within(
         least = criterion.error(whole)
         while True:
             parts = decompose(factor)
-            for state, error in united_in_turn(parts, unite, criterion, Work(MEASURING), run):
+            for state, error in united_in_turn(parts, unite, criterion, Work(MOST_CUTTING), run):
                 if len(state) <= most and error < least:
                     best, least = state, error
             if len(parts) <= 1 or run.stopped_by is not None:

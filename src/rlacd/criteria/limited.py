@@ -12,13 +12,14 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria.concavity import Concavity, Distance
 from rlacd.criteria.criterion import Criterion, Joined
-from rlacd.criteria.navigable import TOUCH, Intrusions, Navigable
+from rlacd.criteria.navigable import Intrusions, Navigable
 from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import keeps, limit_hull
 from rlacd.solid.passages import passage_balls
 from rlacd.solid.primitive import Balls
@@ -64,7 +65,7 @@ class KeptOpen(Joined):
 
     def is_met(self, part: Part) -> bool:
         """Whether the hull stays out of the balls, and the criterion is met."""
-        return not self._intrusions.any_beyond(part, TOUCH) and self.criterion.is_met(part)
+        return not self._intrusions.any_beyond(part, ROUNDING) and self.criterion.is_met(part)
 
     def scaled(self, factor: float) -> KeptOpen:
         """Coarser: hulls may take more of each ball, by the same factor."""

@@ -33,16 +33,13 @@ from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, dots, heights
 from rlacd.solid.component import Part
-from rlacd.solid.frame import Frame
+from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 MOST_CELLS = 256
 """Maximum number of grid cells along the longest side: for radii that need more, the balls are spaced more widely."""
-
-TOUCH = 1e-9
-"""A hull that reaches no deeper than this into a ball does not touch it."""
 
 LEAST_RADIUS = 0.1
 """A ball that has to shrink below this share of the radius is dropped."""
@@ -225,7 +222,7 @@ class Navigable(Criterion):
             return False
         if self._is_small(part) or len(self.balls) == 0:
             return True
-        if not self._intrusions.any_beyond(part, max(self.allowance, TOUCH)):
+        if not self._intrusions.any_beyond(part, max(self.allowance, ROUNDING)):
             return True
         if self.allowance == 0:
             return False
@@ -294,7 +291,7 @@ class Intrusions:
         if known is None:
             within = part.within
             candidates = None if within is None else self.of(within)[0]
-            known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, TOUCH)
+            known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, ROUNDING)
             with self._lock:  # another thread may have done the same, with the same result
                 self._known[part] = known
         return known

@@ -25,7 +25,7 @@ from rlacd.finish.limit import (
     within_reach,
 )
 from rlacd.finish.overlap import Seams, overlap_parts
-from rlacd.finish.primitives import PRIMITIVE_SLACK, primitive_part
+from rlacd.finish.primitives import primitive_part
 from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
 from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
@@ -35,7 +35,7 @@ from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
-from rlacd.solid.frame import GROWTH_TO_SPARE, Frame
+from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
 from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
@@ -122,7 +122,7 @@ def _cleaned(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
     """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     options, goal, limits = reached.options, reached.goal, reached.options.hull_limits
     sides = NO_SIDES if reached.root is None else resting_sides(reached.root)
-    slack = PRIMITIVE_SLACK + 8 * reached.solid.frame.resolution
+    slack = ROUNDING + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
         part.tree = part.tree or _native.TreeCache()

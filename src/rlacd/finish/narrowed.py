@@ -14,11 +14,12 @@ from rlacd.find_parts import Reached
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
 from rlacd.solid.distance import hull_union
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import Hull
 from rlacd.solid.passages import passage_balls
 from rlacd.solid.primitive import Balls
 
-NARROWEST = 0.008
+NARROWEST = 8 * HALF_THICKNESS
 """Radius of the narrowest passages looked for (the longest side is 2): folds of scans and gaps of sheets are such."""
 
 LEAST_LOSS = 0.1

@@ -13,11 +13,9 @@ from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import LOST_VOLUME, Component, Part
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, Hull, keeps
 from rlacd.solid.primitive import Primitive
-
-PRIMITIVE_SLACK = 1e-9
-"""Primitives are larger than what they are fitted to by this, so that rounding leaves no point outside (frame)."""
 
 SIMPLER = 1.25
 """A simpler primitive is preferred unless its volume exceeds that of the tightest by this factor."""
@@ -29,7 +27,7 @@ the frame's."""
 SAME_DIRECTION = 0.9998
 """Cosine of the angle (1 degree) below which two directions are tried once."""
 
-ROUND_AXES = 4
+ROUND_AXES = DIRECTIONS // 3
 """Axes about which capsules and cylinders are fitted: those with the least volume by a lower bound."""
 
 RADII = np.linspace(1.0, 1.4, 21)
@@ -41,7 +39,7 @@ def primitive_part(
     criterion: Criterion,
     kinds: Collection[PrimitiveKind],
     limits: HullLimits = NO_LIMITS,
-    slack: float = PRIMITIVE_SLACK,
+    slack: float = ROUNDING,
     solid: Component | None = None,
 ) -> Part:
     """Get the part with a primitive for a hull, if one meets the criterion; otherwise the same part.

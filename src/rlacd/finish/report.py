@@ -27,7 +27,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
 
-COVERAGE_TOLERANCE = 5e-3
+COVERAGE_TOLERANCE = 5 * HALF_THICKNESS
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
 

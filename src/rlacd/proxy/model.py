@@ -1,8 +1,7 @@
 """What is cut in place of a solid: the solid itself, or a simpler copy of a dense one, whose parts are carried back.
 
 Every hull takes in what of the solid's surface it misses (`Filling.uncovered`), so that together the hulls cover the
-solid; its part is then the solid clipped to it. Each part is tested on the solid itself. One that fails is cut again:
-on the proxy under a tighter criterion, at last, or where the proxy cannot be cut, on the solid.
+solid; its part is then the solid clipped to it. Each part is tested on the solid itself; one that fails is cut there.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from rlacd.policies import Policy
 from rlacd.proxy.simplify import FEW_TRIANGLES, Proxy, simplify
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part, reunite
+from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import GROWTH_TO_SPARE, HALF_THICKNESS
 from rlacd.solid.hull import TOLERANCE, Hull, limit_hull
 from rlacd.solid.solid import Shape
@@ -31,11 +30,8 @@ SIMPLE_FIRST = 2 * HALF_THICKNESS
 """The hulls of a proxy's parts are simplified within this first: they have to grow anyway. Grown hulls are simplified
 within half of it: noise gives them many corners."""
 
-TIGHTENING = 0.8
-"""Parts that fail on the solid are cut again under a criterion tighter by this factor, and by its powers."""
-
-ROUNDS = 3
-"""Number of times that parts are cut again on the proxy."""
+MARGIN = 1.5
+"""Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
 
 
 @dataclass
@@ -45,8 +41,8 @@ class _Lifted:
     Attributes
     ----------
     hull : Hull
-    on_proxy : Part or None
-        The part of the proxy it comes from; None if it was cut on the solid.
+    is_fresh : bool
+        Whether it comes from the proxy, and was not cut on the solid.
     part : Part or None
         Its part of the solid, if that is known for this hull.
     is_met : bool
@@ -54,7 +50,7 @@ class _Lifted:
     """
 
     hull: Hull
-    on_proxy: Part | None
+    is_fresh: bool
     part: Part | None = None
     is_met: bool = False
 
@@ -72,8 +68,8 @@ class _Lifted:
         """
         grown = Hull.of(np.concatenate([self.hull.vertices, points]))
         assert grown is not None, "a hull stays solid when it grows"
-        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.on_proxy is None else SIMPLE_FIRST / 2)
-        self.part = self.part.with_hull(self.hull) if self.on_proxy is None and self.part is not None else None
+        self.hull = limit_hull(grown, tolerance=SIMPLE_FIRST / 2 if self.is_fresh else TOLERANCE)
+        self.part = None if self.is_fresh or self.part is None else self.part.with_hull(self.hull)
         self.is_met = False
 
 
@@ -88,8 +84,6 @@ class Lift:
         Of the proxy.
     goal : Criterion
         Tests the parts on the solid.
-    on_proxy : Criterion
-        The criterion for parts on the proxy.
     policy : Policy
         Chooses the planes where parts are cut again.
     run : Run
@@ -99,7 +93,6 @@ class Lift:
     solid: Component
     deviation: float
     goal: Criterion
-    on_proxy: Criterion
     policy: Policy
     run: Run
 
@@ -114,7 +107,7 @@ class Lift:
             Cut parts again if they meet their criterion on the proxy only.
         """
         with self.run.shielded():
-            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), part) for part in parts]
+            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), True) for part in parts]
             self._cover(lifted)
             hulls = [each.hull for each in lifted]
         try:
@@ -124,33 +117,20 @@ class Lift:
             return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
 
     def _tested(self, lifted: list[_Lifted]) -> list[Part]:
-        """Clip the solid to the hulls and cut parts again until all meet the goal."""
-        criterion = self.on_proxy
-        for left in range(ROUNDS, -1, -1):
-            self._clip(lifted)
-            failing = self._failing(lifted)
-            if not failing:
-                break
-            criterion = criterion.scaled(TIGHTENING)
-            for i in reversed(failing):
-                lifted[i : i + 1] = self._cut_again(lifted[i], criterion, left)
-            self._cover(lifted)
+        """Clip the solid to the hulls, and cut it there where one fails, until all meet the goal."""
         self._clip(lifted)
+        while failing := self._failing(lifted):
+            for i in reversed(failing):
+                lifted[i : i + 1] = self._cut_again(lifted[i].on_solid)
+            self._cover(lifted)
+            self._clip(lifted)
         return [each.on_solid for each in lifted]
 
-    def _cut_again(self, failing: _Lifted, criterion: Criterion, left: int) -> list[_Lifted]:
-        """Cut a part on the proxy, under a criterion that is tightened until that takes a cut; else on the solid."""
-        origin = failing.on_proxy
-        if origin is not None and left and self.on_proxy.is_met(origin):  # else the proxy could not be cut there
-            trees = self._trees(origin)
-            for _ in range(left):
-                new = [part for tree in trees for part in self._cut(tree, criterion)]
-                if len(new) > 1:
-                    return [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), part) for part in new]
-                criterion = criterion.scaled(TIGHTENING)
-        part = failing.on_solid
-        new = self._cut(self._tree(Component((part.vertices, part.faces))), self.goal) or [part]
-        return [_Lifted(part.hull, None, part) for part in new]
+    def _cut_again(self, part: Part) -> list[_Lifted]:
+        """Cut a part of the solid."""
+        tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
+        new = cut_and_merge(tree, self.goal, self.run).parts or [part]
+        return [_Lifted(part.hull, False, part) for part in new]
 
     def confirmed(self, hull: Hull) -> Part | None:
         """Get what the solid fills of a hull; None if it does not meet the goal."""
@@ -183,26 +163,11 @@ class Lift:
 
     def _failing(self, lifted: Sequence[_Lifted]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there before."""
-        fresh = [i for i, each in enumerate(lifted) if each.on_proxy is not None and not each.is_met]
+        fresh = [i for i, each in enumerate(lifted) if each.is_fresh and not each.is_met]
         verdicts = self.run.map(self.goal.is_met, [lifted[i].on_solid for i in fresh])
         for i, is_met in zip(fresh, verdicts, strict=True):
             lifted[i].is_met = is_met
         return [i for i in fresh if not lifted[i].is_met]
-
-    def _trees(self, part: Part) -> list[CutTree]:
-        """The cuts of a part of the proxy, made once for all criteria; of its pieces if these do not become one."""
-        whole = reunite(part.members)
-        return [self._tree(root) for root in ([whole] if whole is not None else part.members)]
-
-    def _tree(self, root: Component) -> CutTree:
-        return CutTree(root, self.policy, self.run)
-
-    def _cut(self, tree: CutTree, criterion: Criterion) -> list[Part]:
-        return cut_and_merge(tree, criterion, self.run).parts
-
-
-MARGIN = 1.5
-"""Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
 
 
 @dataclass(frozen=True)
@@ -247,7 +212,7 @@ class Model:
         if self.proxy is None:
             return parts
         with run.stage("lift"):
-            lift = Lift(self.solid, self.proxy.deviation, goal, self.tighter(goal), policy, run)
+            lift = Lift(self.solid, self.proxy.deviation, goal, policy, run)
             parts = lift(parts, mend=run.stopped_by is None)
             if merge and run.stopped_by is None:  # the margin may have kept some apart
                 looser = goal.scaled(1 + self._margin)

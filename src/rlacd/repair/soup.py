@@ -9,9 +9,10 @@ import numpy as np
 
 from rlacd._native import components, face_areas, long_normals, poll_stop
 from rlacd.solid.arrays import FloatArray, dots
+from rlacd.solid.hull import TOLERANCE
 from rlacd.solid.topology import NO_FILM, BoolArray, Edges, IntArray, Sides, has_marked, sides_of
 
-FLAT = 1e-6
+FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
 
 FLAPS = 0.05

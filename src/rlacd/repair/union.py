@@ -24,7 +24,7 @@ from rlacd.solid.topology import IntArray, compacted
 _FLAT_MESH = 1e-11
 
 # Number of triangles united at once; the work may be stopped between batches.
-_MESHES_UNITED = 20_000
+_MESHES_UNITED = 5 * MOST_UNITED
 
 # Pairs of crossing triangles, or corners of their arrangement, that are united at once; pairs after which solids are
 # not united exactly, and more per triangle: manifold3d takes about

@@ -27,14 +27,13 @@ from rlacd.solid.manifold import to_manifold
 from rlacd.solid.topology import BoolArray, IntArray
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
-# A room of an outer skin is filled from this share of the solid's volume on: rooms in furniture have 0.04 and more,
-# crevices at most 0.0023.
+# A room of an outer skin is filled from this share of the solid's volume on, slits up to it: rooms in furniture have
+# 0.04 and more, crevices at most 0.0023.
 _SLIT_VOLUME = 0.01
-# A slit is filled from this depth on, up to this width (multiples of the gap), if all slits hold no more than this
-# share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid. Between caps it may
-# be wider, as in a fridge whose bodies close each other. It may have no volume, but this share of the surface has to go
-# with the slits.
-_DEEP, _BESIDE, _BETWEEN_CAPS, _LITTLE, _BARED = 1.5, 1 / 16, 1 / 4, 1e-2, 0.004
+# A slit is filled from this depth on, up to this width (multiples of the gap): what is shallower needs no cut, and what
+# is wider leaves steps of the grid. Between caps it may be wider, as in a fridge whose bodies close each other. It may
+# have no volume, but this share of the surface has to go with the slits.
+_DEEP, _BESIDE, _BETWEEN_CAPS, _BARED = 1.5, 1 / 16, 1 / 4, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
 _TUNNELS = 25
 # Where a filled room has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
@@ -209,7 +208,7 @@ def fill_slits(work: Work) -> None:
         return
     wrap = _wrap(work, work.reach.around_points(points), _WRAP_ERROR, query)
     filled = unite([as_manifold(work.solid), wrap])
-    is_little = abs(volume_of(filled) / work.volume - 1) < _LITTLE
+    is_little = abs(volume_of(filled) / work.volume - 1) < _SLIT_VOLUME
     if is_little and area_of(filled) < (1 - _BARED) * area_of(work.solid):
         work.solid = filled
         work.parts.append(Piece(wrap, int(_with_slits(work).argmax())))
