@@ -31,9 +31,8 @@ void bind_concavity(nb::module_& m) {
          const TreeCache* tree) {
         const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
         if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
-        Concavity c;
         const TreeCache own;
-        c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
+        const Concavity c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
         const auto pair = [](const Interval& i) { return std::tuple(i.lower, i.upper); };
         return std::tuple(pair(c.value()), pair(c.part_to_hull), pair(c.hull_to_part), c.volume_radius);
       },
@@ -80,12 +79,8 @@ void bind_concavity(nb::module_& m) {
       .def(
           "joint_feasibilities",
           [](const Filling& self, const std::vector<const HullCorners*>& hulls,
-             const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs,
-             double threshold, int threads) {
-            const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
-            for (const std::int32_t g : pair)
-              if (g < 0 || g >= static_cast<std::int64_t>(hulls.size()) || hulls[g] == nullptr)
-                throw std::invalid_argument("pair out of range");
+             const PairsIn& pairs, double threshold, int threads) {
+            const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
             std::vector<double> volumes(pairs.shape(0));
             std::vector<std::int32_t> verdicts(pairs.shape(0));
             parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {

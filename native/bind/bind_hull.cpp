@@ -71,10 +71,8 @@ void bind_hull(nb::module_& m) {
   m.def(
       "joint_hull_volumes",
       [](const std::vector<const HullCorners*>& groups,
-         const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs, int threads) {
-        const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
-        for (const std::int32_t g : pair)
-          if (g < 0 || g >= static_cast<std::int64_t>(groups.size())) throw std::invalid_argument("pair out of range");
+         const PairsIn& pairs, int threads) {
+        const std::vector<std::int32_t> pair = to_numbers(pairs, groups.size());
         std::vector<double> volumes(pairs.shape(0));
         const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
         parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {

@@ -16,8 +16,7 @@ void bind_sweep(nb::module_& m) {
         const Mesh mesh = to_mesh(vertices, faces);
         const std::vector<Vec3> normals = to_points(directions);
         const std::vector<double> d(offsets.data(), offsets.data() + offsets.size());
-        std::vector<PlaneScore> scores = sweep(mesh, normals, d, threads);
-        return rows<double>(std::move(scores));
+        return rows<double>(sweep(mesh, normals, d, threads));
       },
       Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"),
       nb::arg("threads") = 0,

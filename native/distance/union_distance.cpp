@@ -1,11 +1,10 @@
 #include "distance/union_distance.hpp"
 
-#include <unordered_map>
-
 #include "base/stop.hpp"
 #include "cut/clip.hpp"
 #include "distance/surface_field.hpp"
 #include "mesh/curve.hpp"
+#include "mesh/weld.hpp"
 
 namespace rlacd {
 namespace {
@@ -26,32 +25,26 @@ constexpr double kSameWay = 0.5;
 class Gathering {
  public:
   void add(const Polygon& polygon) {
-    corner_.clear();
-    for (const Vec3 p : polygon) corner_.push_back(number_of(p));
-    for (std::size_t i = 2; i < corner_.size(); ++i) mesh_.faces.push_back({corner_[0], corner_[i - 1], corner_[i]});
+    const auto first = static_cast<std::int32_t>(soup_.vertices.size());
+    soup_.vertices.insert(soup_.vertices.end(), polygon.begin(), polygon.end());
+    for (auto i = static_cast<std::int32_t>(2); i < static_cast<std::int32_t>(polygon.size()); ++i)
+      soup_.faces.push_back({first, first + i - 1, first + i});
   }
-  Mesh take() { return std::move(mesh_); }
+  Mesh take() {
+    const std::vector<std::int32_t> first = first_in_place(soup_.vertices);
+    std::vector<std::int32_t> number(first.size());
+    Mesh mesh;
+    for (std::size_t v = 0; v < first.size(); ++v) {
+      const bool is_new = first[v] == static_cast<std::int32_t>(v);
+      number[v] = is_new ? static_cast<std::int32_t>(mesh.vertices.size()) : number[first[v]];
+      if (is_new) mesh.vertices.push_back(soup_.vertices[v]);
+    }
+    for (const auto& [a, b, c] : soup_.faces) mesh.faces.push_back({number[a], number[b], number[c]});
+    return mesh;
+  }
 
  private:
-  using Key = std::array<double, 3>;
-  struct Hash {
-    std::size_t operator()(const Key& p) const {
-      std::size_t all = 0;
-      for (const double x : p) all = (all ^ std::hash<double>()(x)) * 0x9e3779b97f4a7c15u;
-      return all;
-    }
-  };
-
-  std::int32_t number_of(Vec3 p) {
-    const auto next = static_cast<std::int32_t>(mesh_.vertices.size());
-    const auto [place, is_new] = number_.try_emplace(Key{p.x, p.y, p.z}, next);
-    if (is_new) mesh_.vertices.push_back(p);
-    return place->second;
-  }
-
-  Mesh mesh_;
-  std::unordered_map<Key, std::int32_t, Hash> number_;
-  std::vector<std::int32_t> corner_;
+  Mesh soup_;
 };
 
 // Whether a triangle lies farther than `gap` beyond a plane.

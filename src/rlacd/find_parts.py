@@ -241,10 +241,8 @@ def _scale(criterion: Criterion) -> float | None:
 
 
 COARSER = 1.5
-"""The threshold grows by this factor until one part is left. In between, parts are united two at a time."""
-
-LONG_MERGING = 8e6
-"""Units of work (see `rlacd.run.work`) after which it grows by the fourth power of that: only tangles take so long."""
+"""The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
+only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
 
 
 def best_within(
@@ -282,7 +280,7 @@ def best_within(
                     best, least = state, error
             if len(parts) <= 1 or run.stopped_by is not None:
                 return best
-            factor *= COARSER if run.work.done - begin < LONG_MERGING else COARSER**4
+            factor *= COARSER if run.work.done - begin < MOST_CUTTING else COARSER**4
     except Stopped:
         run.note_stop()
     return best

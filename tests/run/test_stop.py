@@ -18,10 +18,10 @@ import trimesh
 import rlacd
 from rlacd import _native, decompose_mesh
 from rlacd.io.read.load import load_mesh
-from rlacd.merge.slivers import SLIVER_RADIUS
 from rlacd.run import Run
 from rlacd.solid.cover import MOST_HULLS, cover
 from rlacd.solid.distance import hull_distances
+from rlacd.solid.hull import SLIVER_RADIUS
 from rlacd.solid.topology import point_bodies
 from tests.hulls import assert_covers
 from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain

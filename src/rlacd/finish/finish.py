@@ -34,15 +34,12 @@ from rlacd.options.presets import HullLimits
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
-from rlacd.solid.distance import hull_union
+from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
 from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
-
-FEW_TO_DOUBT = 2000
-"""Solids of at most this many triangles are sampled at as many points after a stop: do the hulls cover them?"""
 
 
 class Finished(NamedTuple):
@@ -56,10 +53,10 @@ class Finished(NamedTuple):
 def misses_some(reached: Reached, run: Run) -> bool:
     """Whether a stop left parts that miss some of a small solid, as happens to one that crosses itself."""
     solid = reached.solid
-    if run.stopped_by is None or not 0 < len(solid.faces) <= FEW_TO_DOUBT:
+    if run.stopped_by is None or not 0 < len(solid.faces) <= PLACES:
         return False
     with run.shielded():
-        inner, _ = _native.sample_surface(solid.vertices, solid.faces, FEW_TO_DOUBT, 0)
+        inner, _ = _native.sample_surface(solid.vertices, solid.faces, PLACES, 0)
         hulls = hull_union([part.hull for part in reached.parts], run.threads)
         away = hulls.distance(np.concatenate([solid.vertices, inner]), run.threads)
         return bool(away.max() > COVERAGE_TOLERANCE)

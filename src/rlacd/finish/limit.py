@@ -15,7 +15,7 @@ from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, dots, heights
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import NO_SIDES, TOLERANCE, Hull, keeps, limit_hull
 
@@ -133,10 +133,6 @@ def kept_within(part: Part, sides: FloatArray, criterion: Criterion) -> Part:
     return clipped if criterion.is_met(clipped) or not criterion.is_met(part) else part
 
 
-MOST_POINTS_TAKEN_IN = 10_000
-"""Of more points than this, only every second, third, ... is looked at."""
-
-
 def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> list[Part]:
     """Grow the hull nearest to each point to take it in, unless the hull's part then breaks the criterion.
 
@@ -144,7 +140,8 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     ----------
     parts : sequence of Part
     points : float64 [N, 3]
-        A hull that holds one already is skipped: its part is going to be dropped.
+        A hull that holds one already is skipped: its part is going to be dropped. Of more than `DENSE`, only every
+        second, third, ... is looked at.
     criterion : Criterion
 
     Returns
@@ -152,7 +149,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     list of Part
         In the same order, some with larger hulls.
     """
-    points = points[:: 1 + len(points) // MOST_POINTS_TAKEN_IN]
+    points = points[:: 1 + len(points) // DENSE]
     distance = np.array([hull_union([part.hull], 1).distance(points, 1) for part in parts])
     taker = np.where(distance > 0, distance, np.inf).argmin(axis=0)
     grown = list(parts)

@@ -13,11 +13,8 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
-from rlacd.solid.hull import Hull
+from rlacd.solid.hull import SLIVER_RADIUS, Hull
 from rlacd.solid.topology import BoolArray
-
-SLIVER_RADIUS = 0.01
-"""A hull is a sliver if the radius of its inscribed ball is below this share of its largest extent."""
 
 FILM = HALF_THICKNESS / 5
 """Mean thickness below which a part is a film left by rounding: real sheets are ten times thicker."""

@@ -18,10 +18,10 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import merge_lifted
 from rlacd.policies import Policy
-from rlacd.proxy.simplify import FEW_TRIANGLES, Proxy, simplify
+from rlacd.proxy.simplify import Proxy, simplify
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.frame import GROWTH_TO_SPARE, HALF_THICKNESS
 from rlacd.solid.hull import TOLERANCE, Hull, limit_hull
 from rlacd.solid.solid import Shape
@@ -190,7 +190,7 @@ class Model:
     def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, run: Run) -> Model:
         """Make the model of a solid; `pieces` are closed solids whose union it is (see `simplify`)."""
         proxy = None
-        if math.isfinite(goal.overhang) and len(solid.faces) >= FEW_TRIANGLES:
+        if math.isfinite(goal.overhang) and len(solid.faces) >= DENSE:
             try:
                 with run.stage("simplify"):
                     proxy = simplify(solid, goal.overhang, run.threads, pieces)

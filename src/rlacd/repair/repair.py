@@ -24,7 +24,7 @@ from rlacd.repair.soup import MOST_PATCHES, Soup
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import are_unbuilt, build_slabs, build_walls, has_sheets, skins
-from rlacd.repair.windings import MOST_TANGLED, are_crowded, are_oriented, is_tangle, sort_out, take_as_they_are
+from rlacd.repair.windings import are_crowded, are_oriented, is_tangle, sort_out, take_as_they_are
 from rlacd.repair.work import STEPS as NAMES
 from rlacd.repair.work import Piece, Wanted, Work, measure, query_of
 from rlacd.repair.wraps import (
@@ -39,6 +39,7 @@ from rlacd.repair.wraps import (
     wrap_sheets,
 )
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
@@ -165,7 +166,7 @@ def repair(
     poll_stop()
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
     taken = one_body(welded_vertices, welded_faces)
-    if taken is not None and not (len(corners) <= MOST_TANGLED and is_tangle(query_of(taken[0], threads))):
+    if taken is not None and not (len(corners) <= DENSE and is_tangle(query_of(taken[0], threads))):
         shape, was_inward = taken
         row = BodyRepair(0, "reoriented" if was_inward else "closed", len(welded_faces), len(welded_faces), 0.0)
         return Solid(shape, (welded_vertices, welded_faces), frame, (row,), mesh.warnings, is_as_given=True)

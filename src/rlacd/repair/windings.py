@@ -18,6 +18,8 @@ from rlacd.repair.soup import FLAPS, FLAT, Soup, face_normals
 from rlacd.repair.union import split_labels
 from rlacd.repair.work import Piece, Work
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE
+from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.topology import BoolArray, IntArray, is_balanced, marked
@@ -88,27 +90,22 @@ def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> S
 
 TANGLED = 0.02
 """Share of a surface that is inside out from which it is a tangle. Of 600 meshes that people have made, all have up to
-0.012 but for one with 0.042, which became 1,408 hulls; tangles found by fuzzing have 0.027 and more."""
-
-# Number of places where a surface is looked at.
-_PLACES = 1000
-
-MOST_TANGLED = 10 * _PLACES
-"""A body of more triangles is no tangle: it is noise that turns some of them over, and its proxy averages that."""
+0.012 but for one with 0.042, which became 1,408 hulls; tangles found by fuzzing have 0.027 and more. Dense bodies are
+none: noise turns some of their triangles over, and their proxies average that."""
 
 
 def is_tangle(solid: SurfaceQuery) -> bool:
     """Whether a closed surface is inside out in too many places."""
-    return bool(_inside_out(solid, _PLACES)[1].mean() > TANGLED)
+    return bool(_inside_out(solid, PLACES)[1].mean() > TANGLED)
 
 
 def tangled_bodies(solid: SurfaceQuery, vertices: FloatArray, faces: IntArray, body: IntArray) -> IntArray:
     """Return the bodies of which too much is inside out, given the faces that the solid was built from."""
-    points, is_wrong = _inside_out(solid, MOST_TANGLED)  # enough to tell in which bodies
+    points, is_wrong = _inside_out(solid, DENSE)  # enough to tell in which bodies
     at = body[SurfaceQuery(vertices, faces, solid.threads).closest(points)[1]]
     count = len(np.bincount(body))
     is_tangled = np.bincount(at, is_wrong, count) > TANGLED * np.bincount(at, minlength=count)
-    return np.flatnonzero(is_tangled & (np.bincount(body) <= MOST_TANGLED))
+    return np.flatnonzero(is_tangled & (np.bincount(body) <= DENSE))
 
 
 def _inside_out(solid: SurfaceQuery, count: int) -> tuple[FloatArray, BoolArray]:

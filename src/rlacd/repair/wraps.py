@@ -19,9 +19,10 @@ from rlacd.repair.union import (
 )
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.repair.walls import skins
-from rlacd.repair.windings import MOST_TANGLED, is_tangle, tangled_bodies
+from rlacd.repair.windings import is_tangle, tangled_bodies
 from rlacd.repair.work import Piece, Work, query_of
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.topology import BoolArray, IntArray
@@ -80,7 +81,7 @@ def wrap_all(work: Work) -> None:
 
 def is_inside_out(work: Work) -> bool:
     """Whether some bodies cross too much of their own surface to be cut."""
-    return work.volume != 0 and np.bincount(work.soup.body).min() <= MOST_TANGLED and is_tangle(work.query())
+    return work.volume != 0 and np.bincount(work.soup.body).min() <= DENSE and is_tangle(work.query())
 
 
 def rebuild_tangles(work: Work) -> None:

@@ -24,6 +24,10 @@ DISTANCE_ACCURACY = 2 * HALF_THICKNESS
 """Default width of the intervals: 0.1 % of the input's longest side in the normalised frame."""
 
 
+PLACES = 2000
+"""Number of places at which it is looked how something compares with what it stands for."""
+
+
 @dataclass(frozen=True)
 class HullDistances:
     """How closely hulls approximate a surface.
