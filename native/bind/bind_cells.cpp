@@ -21,9 +21,7 @@ Cell shape_of(const Grid& grid) {
 void bind_cells(nb::module_& m) {
   m.def(
       "label_cells",
-      [](const GridIn<bool>& marks) {
-        return rows<std::int64_t>(label_cells(marks.data(), shape_of(marks)));
-      },
+      [](const GridIn<bool>& marks) { return rows<std::int64_t>(label_cells(marks.data(), shape_of(marks))); },
       Released(), nb::arg("marks"),
       "Labels [X * Y * Z] of the connected sets of marked cells [X, Y, Z], which share sides, from 1 on by their "
       "first\n"

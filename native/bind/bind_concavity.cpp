@@ -70,16 +70,15 @@ void bind_concavity(nb::module_& m) {
       .def(
           "feasibility",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
-            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
-            return static_cast<int>(self.feasibility(hull, threshold));
+            return static_cast<int>(self.feasibility(to_finite_mesh(hull_vertices, hull_faces), threshold));
           },
           Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
           "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
       .def(
           "joint_feasibilities",
-          [](const Filling& self, const std::vector<const HullCorners*>& hulls,
-             const PairsIn& pairs, double threshold, int threads) {
+          [](const Filling& self, const std::vector<const HullCorners*>& hulls, const PairsIn& pairs, double threshold,
+             int threads) {
             const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
             std::vector<double> volumes(pairs.shape(0));
             std::vector<std::int32_t> verdicts(pairs.shape(0));
@@ -99,8 +98,7 @@ void bind_concavity(nb::module_& m) {
       .def(
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
-            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
-            return self.comes_deeper(hull, threshold);
+            return self.comes_deeper(to_finite_mesh(hull_vertices, hull_faces), threshold);
           },
           Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")

@@ -70,8 +70,7 @@ void bind_hull(nb::module_& m) {
       "Whether a ball of this radius fits into a convex hull.");
   m.def(
       "joint_hull_volumes",
-      [](const std::vector<const HullCorners*>& groups,
-         const PairsIn& pairs, int threads) {
+      [](const std::vector<const HullCorners*>& groups, const PairsIn& pairs, int threads) {
         const std::vector<std::int32_t> pair = to_numbers(pairs, groups.size());
         std::vector<double> volumes(pairs.shape(0));
         const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);

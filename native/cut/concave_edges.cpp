@@ -194,9 +194,8 @@ CandidatePlane turned(const CandidatePlane& plane) {
   return {Vec3{} - plane.normal, -plane.offset};
 }
 
-}  // namespace
-
-std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull, std::size_t count) {
+// Up to `count` of a mesh's reflex edges; edges that offer no new plane are never chosen.
+std::vector<ReflexEdge> chosen_edges(const Mesh& mesh, const Mesh& hull, std::size_t count) {
   const std::vector<ReflexEdge> edges = reflex_edges(mesh);
   if (edges.empty() || count == 0) return {};
   const Box box = Box::of(hull.vertices);
@@ -222,10 +221,12 @@ std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull,
   return spread_out(contenders, PlaneSpace(box), count);
 }
 
-std::vector<CandidatePlane> planes_of_edges(const Mesh& mesh, const Mesh& hull, const std::vector<ReflexEdge>& edges) {
+}  // namespace
+
+std::vector<CandidatePlane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_t count) {
   const PlaneSpace space(Box::of(hull.vertices));
   std::vector<CandidatePlane> planes;
-  for (const ReflexEdge& edge : edges) {
+  for (const ReflexEdge& edge : chosen_edges(mesh, hull, count)) {
     EdgePlanes own = planes_of(mesh, edge);
     for (const int side : {0, 1})
       own[side + 1].offset = above_face(mesh, mesh.faces[edge.face[side]], own[side + 1].normal);

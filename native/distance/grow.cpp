@@ -70,9 +70,7 @@ class Growth {
         if (is_in(node.box[side])) {
           const Box& box = node.box[side];
           const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
-          open_.push({distance([&](Vec3 n) {
-                        return dot(n, middle) - reach_along(n, half);
-                      }),
+          open_.push({distance([&](Vec3 n) { return dot(n, middle) - reach_along(n, half); }),
                       node.child[side],
                       box,
                       -1,

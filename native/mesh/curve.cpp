@@ -29,8 +29,7 @@ std::uint32_t place_on_curve(Vec3 p, const Box& box) {
   return place;
 }
 
-}  // namespace
-
+// The order of points, all in a box, along the curve; points of one cell stay in their order.
 std::vector<std::int32_t> order_along_a_curve(const std::vector<Vec3>& points, const Box& box) {
   poll_stop();
   std::vector<std::uint32_t> place(points.size());
@@ -41,6 +40,8 @@ std::vector<std::int32_t> order_along_a_curve(const std::vector<Vec3>& points, c
   std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return place[a] < place[b]; });
   return order;
 }
+
+}  // namespace
 
 std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
   std::vector<Vec3> middles;
