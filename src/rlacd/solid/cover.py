@@ -17,7 +17,7 @@ from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import LATE, to_manifold
 from rlacd.solid.solid import Solid, surface_of
-from rlacd.solid.topology import compacted, marked, point_bodies
+from rlacd.solid.topology import compacted, point_bodies
 
 MOST_HULLS = 2000
 """If there are more bodies, neighbours along a space-filling curve share a hull."""
@@ -68,7 +68,7 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
 
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
     """The points [N, 3] of each body, or of several bodies near each other."""
-    used = np.flatnonzero(marked(faces, len(vertices)))
+    used = np.unique(faces)
     _, body = np.unique(point_bodies(vertices, faces)[used], return_inverse=True)
     count = int(body.max()) + 1
     order = np.argsort(body, kind="stable")
