@@ -37,6 +37,9 @@ STARTS = 600
 
 MOST_LISTED = 50
 
+LOOKED_AT = 5
+"""Places along a passage at which what is left is measured."""
+
 ACCURACY = LEAST_LOSS / 2
 """Share of its radius to within which what is left of a ball is measured; less counts as closed."""
 
@@ -97,14 +100,14 @@ def _is_long(balls: Balls) -> bool:
 def _narrowest(balls: Balls, union: _native.HullUnion) -> tuple[FloatArray, float, float]:
     """Centre and radius of the ball of a passage of which least is left, and how much.
 
-    Of balls whose centres are about as much covered, three along the passage are looked at: where it opens, part of a
+    Of balls whose centres are about as much covered, some along the passage are looked at: where it opens, part of a
     ball is outside of it.
     """
     covered = union.distance(balls.centres, 1) / balls.radii
     some = np.flatnonzero(covered <= covered.min() + LEAST_LOSS)
     axis = int(np.ptp(balls.centres, axis=0).argmax())
     along = some[np.argsort(balls.centres[some, axis], kind="stable")]
-    looked_at = np.unique(along[[0, len(along) // 2, -1]]).tolist()
+    looked_at = along[np.unique(np.linspace(0, len(along) - 1, LOOKED_AT).astype(int))].tolist()
     left = [_left(union, balls.centres[i], balls.radii[i]) for i in looked_at]
     worst = int(np.argmin(np.array(left) / balls.radii[looked_at]))
     i = looked_at[worst]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rlacd._native import Stopped
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, heights, length
-from rlacd.solid.component import Part
+from rlacd.solid.component import DENSE, Part
 from rlacd.solid.frame import HALF_THICKNESS, Frame, thickened
 from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.input_mesh import InputMesh
@@ -22,10 +22,6 @@ from rlacd.solid.topology import compacted, point_bodies
 MOST_HULLS = 2000
 """If there are more bodies, neighbours along a space-filling curve share a hull."""
 
-FEW_POINTS = 10_000
-"""When time has run out, bodies with fewer points than this get their box only; others are looked at in blocks of so
-many."""
-
 _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
@@ -33,8 +29,8 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
     """Return the hull of every body of an input, without repairing anything.
 
     Faces that share a corner, or have corners at the same place, form one body. The hull of a body holds all of its
-    points. After `LATE` seconds the rest get looser hulls, of supporting planes in 26 directions: exact hulls of half a
-    million corners take seconds.
+    points. After `LATE` seconds the rest get looser hulls, as exact ones of half a million corners take seconds: boxes,
+    and from `DENSE` points on the supporting planes in 26 directions, found in blocks of so many points.
 
     Parameters
     ----------
@@ -100,7 +96,7 @@ def _hull(points: FloatArray, run: Run) -> Hull:
             return exact
     except Stopped:
         with run.shielded():
-            return _touching(points) if len(points) > FEW_POINTS else _box(points)
+            return _touching(points) if len(points) > DENSE else _box(points)
     with run.shielded():
         return Hull.of(thickened(points)) or _box(points)
 
@@ -108,8 +104,8 @@ def _hull(points: FloatArray, run: Run) -> Hull:
 def _touching(points: FloatArray) -> Hull:
     """The polytope of the supporting planes of points [N, 3] in `_DIRECTIONS`."""
     reach = np.full(len(_DIRECTIONS), -np.inf)
-    for first in range(0, len(points), FEW_POINTS):
-        np.maximum(reach, heights(points[first : first + FEW_POINTS], _DIRECTIONS).max(axis=0), out=reach)
+    for first in range(0, len(points), DENSE):
+        np.maximum(reach, heights(points[first : first + DENSE], _DIRECTIONS).max(axis=0), out=reach)
     box = _box(points)
     body = to_manifold(box.vertices, box.faces)
     for direction, offset in zip(_DIRECTIONS, reach + 2 * TOLERANCE, strict=True):
