@@ -10,6 +10,7 @@
 #include "distance/filling.hpp"
 #include "mesh/curve.hpp"
 #include "mesh/edges.hpp"
+#include "mesh/least_bent.hpp"
 #include "mesh/near_boxes.hpp"
 #include "mesh/point_tree.hpp"
 #include "mesh/spread_points.hpp"
@@ -132,6 +133,22 @@ void bind_mesh(nb::module_& m) {
       "to its larger vertex by the right-hand rule, and the sides [3F, 2] of their faces that do: 2 f is the front of "
       "face f,\n"
       "2 f + 1 its back. Coincident faces, and trusted ones [F], alternate as their windings require.");
+  m.def(
+      "least_bent",
+      [](const PointsIn& points, const PointsIn& beside, const std::optional<MarksIn>& taken) {
+        const std::size_t count = points.shape(0);
+        if (count < 3) throw std::invalid_argument("a loop has at least three points");
+        if (beside.shape(0) != count) throw std::invalid_argument("not as many normals as points");
+        const Loop loop = {to_points(points), to_points(beside), to_marks(taken, count * count)};
+        require_finite(loop.points);
+        return rows<std::int32_t>(least_bent(loop));
+      },
+      Released(), nb::arg("points"), nb::arg("beside"), nb::arg("taken") = nb::none(),
+      "Triangulates a closed loop [N, 3] with the least bending; [N - 2, 3], wound like the loop. `beside` [N, 3] has "
+      "the\n"
+      "unit normals of the faces beyond its edges, which run against it; `taken` [N, N] marks pairs of points that "
+      "should\n"
+      "not get an edge.");
   m.def(
       "components",
       [](std::int64_t count, const NodesIn& a, const NodesIn& b) {

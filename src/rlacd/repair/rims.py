@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import mapbox_earcut
 import numpy as np
 
-from rlacd._native import components, long_normals, poll_stop
+from rlacd._native import components, least_bent, long_normals, poll_stop
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
 from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.topology import BoolArray, IntArray, both_sides, has_marked, marked, nondegenerate
@@ -239,31 +239,65 @@ def _cycles(follower: IntArray) -> list[IntArray]:
     return cycles
 
 
+# Optimal triangulation considers all triples of corners; longer loops are cut by ears.
+_EXACT_LOOP = 60
 # Where a cap turns by less than this from a face beside it, it continues the face (cosine of 45 degrees).
 _SMOOTH_RIM = 0.7
 
 
 def caps_of(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
-    """Triangulate the loops.
+    """Triangulate the loops, no two across the same edge if possible.
 
     Returns the faces ``[C, 3]``, without those with a repeated vertex, and the loop ``[C]`` of each.
     """
-    caps = [loop[cap(soup.vertices[loop])] for loop in rims.loops]
+    count = len(soup.vertices)
+    edges = soup.edges.vertices @ np.array([count, 1])  # in ascending order
+    across: dict[int, list[int]] = {}
+    caps = []
+    for loop, beside in zip(rims.loops, rims.beside, strict=True):
+        poll_stop()
+        taken = None
+        if 3 < len(loop) <= _EXACT_LOOP:
+            low, high = np.minimum(loop[:, None], loop), np.maximum(loop[:, None], loop)
+            at = np.minimum(np.searchsorted(edges, low * count + high), len(edges) - 1)
+            taken = (edges[at] == low * count + high) | (low == high)
+            places: dict[int, list[int]] = {}
+            for i, vertex in enumerate(loop.tolist()):
+                places.setdefault(vertex, []).append(i)
+            for i, vertex in enumerate(loop.tolist()):
+                taken[i, [place for other in across.get(vertex, ()) for place in places.get(other, ())]] = True
+        caps.append(loop[cap(soup.vertices[loop], rims.normals[beside], taken)])
+        for a, b, c in caps[-1].tolist() if len(loop) > 3 else ():
+            for here, there in ((a, (b, c)), (b, (c, a)), (c, (a, b))):
+                across.setdefault(here, []).extend(there)
     owner = np.repeat(np.arange(len(caps)), [len(some) for some in caps])
     faces = np.concatenate(caps)
     real = nondegenerate(faces)
     return faces[real], owner[real]
 
 
-def cap(points: FloatArray) -> IntArray:
-    """Triangulate a closed loop of points ``[N, 3]`` as seen along its plane; a loop may visit a place twice.
+def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) -> IntArray:
+    """Triangulate a closed loop of points; a loop may visit a place twice.
 
-    Returns ``[N - 2, 3]`` corners, all of them points of the loop, oriented against the loop to match the adjacent
-    faces.
+    Parameters
+    ----------
+    points
+        ``[N, 3]``.
+    beside
+        ``[N, 3]``, the unit normal of the face on the other side of the edge from each point to the next. It runs along
+        that edge in the order of the loop.
+    taken
+        ``[N, N]``, pairs of points that must not get an edge, because one exists already or because they are equal.
+
+    Returns
+    -------
+    IntArray
+        ``[N - 2, 3]`` corners, all of them points of the loop, oriented against the loop to match the adjacent faces.
     """
-    poll_stop()
     if len(points) <= 3:
         return np.array([[0, 2, 1]])
+    if len(points) <= _EXACT_LOOP:
+        return least_bent(points, beside, taken)[:, ::-1].astype(np.int64)
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
     flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
