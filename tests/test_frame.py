@@ -7,7 +7,7 @@ from hypothesis.extra import numpy as hnp
 
 import rlacd
 from fuzz.geometry import Polytope
-from rlacd.finish.in_input import in_input
+from rlacd.finish.finish import in_input
 from rlacd.options.presets import HullLimits
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull

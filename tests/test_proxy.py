@@ -12,7 +12,8 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
-from rlacd.proxy import Lift, simplify
+from rlacd.proxy.model import Lift
+from rlacd.proxy.simplify import simplify
 from rlacd.repair.union import unite
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part
@@ -106,7 +107,7 @@ def test_a_part_without_room_below_the_threshold_keeps_its_own_hull() -> None:
         middle = (broken + met) / 2
         broken, met = (broken, middle) if Concavity(middle).is_met(solid) else (middle, met)
     goal, policy = Concavity(met), make_policy("greedy", SweepCache(), None)
-    lift = Lift(solid, proxy.deviation, goal, Concavity(0.2), policy, Run(1))
+    lift = Lift(solid, proxy.deviation, goal, policy, Run(1))
     (part,) = lift([proxy.component])
     assert goal.is_met(part)
     assert hull_union([part.hull], 1).distance(solid.vertices, 1).max() <= 1e-9

@@ -12,20 +12,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from rlacd import _native
+from rlacd._native import components, face_areas, long_normals, signed_tetrahedra
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.repair.union import unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.topology import (
-    Edges,
-    bodies_of,
-    components,
-    face_areas,
-    first_of_doubled,
-    has_marked,
-    long_normals,
-    signed_tetrahedra,
-)
+from rlacd.solid.topology import Edges, bodies_of, first_of_doubled, has_marked
 
 
 def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,9 @@ namespace nb = nanobind;
 using PointsIn = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using FacesIn = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using VectorIn = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using IndicesIn = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using PairsIn = nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using PlanesIn = nb::ndarray<const double, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
 
 static_assert(sizeof(Vec3) == 3 * sizeof(double), "points are copied as raw rows");
 static_assert(sizeof(Triangle) == 3 * sizeof(std::int32_t), "faces are copied as raw rows");
@@ -29,6 +32,15 @@ inline std::vector<Vec3> to_points(const PointsIn& array) {
   std::vector<Vec3> points(array.shape(0));
   if (!points.empty()) std::memcpy(static_cast<void*>(points.data()), array.data(), points.size() * sizeof(Vec3));
   return points;
+}
+
+// Copies numbers of `count` items in, and checks them.
+template <class Array>
+std::vector<std::int32_t> to_numbers(const Array& array, std::size_t count) {
+  std::vector<std::int32_t> numbers(array.data(), array.data() + array.size());
+  for (const std::int32_t i : numbers)
+    if (i < 0 || i >= static_cast<std::int64_t>(count)) throw std::invalid_argument("a number is out of range");
+  return numbers;
 }
 
 // Copies faces in and checks their indices, so that no kernel can read out of bounds.

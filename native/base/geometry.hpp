@@ -34,12 +34,51 @@ inline double max_abs(Vec3 a) { return std::max(std::max(std::fabs(a.x), std::fa
 
 using Triangle = std::array<std::int32_t, 3>;  // indices of the corners, counter-clockwise seen from outside
 
+constexpr double kPi = 3.14159265358979323846;
+
 using PlanePoint = std::array<double, 2>;
+
+// Twice the area of a triangle, positive if it is counter-clockwise.
+inline double doubled_area(PlanePoint a, PlanePoint b, PlanePoint c) {
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+// Whether the segments a-b and c-d cross between their ends, and where: shares of the way along each.
+inline bool do_cross(PlanePoint a, PlanePoint b, PlanePoint c, PlanePoint d, std::array<double, 2>& along) {
+  const double c_side = doubled_area(a, b, c), d_side = doubled_area(a, b, d);
+  if (!(c_side < 0 ? d_side > 0 : c_side > 0 && d_side < 0)) return false;
+  const double a_side = doubled_area(c, d, a), b_side = doubled_area(c, d, b);
+  if (!(a_side < 0 ? b_side > 0 : a_side > 0 && b_side < 0)) return false;
+  along = {a_side / (a_side - b_side), c_side / (c_side - d_side)};
+  return true;
+}
 
 struct Mesh {
   std::vector<Vec3> vertices;
   std::vector<Triangle> faces;
 };
+
+using Corners = std::array<Vec3, 3>;
+inline Corners corners_of(const Mesh& mesh, const Triangle& face) {
+  return {mesh.vertices[face[0]], mesh.vertices[face[1]], mesh.vertices[face[2]]};
+}
+// Normal to a triangle, twice as long as its area.
+inline Vec3 long_normal(const Corners& t) { return cross(t[1] - t[0], t[2] - t[0]); }
+inline Vec3 long_normal(const Mesh& mesh, const Triangle& face) { return long_normal(corners_of(mesh, face)); }
+
+// The side from corner k to the next that is longest, the first of several.
+inline int longest_side(const Corners& t) {
+  int longest = 0;
+  for (int k = 1; k < 3; ++k)
+    if (norm2(t[(k + 1) % 3] - t[k]) > norm2(t[(longest + 1) % 3] - t[longest])) longest = k;
+  return longest;
+}
+
+inline void append(Mesh& out, const Mesh& other) {
+  const auto first = static_cast<std::int32_t>(out.vertices.size());
+  out.vertices.insert(out.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const Triangle& f : other.faces) out.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
+}
 
 struct Box {
   Vec3 lower{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
@@ -47,6 +86,12 @@ struct Box {
   Vec3 upper{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
              -std::numeric_limits<double>::infinity()};
 
+  template <class Points>
+  static Box of(const Points& points) {
+    Box box;
+    for (const Vec3 p : points) box.extend(p);
+    return box;
+  }
   void extend(Vec3 p) {
     lower = {std::min(lower.x, p.x), std::min(lower.y, p.y), std::min(lower.z, p.z)};
     upper = {std::max(upper.x, p.x), std::max(upper.y, p.y), std::max(upper.z, p.z)};
@@ -59,6 +104,24 @@ struct Box {
   bool holds(Vec3 p) const {
     return lower.x <= p.x && p.x <= upper.x && lower.y <= p.y && p.y <= upper.y && lower.z <= p.z && p.z <= upper.z;
   }
+  bool meets(const Box& other, double slack = 0) const {
+    for (int axis = 0; axis < 3; ++axis)
+      if (lower[axis] > other.upper[axis] + slack || other.lower[axis] > upper[axis] + slack) return false;
+    return true;
+  }
+  double distance2(Vec3 p) const {
+    double sum = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double d = std::max({lower[axis] - p[axis], p[axis] - upper[axis], 0.0});
+      sum += d * d;
+    }
+    return sum;
+  }
 };
+
+// How far a box reaches from its middle along a direction, given half its extents.
+inline double reach_along(Vec3 n, Vec3 half) {
+  return std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z;
+}
 
 }  // namespace rlacd

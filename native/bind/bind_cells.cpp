@@ -21,10 +21,7 @@ Cell shape_of(const Grid& grid) {
 void bind_cells(nb::module_& m) {
   m.def(
       "label_cells",
-      [](const GridIn<bool>& marks) {
-        std::vector<std::int64_t> labels = label_cells(marks.data(), shape_of(marks));
-        return rows<std::int64_t>(std::move(labels));
-      },
+      [](const GridIn<bool>& marks) { return rows<std::int64_t>(label_cells(marks.data(), shape_of(marks))); },
       Released(), nb::arg("marks"),
       "Labels [X * Y * Z] of the connected sets of marked cells [X, Y, Z], which share sides, from 1 on by their "
       "first\n"
@@ -40,8 +37,7 @@ void bind_cells(nb::module_& m) {
             if (cells[n][axis] < 0 || cells[n][axis] >= shape[axis]) throw std::invalid_argument("a cell off the grid");
           }
         if (!(reach >= 0 && reach < 1000)) throw std::invalid_argument("the reach has to be from 0 to 1000 cells");
-        std::vector<std::int64_t> nearest = nearest_labels(labels.data(), shape, cells, reach);
-        return rows<std::int64_t>(std::move(nearest));
+        return rows<std::int64_t>(nearest_labels(labels.data(), shape, cells, reach));
       },
       Released(), nb::arg("labels"), nb::arg("cells"), nb::arg("reach"),
       "The label [N] of the nearest labelled cell of a grid [X, Y, Z] at most `reach` cells away from each cell [N, "

@@ -31,9 +31,8 @@ void bind_concavity(nb::module_& m) {
          const TreeCache* tree) {
         const Mesh part = to_finite_mesh(part_vertices, part_faces), hull = to_finite_mesh(hull_vertices, hull_faces);
         if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
-        Concavity c;
         const TreeCache own;
-        c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
+        const Concavity c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
         const auto pair = [](const Interval& i) { return std::tuple(i.lower, i.upper); };
         return std::tuple(pair(c.value()), pair(c.part_to_hull), pair(c.hull_to_part), c.volume_radius);
       },
@@ -71,21 +70,16 @@ void bind_concavity(nb::module_& m) {
       .def(
           "feasibility",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
-            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
-            return static_cast<int>(self.feasibility(hull, threshold));
+            return static_cast<int>(self.feasibility(to_finite_mesh(hull_vertices, hull_faces), threshold));
           },
           Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
           "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
       .def(
           "joint_feasibilities",
-          [](const Filling& self, const std::vector<const HullCorners*>& hulls,
-             const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs,
-             double threshold, int threads) {
-            const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
-            for (const std::int32_t g : pair)
-              if (g < 0 || g >= static_cast<std::int64_t>(hulls.size()) || hulls[g] == nullptr)
-                throw std::invalid_argument("pair out of range");
+          [](const Filling& self, const std::vector<const HullCorners*>& hulls, const PairsIn& pairs, double threshold,
+             int threads) {
+            const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
             std::vector<double> volumes(pairs.shape(0));
             std::vector<std::int32_t> verdicts(pairs.shape(0));
             parallel_for(volumes.size(), resolve_threads(threads), [&](std::size_t i) {
@@ -104,8 +98,7 @@ void bind_concavity(nb::module_& m) {
       .def(
           "comes_deeper",
           [](const Filling& self, const PointsIn& hull_vertices, const FacesIn& hull_faces, double threshold) {
-            const Mesh hull = to_finite_mesh(hull_vertices, hull_faces);
-            return self.comes_deeper(hull, threshold);
+            return self.comes_deeper(to_finite_mesh(hull_vertices, hull_faces), threshold);
           },
           Released(), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("threshold"),
           "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
@@ -135,12 +128,10 @@ void bind_concavity(nb::module_& m) {
           "uncovered",
           [](const Filling& self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces,
              double reach, double grain, int threads) {
-            if (vertices.empty() || vertices.size() != faces.size())
-              throw std::invalid_argument("there must be one array of faces for each array of vertices");
+            if (vertices.empty()) throw std::invalid_argument("there are no hulls");
             if (!(grain > 0)) throw std::invalid_argument("the grain must be positive");
-            std::vector<Mesh> hulls;
-            for (std::size_t i = 0; i < vertices.size(); ++i) hulls.push_back(to_finite_mesh(vertices[i], faces[i]));
-            std::vector<std::vector<Vec3>> points = self.uncovered(hulls, reach, grain, threads);
+            std::vector<std::vector<Vec3>> points =
+                self.uncovered(to_finite_meshes(vertices, faces), reach, grain, threads);
             std::vector<Rows<double, Vec3>> result;
             for (std::vector<Vec3>& own : points) result.push_back(rows<double>(std::move(own)));
             return result;

@@ -112,8 +112,7 @@ void bind_distance(nb::module_& m) {
   m.def(
       "sample_surface",
       [](const PointsIn& vertices, const FacesIn& faces, std::size_t count, std::uint64_t seed) {
-        const Mesh mesh = to_finite_mesh(vertices, faces);
-        SurfaceSamples samples = sample_surface(mesh, count, seed);
+        SurfaceSamples samples = sample_surface(to_finite_mesh(vertices, faces), count, seed);
         return std::tuple(rows<double>(std::move(samples.points)), rows<std::int32_t>(std::move(samples.faces)));
       },
       Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("count"), nb::arg("seed"),
@@ -138,10 +137,7 @@ void bind_distance(nb::module_& m) {
         const Mesh mesh = to_finite_mesh(vertices, faces);
         if (array.shape(0) != mesh.faces.size()) throw std::invalid_argument("one body for every face");
         const std::vector<std::int64_t> body(array.data(), array.data() + array.shape(0));
-        Crossings found;
-        if (!mesh.faces.empty()) {
-          found = crossings(mesh, body, most);
-        }
+        const Crossings found = mesh.faces.empty() ? Crossings() : crossings(mesh, body, most);
         return std::tuple(found.pairs, found.corners);
       },
       Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("body"), nb::arg("most"),

@@ -8,7 +8,6 @@
 namespace rlacd {
 
 void bind_flush(nb::module_& m) {
-  using IndicesIn = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
   const auto require_depth = [](double depth, double touch) {
     if (!(depth > 0) || !std::isfinite(depth)) throw std::invalid_argument("the depth must be positive");
     if (!(touch >= 0)) throw std::invalid_argument("the gap of a touch must not be negative");
@@ -43,12 +42,7 @@ void bind_flush(nb::module_& m) {
           "layer",
           [=](const FlushBody& self, const FlushBody& other, const IndicesIn& array, double depth, double touch) {
             require_depth(depth, touch);
-            const std::vector<std::int32_t> sides(array.data(), array.data() + array.size());
-            for (const std::int32_t side : sides)
-              if (side < 0 || side >= static_cast<std::int64_t>(self.size()))
-                throw std::invalid_argument("side out of range");
-            std::vector<Vec3> points = self.layer(other, sides, depth, touch);
-            return rows<double>(std::move(points));
+            return rows<double>(self.layer(other, to_numbers(array, self.size()), depth, touch));
           },
           Released(), nb::arg("other"), nb::arg("sides"), nb::arg("depth"), nb::arg("touch"),
           "What another body fills of this one with some of its sides, and those within 60 degrees of them, moved\n"

@@ -11,13 +11,10 @@
 #include "distance/filling.hpp"
 #include "hull/hull.hpp"
 #include "hull/inscribed_ball.hpp"
-#include "hull/outline.hpp"
 
 namespace rlacd {
 
 namespace {
-
-using PlanePointsIn = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 
 constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as a few joint hulls of small parts
 
@@ -53,14 +50,12 @@ void bind_hull(nb::module_& m) {
           points.insert(points.end(), own.begin(), own.end());
         }
         require_numbers(points);
-        Hull hull = convex_hull(points);
+        Mesh hull = hull_mesh(points);
         using Out = std::tuple<Rows<double, Vec3>, Rows<std::int32_t, Triangle>, double>;
-        if (hull.rank < 3) return std::optional<Out>();
-        std::vector<Vec3> corners;
-        for (const std::int32_t i : hull.indices) corners.push_back(points[i]);
-        const double volume = mesh_volume(corners, hull.faces);
+        if (hull.faces.empty()) return std::optional<Out>();
+        const double volume = mesh_volume(hull.vertices, hull.faces);
         return std::optional<Out>(
-            {rows<double>(std::move(corners)), rows<std::int32_t>(std::move(hull.faces)), volume});
+            {rows<double>(std::move(hull.vertices)), rows<std::int32_t>(std::move(hull.faces)), volume});
       },
       Released(), nb::arg("groups"),
       "Corners [H, 3], faces [F, 3] and volume of the convex hull of several arrays of points [N, 3]; None if all lie\n"
@@ -74,27 +69,9 @@ void bind_hull(nb::module_& m) {
       Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("radius"),
       "Whether a ball of this radius fits into a convex hull.");
   m.def(
-      "outline",
-      [](const PlanePointsIn& array) {
-        std::vector<PlanePoint> points(array.shape(0));
-        for (std::size_t i = 0; i < points.size(); ++i) {
-          points[i] = {array(i, 0), array(i, 1)};
-          if (!std::isfinite(points[i][0]) || !std::isfinite(points[i][1]))
-            throw std::invalid_argument("a point is not finite");
-        }
-        return rows<std::int32_t>(outline(points));
-      },
-      Released(), nb::arg("points"),
-      "The corners of the convex hull of points [N, 2] of the plane as indices, counter-clockwise; fewer than three if "
-      "the\n"
-      "points lie on a line up to rounding.");
-  m.def(
       "joint_hull_volumes",
-      [](const std::vector<const HullCorners*>& groups,
-         const nb::ndarray<const std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& pairs, int threads) {
-        const std::vector<std::int32_t> pair(pairs.data(), pairs.data() + pairs.size());
-        for (const std::int32_t g : pair)
-          if (g < 0 || g >= static_cast<std::int64_t>(groups.size())) throw std::invalid_argument("pair out of range");
+      [](const std::vector<const HullCorners*>& groups, const PairsIn& pairs, int threads) {
+        const std::vector<std::int32_t> pair = to_numbers(pairs, groups.size());
         std::vector<double> volumes(pairs.shape(0));
         const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
         parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {

@@ -12,7 +12,6 @@
 #include "mesh/edges.hpp"
 #include "mesh/least_bent.hpp"
 #include "mesh/near_boxes.hpp"
-#include "mesh/point_bodies.hpp"
 #include "mesh/point_tree.hpp"
 #include "mesh/spread_points.hpp"
 #include "mesh/wedges.hpp"
@@ -24,7 +23,7 @@ namespace {
 
 constexpr std::size_t kBetweenPolls = 4096;
 
-using IndicesIn = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using NodesIn = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using MarksIn = nb::ndarray<const bool, nb::c_contig, nb::device::cpu>;
 using WideFacesIn = nb::ndarray<const std::int64_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
@@ -78,8 +77,7 @@ void bind_mesh(nb::module_& m) {
   m.def(
       "weld",
       [](const PointsIn& vertices, const WideFacesIn& faces) {
-        const Mesh mesh = to_wide_mesh(vertices, faces);
-        Welded welded = weld(mesh);
+        Welded welded = weld(to_wide_mesh(vertices, faces));
         return std::tuple(rows<double>(std::move(welded.mesh.vertices)),
                           rows<std::int32_t>(std::move(welded.mesh.faces)), rows<bool>(std::move(welded.is_film)));
       },
@@ -91,28 +89,22 @@ void bind_mesh(nb::module_& m) {
   m.def(
       "first_in_place",
       [](const PointsIn& array) {
-        const std::vector<Vec3> points = to_points(array);
-        std::vector<std::int64_t> first;
-        const std::vector<std::int32_t> found = first_in_place(points);
-        first.assign(found.begin(), found.end());
-        return rows<std::int64_t>(std::move(first));
+        const std::vector<std::int32_t> found = first_in_place(to_points(array));
+        return rows<std::int64_t>(std::vector<std::int64_t>(found.begin(), found.end()));
       },
       Released(), nb::arg("points"),
       "The first of the points [N, 3] at the same place as each [N]; zeros of either sign are equal.");
   m.def(
       "first_of_doubled",
       [](const WideFacesIn& array, std::int64_t vertices) {
-        const std::vector<Triangle> faces = to_faces(array, vertices);
-        std::vector<char> is_first = first_of_doubled(faces, static_cast<std::size_t>(vertices));
-        return rows<bool>(std::move(is_first));
+        return rows<bool>(first_of_doubled(to_faces(array, vertices), static_cast<std::size_t>(vertices)));
       },
       Released(), nb::arg("faces"), nb::arg("count"),
       "Whether each of the faces [F, 3] over `count` vertices is the first with its three corners, in any order [F].");
   m.def(
       "edges",
       [](const WideFacesIn& array, std::int64_t vertices) {
-        const std::vector<Triangle> faces = to_faces(array, vertices);
-        Edges found = edges_of(faces, static_cast<std::size_t>(vertices));
+        Edges found = edges_of(to_faces(array, vertices), static_cast<std::size_t>(vertices));
         return std::tuple(rows<std::int64_t>(std::move(found.of_halfedge)),
                           rows<std::int64_t>(std::move(found.vertices)), rows<std::int64_t>(std::move(found.valence)));
       },
@@ -122,7 +114,7 @@ void bind_mesh(nb::module_& m) {
       "many halfedges each has [E].");
   m.def(
       "wedges",
-      [](const PointsIn& vertices, const WideFacesIn& faces, const IndicesIn& edge_of_halfedge, std::int64_t edges,
+      [](const PointsIn& vertices, const WideFacesIn& faces, const NodesIn& edge_of_halfedge, std::int64_t edges,
          const std::optional<MarksIn>& trusted) {
         const Mesh mesh = to_wide_mesh(vertices, faces);
         const std::vector<std::int64_t> edge(edge_of_halfedge.data(),
@@ -149,8 +141,7 @@ void bind_mesh(nb::module_& m) {
         if (beside.shape(0) != count) throw std::invalid_argument("not as many normals as points");
         const Loop loop = {to_points(points), to_points(beside), to_marks(taken, count * count)};
         require_finite(loop.points);
-        std::vector<Triangle> triangles = least_bent(loop);
-        return rows<std::int32_t>(std::move(triangles));
+        return rows<std::int32_t>(least_bent(loop));
       },
       Released(), nb::arg("points"), nb::arg("beside"), nb::arg("taken") = nb::none(),
       "Triangulates a closed loop [N, 3] with the least bending; [N - 2, 3], wound like the loop. `beside` [N, 3] has "
@@ -160,19 +151,18 @@ void bind_mesh(nb::module_& m) {
       "not get an edge.");
   m.def(
       "components",
-      [](std::int64_t count, const IndicesIn& a, const IndicesIn& b) {
+      [](std::int64_t count, const NodesIn& a, const NodesIn& b) {
         if (a.shape(0) != b.shape(0)) throw std::invalid_argument("a link has two ends");
-        for (const IndicesIn* ends : {&a, &b})
+        for (const NodesIn* ends : {&a, &b})
           for (std::size_t i = 0; i < ends->shape(0); ++i)
             if ((*ends)(i) < 0 || (*ends)(i) >= count) throw std::invalid_argument("node out of range");
-        std::pair<std::int64_t, std::vector<std::int64_t>> found;
         Groups groups(static_cast<std::size_t>(count));
         for (std::size_t i = 0; i < a.shape(0); ++i) {
           if (i % kBetweenPolls == 0) poll_stop();
           groups.join(a(i), b(i));
         }
-        found = groups.labels();
-        return std::tuple(found.first, rows<std::int64_t>(std::move(found.second)));
+        auto [number, labels] = groups.labels();
+        return std::tuple(number, rows<std::int64_t>(std::move(labels)));
       },
       Released(), nb::arg("count"), nb::arg("a"), nb::arg("b"),
       "Connected components under links a[i] - b[i]: their number, and the label [count] of each node, by first "
@@ -189,9 +179,8 @@ void bind_mesh(nb::module_& m) {
   m.def(
       "spread_points",
       [](const PointsIn& vertices, const WideFacesIn& faces, double spacing) {
-        const Mesh mesh = to_wide_mesh(vertices, faces);
         if (!(spacing > 0)) throw std::invalid_argument("the spacing must be positive");
-        SpreadPoints spread = spread_points(mesh, spacing);
+        SpreadPoints spread = spread_points(to_wide_mesh(vertices, faces), spacing);
         return std::tuple(rows<double>(std::move(spread.points)), rows<std::int32_t>(std::move(spread.faces)));
       },
       Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("spacing"),
@@ -264,17 +253,6 @@ void bind_mesh(nb::module_& m) {
           "Pairs [P, 2] of numbers, ascending, of a fresh box and any other: those within reach of each other, or "
           "with\n"
           "`across` of a common third one.");
-  m.def(
-      "point_bodies",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        const Mesh mesh = to_mesh(vertices, faces);
-        std::vector<std::int32_t> body = point_bodies(mesh);
-        return rows<std::int32_t>(std::move(body));
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"),
-      "The body [V] of each vertex of a mesh of any quality, numbered from 0 by their first faces, -1 for those of "
-      "none:\n"
-      "faces are connected where they share a corner, or have corners in one place.");
   nb::class_<PointTree>(m, "PointTree", "Finds those of some points [N, 3] that lie in a ball.")
       .def(
           "__init__",

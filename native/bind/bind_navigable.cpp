@@ -10,9 +10,6 @@
 namespace rlacd {
 namespace {
 
-using IndicesIn = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using PlanesIn = nb::ndarray<const double, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
-
 struct BallSet {
   std::vector<Vec3> centres;
   std::vector<double> radii;
@@ -40,10 +37,9 @@ void bind_navigable(nb::module_& m) {
           half_spaces.push_back({{row[0], row[1], row[2]}, row[3]});
           require_finite({half_spaces.back().normal});
         }
-        Balls balls;
         const ConvexBody hull(std::move(mesh));
         const NavigableField field(surface.bvh(), hull, std::move(half_spaces), radius, tolerance);
-        balls = spread_balls(surface, field, sources, pitch, threads);
+        Balls balls = spread_balls(surface, field, sources, pitch, threads);
         return std::tuple(rows<double>(std::move(balls.centres)), rows<double>(std::move(balls.radii)));
       },
       Released(), nb::arg("surface"), nb::arg("hull_vertices"), nb::arg("hull_faces"), nb::arg("radius"),
@@ -70,10 +66,7 @@ void bind_navigable(nb::module_& m) {
              const std::optional<IndicesIn>& candidates, double least, bool first) {
             Mesh mesh = to_finite_mesh(vertices, faces);
             std::vector<std::int32_t> among;
-            if (candidates) among.assign(candidates->data(), candidates->data() + candidates->size());
-            for (const std::int32_t ball : among)
-              if (ball < 0 || ball >= static_cast<std::int64_t>(self.centres.size()))
-                throw std::invalid_argument("ball out of range");
+            if (candidates) among = to_numbers(*candidates, self.centres.size());
             std::vector<std::int32_t> balls;
             std::vector<double> depths;
             const ConvexBody hull(std::move(mesh));

@@ -10,8 +10,7 @@ void bind_simplifier(nb::module_& m) {
       .def(
           "__init__",
           [](Simplifier* self, const PointsIn& vertices, const FacesIn& faces) {
-            const Mesh mesh = to_finite_mesh(vertices, faces);
-            new (self) Simplifier(mesh);
+            new (self) Simplifier(to_finite_mesh(vertices, faces));
           },
           Released(), nb::arg("vertices"), nb::arg("faces"))
       .def(

@@ -5,14 +5,12 @@
 
 namespace rlacd {
 
-using PlanesIn = nb::ndarray<const double, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
-
 void bind_simplify(nb::module_& m) {
   m.def(
       "simplify_hull",
       [](const PointsIn& vertices, const FacesIn& faces, std::size_t max_vertices, std::size_t max_faces,
          double tolerance, const PlanesIn& bounds) {
-        Mesh hull = to_finite_mesh(vertices, faces);
+        const Mesh hull = to_finite_mesh(vertices, faces);
         if (!(tolerance >= 0)) throw std::invalid_argument("the tolerance must not be negative");
         if (hull.vertices.empty()) throw std::invalid_argument("the hull has no vertices");
         std::vector<Above> above;
@@ -21,8 +19,7 @@ void bind_simplify(nb::module_& m) {
           above.push_back({{-row[0], -row[1], -row[2]}, -row[3]});
           require_finite({above.back().normal});
         }
-        hull = simplify_hull(hull, max_vertices, max_faces, tolerance, above);
-        return out(std::move(hull));
+        return out(simplify_hull(hull, max_vertices, max_faces, tolerance, above));
       },
       Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("max_vertices"), nb::arg("max_faces"),
       nb::arg("tolerance"), nb::arg("bounds"),

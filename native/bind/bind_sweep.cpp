@@ -1,13 +1,34 @@
-// Python bindings of the plane sweep.
+// Python bindings of candidate planes and of the plane sweep.
 #include <nanobind/stl/vector.h>
 
 #include "base/arrays.hpp"
+#include "cut/concave_edges.hpp"
 #include "cut/least_excess.hpp"
 #include "cut/sweep.hpp"
 
 namespace rlacd {
 
 void bind_sweep(nb::module_& m) {
+  m.def(
+      "candidate_planes",
+      [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& hull_vertices, const FacesIn& hull_faces,
+         int per_axis, std::size_t edges) {
+        const Mesh mesh = to_mesh(vertices, faces), hull = to_mesh(hull_vertices, hull_faces);
+        std::vector<CandidatePlane> planes;
+        if (per_axis > 0) planes = equidistant_planes(mesh, hull, per_axis);
+        for (const CandidatePlane& plane : concave_planes(mesh, hull, edges)) planes.push_back(plane);
+        std::vector<Vec3> normals;
+        std::vector<double> offsets;
+        for (const CandidatePlane& plane : planes) {
+          normals.push_back(plane.normal);
+          offsets.push_back(plane.offset);
+        }
+        return std::tuple(rows<double>(std::move(normals)), rows<double>(std::move(offsets)));
+      },
+      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("hull_vertices"), nb::arg("hull_faces"),
+      nb::arg("per_axis"), nb::arg("edges"),
+      "Unit normals [K, 3] and offsets [K] of planes: `per_axis` along each coordinate axis and principal axis,\n"
+      "which divide the hull's extent into equal slabs, and at most three for each of the concave edges chosen.");
   m.def(
       "sweep",
       [](const PointsIn& vertices, const FacesIn& faces, const PointsIn& directions,
@@ -16,8 +37,7 @@ void bind_sweep(nb::module_& m) {
         const Mesh mesh = to_mesh(vertices, faces);
         const std::vector<Vec3> normals = to_points(directions);
         const std::vector<double> d(offsets.data(), offsets.data() + offsets.size());
-        std::vector<PlaneScore> scores = sweep(mesh, normals, d, threads);
-        return rows<double>(std::move(scores));
+        return rows<double>(sweep(mesh, normals, d, threads));
       },
       Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("directions"), nb::arg("offsets"),
       nb::arg("threads") = 0,

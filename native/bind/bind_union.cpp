@@ -17,10 +17,7 @@ void bind_union(nb::module_& m) {
       .def(
           "__init__",
           [](HullUnion* self, const std::vector<PointsIn>& vertices, const std::vector<FacesIn>& faces, int threads) {
-            if (vertices.size() != faces.size()) throw std::invalid_argument("one array of faces a hull");
-            std::vector<Mesh> hulls;
-            for (std::size_t i = 0; i < vertices.size(); ++i) hulls.push_back(to_finite_mesh(vertices[i], faces[i]));
-            new (self) HullUnion(std::move(hulls), threads);
+            new (self) HullUnion(to_finite_meshes(vertices, faces), threads);
           },
           Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 0)
       .def(
@@ -30,15 +27,9 @@ void bind_union(nb::module_& m) {
           "exposed",
           [=](const HullUnion& self, double gap, int threads) {
             require_positive(1, gap);
-            Mesh mesh;
             HullUnion::Exposed found = self.exposed(gap, threads);
-            mesh = std::move(found.exposed);
-            const auto first = static_cast<std::int32_t>(mesh.vertices.size());
-            mesh.vertices.insert(mesh.vertices.end(), found.unresolved.vertices.begin(),
-                                 found.unresolved.vertices.end());
-            for (const Triangle& face : found.unresolved.faces)
-              mesh.faces.push_back({face[0] + first, face[1] + first, face[2] + first});
-            return out(std::move(mesh));
+            append(found.exposed, found.unresolved);
+            return out(std::move(found.exposed));
           },
           Released(), nb::arg("gap") = 1e-6, nb::arg("threads") = 0,
           "Surface of the union as triangles (vertices [V, 3], faces [F, 3]); touching facets are no part of it.")

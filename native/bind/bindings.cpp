@@ -3,7 +3,6 @@
 
 namespace rlacd {
 void bind_cells(nanobind::module_& m);
-void bind_concave_edges(nanobind::module_& m);
 void bind_concavity(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_flush(nanobind::module_& m);
@@ -27,7 +26,6 @@ NB_MODULE(_native, m) {
   nanobind::set_leak_warnings(false);
 #endif
   rlacd::bind_cells(m);
-  rlacd::bind_concave_edges(m);
   rlacd::bind_concavity(m);
   rlacd::bind_distance(m);
   rlacd::bind_flush(m);

@@ -3,79 +3,55 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+
+#include "mesh/edges.hpp"
 
 namespace rlacd {
 
 namespace {
 
-struct Halfedge {
-  std::int32_t high, apex, face;  // the larger of its vertices, and the third corner of its face
-  bool ascends;                   // runs towards `high`
-};
+bool ascends(const Mesh& mesh, std::int32_t low, const Run& run) {
+  return mesh.faces[run.halfedge / 3][run.halfedge % 3] == low;
+}
 
 // Sorts the halfedges between two vertices by angle, such that the solid lies between an ascending one and the one
 // before it. False if ascending and descending halfedges do not alternate.
-bool sort_around(const Mesh& mesh, std::int32_t low, std::vector<Halfedge>::iterator begin,
-                 std::vector<Halfedge>::iterator end) {
+bool sort_around(const Mesh& mesh, std::int32_t low, Run* begin, Run* end) {
   const Vec3 origin = mesh.vertices[low], along = normalized(mesh.vertices[begin->high] - origin);
-  const Vec3 u = normalized(cross(along, mesh.vertices[begin->apex] - origin)), v = cross(along, u);
-  const auto angle = [&](const Halfedge& h) {
-    const Vec3 a = mesh.vertices[h.apex] - origin;
-    return std::atan2(dot(v, a), dot(u, a));
+  const auto apex = [&](const Run& run) {
+    return mesh.vertices[mesh.faces[run.halfedge / 3][(run.halfedge + 2) % 3]] - origin;
   };
-  std::sort(begin, end, [&](const Halfedge& h, const Halfedge& g) { return angle(h) < angle(g); });
-  for (auto h = begin; h != end; ++h)
-    if (h->ascends == (h + 1 == end ? begin : h + 1)->ascends) return false;
+  const Vec3 u = normalized(cross(along, apex(*begin))), v = cross(along, u);
+  const auto angle = [&](const Run& run) { return std::atan2(dot(v, apex(run)), dot(u, apex(run))); };
+  std::sort(begin, end, [&](const Run& a, const Run& b) { return angle(a) < angle(b); });
+  for (const Run* r = begin; r != end; ++r)
+    if (ascends(mesh, low, *r) == ascends(mesh, low, r + 1 == end ? *begin : r[1])) return false;
   return true;
 }
 
 }  // namespace
 
 std::vector<Mesh> bodies(const Mesh& mesh) {
-  std::vector<std::int32_t> parent(mesh.faces.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&parent](std::int32_t f) {
-    while (parent[f] != f) f = parent[f] = parent[parent[f]];
-    return f;
-  };
-  const auto join = [&](std::int32_t f, std::int32_t g) {
-    const std::int32_t a = root(f), b = root(g);
-    parent[std::max(a, b)] = std::min(a, b);
-  };
-  std::vector<std::size_t> first(mesh.vertices.size() + 1, 0);  // halfedges, bucketed by the smaller of their vertices
-  for (const Triangle& f : mesh.faces)
-    for (int e = 0; e < 3; ++e) ++first[std::min(f[e], f[(e + 1) % 3]) + 1];
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) first[v + 1] += first[v];
-  std::vector<Halfedge> halfedges(3 * mesh.faces.size());
-  std::vector<std::size_t> next(first.begin(), first.end() - 1);
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f)
-    for (int e = 0; e < 3; ++e) {
-      const std::int32_t a = mesh.faces[f][e], b = mesh.faces[f][(e + 1) % 3], apex = mesh.faces[f][(e + 2) % 3];
-      halfedges[next[std::min(a, b)]++] = {std::max(a, b), apex, static_cast<std::int32_t>(f), a < b};
-    }
+  Groups groups(mesh.faces.size());
+  const auto join = [&groups](const Run& a, const Run& b) { groups.join(a.halfedge / 3, b.halfedge / 3); };
+  Buckets<Run> runs = sorted_halfedges(mesh.faces, mesh.vertices.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    const auto begin = halfedges.begin() + static_cast<std::ptrdiff_t>(first[v]);
-    const auto end = halfedges.begin() + static_cast<std::ptrdiff_t>(first[v + 1]);
-    std::sort(begin, end, [](const Halfedge& h, const Halfedge& g) { return h.high < g.high; });
-    for (auto h = begin, after = h; h != end; h = after) {
-      after = std::find_if(h, end, [h](const Halfedge& g) { return g.high != h->high; });
-      if (after - h > 2 && sort_around(mesh, static_cast<std::int32_t>(v), h, after)) {
-        for (auto g = h; g != after; ++g)
-          if (g->ascends) join(g->face, (g == h ? after - 1 : g - 1)->face);
+    const auto low = static_cast<std::int32_t>(v);
+    const auto [begin, end] = runs.range(v);
+    for (Run *first = begin, *after; first != end; first = after) {
+      after = std::find_if(first, end, [first](const Run& run) { return run.high != first->high; });
+      if (after - first > 2 && sort_around(mesh, low, first, after)) {
+        for (const Run* r = first; r != after; ++r)
+          if (ascends(mesh, low, *r)) join(*r, r == first ? after[-1] : r[-1]);
       } else {
-        for (auto g = h + 1; g != after; ++g) join(g->face, (g - 1)->face);
+        for (const Run* r = first + 1; r != after; ++r) join(*r, r[-1]);
       }
     }
   }
-  std::vector<std::int32_t> body(mesh.faces.size(), -1);
+  const auto [count, body] = groups.labels();
+  std::vector<std::vector<std::int32_t>> members(static_cast<std::size_t>(count));
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) members[body[f]].push_back(static_cast<std::int32_t>(f));
   std::vector<Mesh> found;
-  std::vector<std::vector<std::int32_t>> members;
-  for (std::int32_t f = 0; f < static_cast<std::int32_t>(mesh.faces.size()); ++f) {
-    const std::int32_t r = root(f);
-    if (body[r] < 0) body[r] = static_cast<std::int32_t>(members.size()), members.emplace_back();
-    members[body[r]].push_back(f);
-  }
   std::vector<std::int32_t> number(mesh.vertices.size()), owner(mesh.vertices.size(), -1);
   for (std::size_t b = 0; b < members.size(); ++b) {
     Mesh one;

@@ -36,8 +36,7 @@ void append(std::vector<Triangle>& faces, const Rims& rims, const Outlines& outl
   const std::vector<PlanePoint> point = joined(outlines);
   for (const Triangle& t : triangulate(outlines, vertex)) {
     if (area != nullptr) {
-      const PlanePoint a = point[t[0]], b = point[t[1]], c = point[t[2]];
-      const double doubled = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+      const double doubled = doubled_area(point[t[0]], point[t[1]], point[t[2]]);
       area->all += std::fabs(doubled);
       if (doubled < 0) area->folded -= doubled;
     }

@@ -8,6 +8,7 @@
 
 #include "base/mesh_measures.hpp"
 #include "base/stop.hpp"
+#include "mesh/edges.hpp"
 
 namespace rlacd {
 
@@ -29,12 +30,6 @@ Vec3 middle(const Mesh& mesh, const ReflexEdge& edge) {
   return 0.5 * (mesh.vertices[edge.end[0]] + mesh.vertices[edge.end[1]]);
 }
 
-Box box_of(const Mesh& mesh) {
-  Box box;
-  for (const Vec3 p : mesh.vertices) box.extend(p);
-  return box;
-}
-
 // Planes of a hull's facets, the largest triangles first.
 class Facets {
  public:
@@ -42,8 +37,7 @@ class Facets {
     std::vector<Vec3> scaled;
     std::vector<double> size;
     for (const Triangle& f : hull.faces) {
-      const Vec3 a = hull.vertices[f[0]];
-      scaled.push_back(cross(hull.vertices[f[1]] - a, hull.vertices[f[2]] - a));
+      scaled.push_back(long_normal(hull, f));
       size.push_back(norm(scaled.back()));
     }
     std::vector<std::size_t> order(hull.faces.size());
@@ -72,11 +66,6 @@ class Facets {
   std::vector<double> offsets_;
 };
 
-std::int32_t root_of(std::vector<std::int32_t>& parent, std::int32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
 // Length of the whole crease that each edge belongs to, capped at `most`.
 std::vector<double> crease_lengths(const Mesh& mesh, const std::vector<ReflexEdge>& edges, double most) {
   struct End {
@@ -93,16 +82,14 @@ std::vector<double> crease_lengths(const Mesh& mesh, const std::vector<ReflexEdg
     }
   std::stable_sort(ends.begin(), ends.end(), [](const End& a, const End& b) { return a.vertex < b.vertex; });
 
-  std::vector<std::int32_t> parent(edges.size());
-  std::iota(parent.begin(), parent.end(), 0);
+  Groups creases(edges.size());
   for (std::size_t i = 0; i < ends.size(); ++i)
     for (std::size_t j = i + 1; j < std::min(i + kMostAtVertex, ends.size()) && ends[j].vertex == ends[i].vertex; ++j)
-      if (dot(ends[i].outgoing, ends[j].outgoing) < -kStraightOn)
-        parent[root_of(parent, ends[j].edge)] = root_of(parent, ends[i].edge);
-  std::vector<double> total(edges.size(), 0), result;
-  for (std::size_t i = 0; i < edges.size(); ++i) total[root_of(parent, static_cast<std::int32_t>(i))] += length[i];
-  for (std::size_t i = 0; i < edges.size(); ++i)
-    result.push_back(std::min(total[root_of(parent, static_cast<std::int32_t>(i))], most));
+      if (dot(ends[i].outgoing, ends[j].outgoing) < -kStraightOn) creases.join(ends[j].edge, ends[i].edge);
+  const auto [count, crease] = creases.labels();
+  std::vector<double> total(static_cast<std::size_t>(count), 0), result;
+  for (std::size_t i = 0; i < edges.size(); ++i) total[crease[i]] += length[i];
+  for (std::size_t i = 0; i < edges.size(); ++i) result.push_back(std::min(total[crease[i]], most));
   return result;
 }
 
@@ -207,12 +194,11 @@ CandidatePlane turned(const CandidatePlane& plane) {
   return {Vec3{} - plane.normal, -plane.offset};
 }
 
-}  // namespace
-
-std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull, std::size_t count) {
+// Up to `count` of a mesh's reflex edges; edges that offer no new plane are never chosen.
+std::vector<ReflexEdge> chosen_edges(const Mesh& mesh, const Mesh& hull, std::size_t count) {
   const std::vector<ReflexEdge> edges = reflex_edges(mesh);
   if (edges.empty() || count == 0) return {};
-  const Box box = box_of(hull);
+  const Box box = Box::of(hull.vertices);
   const Facets facets(hull);
   const std::vector<double> length = crease_lengths(mesh, edges, max_abs(box.upper - box.lower));
   std::vector<double> worth, bound;
@@ -235,10 +221,12 @@ std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull,
   return spread_out(contenders, PlaneSpace(box), count);
 }
 
-std::vector<CandidatePlane> planes_of_edges(const Mesh& mesh, const Mesh& hull, const std::vector<ReflexEdge>& edges) {
-  const PlaneSpace space(box_of(hull));
+}  // namespace
+
+std::vector<CandidatePlane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_t count) {
+  const PlaneSpace space(Box::of(hull.vertices));
   std::vector<CandidatePlane> planes;
-  for (const ReflexEdge& edge : edges) {
+  for (const ReflexEdge& edge : chosen_edges(mesh, hull, count)) {
     EdgePlanes own = planes_of(mesh, edge);
     for (const int side : {0, 1})
       own[side + 1].offset = above_face(mesh, mesh.faces[edge.face[side]], own[side + 1].normal);

@@ -23,14 +23,11 @@ struct CandidatePlane {
   double offset;
 };
 
-// Up to `count` of a mesh's reflex edges; edges that offer no new plane are never chosen.
-std::vector<ReflexEdge> choose_concave_edges(const Mesh& mesh, const Mesh& hull, std::size_t count);
-
-// The planes of these edges. A face's plane is moved out until the face, and everything coplanar with it in single
-// precision, lies wholly on one side: not at all if the plane is normal to a coordinate axis (such cuts are exact),
-// else by a hair. A cut exactly through the face would let rounding decide the side of each corner, and the part beyond
-// would carry the face along as a film.
-std::vector<CandidatePlane> planes_of_edges(const Mesh& mesh, const Mesh& hull, const std::vector<ReflexEdge>& edges);
+// The planes of up to `count` reflex edges. A face's plane is moved out until the face, and everything coplanar with it
+// in single precision, lies wholly on one side: not at all if the plane is normal to a coordinate axis (such cuts are
+// exact), else by a hair. A cut exactly through the face would let rounding decide the side of each corner, and the
+// part beyond would carry the face along as a film.
+std::vector<CandidatePlane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_t count);
 
 // The paper's candidates: along x, y, z and the principal axes of a mesh, planes that divide its hull's extent into
 // equal slabs. Principal axes that hardly differ from a coordinate axis are replaced by it.

@@ -27,8 +27,7 @@ enum Side : std::size_t { kBelow, kAbove };
 Side across(Side side) { return side == kBelow ? kAbove : kBelow; }
 
 double box_volume(const Mesh& mesh) {
-  Box box;
-  for (const Vec3 p : mesh.vertices) box.extend(p);
+  const Box box = Box::of(mesh.vertices);
   const Vec3 e = box.upper - box.lower;
   return e.x * e.y * e.z;
 }

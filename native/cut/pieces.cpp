@@ -20,12 +20,6 @@ constexpr double kHalf = 0.5;     // a winding number between inside and outside
 // given up.
 constexpr std::size_t kManyNewFaces = 1000;
 
-void append(Mesh& out, const Mesh& other) {
-  const auto first = static_cast<std::int32_t>(out.vertices.size());
-  out.vertices.insert(out.vertices.end(), other.vertices.begin(), other.vertices.end());
-  for (const Triangle& f : other.faces) out.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
-}
-
 }  // namespace
 
 std::optional<Piece> piece_of(Mesh mesh, double least) {
@@ -33,10 +27,8 @@ std::optional<Piece> piece_of(Mesh mesh, double least) {
   Piece piece;
   piece.volume = mesh_volume(mesh.vertices, mesh.faces);
   if (!(piece.volume > least)) return std::nullopt;
-  Hull hull = convex_hull(mesh.vertices);
-  if (hull.rank < 3) return std::nullopt;
-  for (const std::int32_t i : hull.indices) piece.hull.vertices.push_back(mesh.vertices[i]);
-  piece.hull.faces = std::move(hull.faces);
+  piece.hull = hull_mesh(mesh.vertices);
+  if (piece.hull.faces.empty()) return std::nullopt;
   piece.hull_volume = mesh_volume(piece.hull.vertices, piece.hull.faces);
   piece.mesh = std::move(mesh);
   return piece;
@@ -82,9 +74,8 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
 Mesh inside_all(Mesh mesh, const Mesh& hull) {
   std::size_t fewest = mesh.faces.size();
   for (const Triangle& f : hull.faces) {
-    const Vec3 a = hull.vertices[f[0]];
-    const Vec3 normal = normalized(cross(hull.vertices[f[1]] - a, hull.vertices[f[2]] - a));
-    const double offset = dot(normal, a) + kApart;
+    const Vec3 normal = normalized(long_normal(hull, f));
+    const double offset = dot(normal, hull.vertices[f[0]]) + kApart;
     if (std::none_of(mesh.vertices.begin(), mesh.vertices.end(), [&](Vec3 p) { return dot(normal, p) > offset; }))
       continue;
     mesh = capped(std::move(cut_by_plane(mesh, normal, offset)[0]), normal);

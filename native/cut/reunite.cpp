@@ -11,7 +11,6 @@
 #include "cut/plane_cut.hpp"
 #include "cut/triangulate.hpp"
 #include "distance/glue.hpp"
-#include "mesh/collapse_flat.hpp"
 
 namespace rlacd {
 
@@ -41,20 +40,12 @@ std::vector<Edge> net(std::vector<Edge> edges) {
   return left;
 }
 
-double doubled_area(PlanePoint a, PlanePoint b, PlanePoint c) {
-  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
 class Reunion {
  public:
   explicit Reunion(const std::vector<Mesh>& solids) {
     for (std::size_t i = 0; i < solids.size(); ++i)
       for (std::size_t j = i + 1; j < solids.size(); ++j) add_touching_planes(planes_, solids[i], solids[j]);
-    for (const Mesh& solid : solids) {
-      const auto first = static_cast<std::int32_t>(mesh_.vertices.size());
-      mesh_.vertices.insert(mesh_.vertices.end(), solid.vertices.begin(), solid.vertices.end());
-      for (const Triangle& f : solid.faces) mesh_.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
-    }
+    for (const Mesh& solid : solids) append(mesh_, solid);
   }
 
   std::optional<Mesh> united() {
@@ -70,11 +61,22 @@ class Reunion {
     for (const Triangle& f : mesh_.faces)
       for (int e = 0; e < 3; ++e) edges.push_back({f[e], f[(e + 1) % 3]});
     if (!net(std::move(edges)).empty()) return std::nullopt;
-    collapse_flat(mesh_, met_);
+    drop_unused();
     return std::move(mesh_);
   }
 
  private:
+  void drop_unused() {
+    std::vector<std::int32_t> number(mesh_.vertices.size(), -1);
+    std::vector<Vec3> used;
+    for (Triangle& f : mesh_.faces)
+      for (std::int32_t& v : f) {
+        if (number[v] < 0) number[v] = static_cast<std::int32_t>(used.size()), used.push_back(mesh_.vertices[v]);
+        v = number[v];
+      }
+    mesh_.vertices = std::move(used);
+  }
+
   // Makes vertices in one place one.
   void weld() {
     std::vector<std::int32_t> order(mesh_.vertices.size()), same(mesh_.vertices.size());
@@ -158,18 +160,14 @@ class Reunion {
       for (auto j = i + 1; j != by_left.end() && left(*j) <= std::max(at[2 * *i][0], at[2 * *i + 1][0]); ++j) {
         const Edge &e = rim[*i], &g = rim[*j];
         if (e[0] == g[0] || e[0] == g[1] || e[1] == g[0] || e[1] == g[1]) continue;
-        const PlanePoint a = at[2 * *i], b = at[2 * *i + 1], c = at[2 * *j], d = at[2 * *j + 1];
-        const double c_side = doubled_area(a, b, c), d_side = doubled_area(a, b, d);
-        const double a_side = doubled_area(c, d, a), b_side = doubled_area(c, d, b);
-        if (!(c_side < 0 ? d_side > 0 : c_side > 0 && d_side < 0)) continue;
-        if (!(a_side < 0 ? b_side > 0 : a_side > 0 && b_side < 0)) continue;
-        const double along_e = a_side / (a_side - b_side), along_g = c_side / (c_side - d_side);
+        std::array<double, 2> along;
+        if (!do_cross(at[2 * *i], at[2 * *i + 1], at[2 * *j], at[2 * *j + 1], along)) continue;
         const auto vertex = static_cast<std::int32_t>(mesh_.vertices.size());
         const Vec3 from = mesh_.vertices[e[0]];
-        mesh_.vertices.push_back(from + along_e * (mesh_.vertices[e[1]] - from));
+        mesh_.vertices.push_back(from + along[0] * (mesh_.vertices[e[1]] - from));
         met_.push_back(vertex);
-        found[undirected(e[0], e[1])].push_back({e[0] < e[1] ? along_e : 1 - along_e, vertex});
-        found[undirected(g[0], g[1])].push_back({g[0] < g[1] ? along_g : 1 - along_g, vertex});
+        found[undirected(e[0], e[1])].push_back({e[0] < e[1] ? along[0] : 1 - along[0], vertex});
+        found[undirected(g[0], g[1])].push_back({g[0] < g[1] ? along[1] : 1 - along[1], vertex});
       }
     for (auto& [key, stops] : found)
       note({static_cast<std::int32_t>(key >> 32), static_cast<std::int32_t>(key & 0xffffffffu)}, std::move(stops));
@@ -254,17 +252,11 @@ class Reunion {
       std::vector<std::int32_t> loop;
       std::vector<Vec3> points;
       for (const Edge& e : sides) loop.push_back(e[0]), points.push_back(mesh_.vertices[e[0]]);
-      const Vec3 normal = cross_of(f);
-      for (const Triangle& t : triangulate({on_plane(points, normal)}, loop))
+      for (const Triangle& t : triangulate({on_plane(points, long_normal(mesh_, f))}, loop))
         faces.push_back({loop[t[0]], loop[t[1]], loop[t[2]]});
     }
     faces.insert(faces.end(), caps_.begin(), caps_.end());
     mesh_.faces = std::move(faces);
-  }
-
-  Vec3 cross_of(const Triangle& f) const {
-    const Vec3 a = mesh_.vertices[f[0]];
-    return rlacd::cross(mesh_.vertices[f[1]] - a, mesh_.vertices[f[2]] - a);
   }
 
   // Stops along an edge from its first vertex, or from its smaller one if that is how they were found.

@@ -5,7 +5,6 @@
 // Algorithm: all faces in a plane where two solids touch are taken out. What is left ends in that plane in rims, run
 // around one way by the solids below it and the other way by those above. Once both have a vertex wherever one meets
 // the other, edges that run both ways vanish, and what the others bound is closed again: once, facing up or down.
-// Vertices left in the middle of flat faces and of straight edges, where the solids met, are collapsed.
 #pragma once
 
 #include <optional>

@@ -18,10 +18,6 @@ constexpr std::size_t kNone = ~std::size_t{0};
 
 using Loop = std::vector<std::int32_t>;
 
-double doubled_area(PlanePoint a, PlanePoint b, PlanePoint c) {
-  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
 double distance2(PlanePoint a, PlanePoint b) { return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]); }
 
 // A loop and its holes, joined by bridges to one ring of nodes.
@@ -301,7 +297,7 @@ std::vector<Loop> untangled(const std::vector<std::vector<PlanePoint>>& loops, c
   return found;
 }
 
-double doubled_area(const std::vector<PlanePoint>& points, const Loop& loop) {
+double doubled_area_of(const std::vector<PlanePoint>& points, const Loop& loop) {
   double sum = 0;
   for (std::size_t i = 1; i + 1 < loop.size(); ++i)
     sum += doubled_area(points[loop[0]], points[loop[i]], points[loop[i + 1]]);
@@ -342,7 +338,7 @@ std::vector<Triangle> triangulate(const std::vector<std::vector<PlanePoint>>& lo
   for (const std::vector<PlanePoint>& loop : loops) points.insert(points.end(), loop.begin(), loop.end());
   std::vector<Loop> all_loops = untangled(loops, points, vertices);
   for (Loop& own : all_loops) {
-    const double area = doubled_area(points, own);
+    const double area = doubled_area_of(points, own);
     if (area > 0 || all_loops.size() == 1)
       outers.push_back({std::move(own), std::fabs(area), {}, area < 0});
     else

@@ -24,11 +24,6 @@ double noise(std::uint64_t i) {
   return static_cast<double>((i ^ (i >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-// Twice the area of a triangle, positive if it is counter-clockwise.
-double doubled_area(PlanePoint a, PlanePoint b, PlanePoint c) {
-  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
 std::uint64_t directed(std::int32_t from, std::int32_t to) {
   return static_cast<std::uint64_t>(from) << 32 | static_cast<std::uint32_t>(to);
 }
@@ -115,12 +110,8 @@ class Tangle {
       if (vertex_[end] == vertex_[j] || vertex_[end] == vertex_[next_[j]]) return;
     const PlanePoint a = point_[i], b = point_[next_[i]], c = point_[j], d = point_[next_[j]];
     if (std::max(a[1], b[1]) < std::min(c[1], d[1]) || std::max(c[1], d[1]) < std::min(a[1], b[1])) return;
-    const double c_side = doubled_area(a, b, c), d_side = doubled_area(a, b, d);
-    if (!(c_side < 0 ? d_side > 0 : c_side > 0 && d_side < 0)) return;
-    const double a_side = doubled_area(c, d, a), b_side = doubled_area(c, d, b);
-    if (!(a_side < 0 ? b_side > 0 : a_side > 0 && b_side < 0)) return;
-    const double along_i = a_side / (a_side - b_side), along_j = c_side / (c_side - d_side);
-    crossings_.push_back({{i, j}, {along_i, along_j}});
+    std::array<double, 2> along;
+    if (do_cross(a, b, c, d, along)) crossings_.push_back({{i, j}, along});
   }
 
   // Gives every crossing a vertex and its two nodes, and lets each rim continue along the other.

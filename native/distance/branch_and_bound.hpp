@@ -36,8 +36,6 @@ struct Sample {
   std::int32_t witness = -1;
 };
 
-using Corners = std::array<Vec3, 3>;
-
 struct Cell {
   Corners corner;
   std::array<Sample, 3> sample;
@@ -100,13 +98,7 @@ double upper_bound(const Field& field, const Cell& cell) {
 // The two halves of a cell, cut at the middle of its longest edge; corner 0 of both is the new point.
 template <class Field>
 std::array<Cell, 2> bisect(const Field& field, const Cell& cell, double enough) {
-  int longest = 0;
-  double most = -1;
-  for (int i = 0; i < 3; ++i) {
-    const double length2 = norm2(cell.corner[(i + 1) % 3] - cell.corner[i]);
-    if (length2 > most) most = length2, longest = i;
-  }
-  const int from = longest, to = (longest + 1) % 3, across = (longest + 2) % 3;
+  const int from = longest_side(cell.corner), to = (from + 1) % 3, across = (from + 2) % 3;
   const Vec3 middle = 0.5 * (cell.corner[from] + cell.corner[to]);
   const Sample sample = field.at(middle, cell.sample[from].witness, enough);
   std::array<Cell, 2> halves;
@@ -117,10 +109,6 @@ std::array<Cell, 2> bisect(const Field& field, const Cell& cell, double enough) 
     halves[side].upper = std::min(cell.upper, upper_bound(field, halves[side]));
   }
   return halves;
-}
-
-inline Corners corners_of(const Mesh& mesh, const Triangle& face) {
-  return {mesh.vertices[face[0]], mesh.vertices[face[1]], mesh.vertices[face[2]]};
 }
 
 // One thread, the cell with the greatest upper bound first.

@@ -8,7 +8,6 @@
 namespace rlacd {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kUndecided = 1e-3;
 constexpr std::size_t kProbes = 64;
 

@@ -6,15 +6,7 @@
 namespace rlacd {
 namespace {
 
-using Corners = std::array<Vec3, 3>;
-
 Corners corners_of(const TriangleFrame& t) { return {t.a, t.a + t.ab, t.a + t.ac}; }
-
-bool do_boxes_meet(const Box& a, const Box& b) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (a.lower[axis] > b.upper[axis] || b.lower[axis] > a.upper[axis]) return false;
-  return true;
-}
 
 bool is_separating(Vec3 axis, const Corners& a, const Corners& b) {
   const auto [low_a, high_a] = std::minmax({dot(axis, a[0]), dot(axis, a[1]), dot(axis, a[2])});
@@ -23,7 +15,7 @@ bool is_separating(Vec3 axis, const Corners& a, const Corners& b) {
 }
 
 bool do_touch(const Corners& a, const Corners& b) {
-  const Vec3 normal_a = cross(a[1] - a[0], a[2] - a[0]), normal_b = cross(b[1] - b[0], b[2] - b[0]);
+  const Vec3 normal_a = long_normal(a), normal_b = long_normal(b);
   if (is_separating(normal_a, a, b) || is_separating(normal_b, a, b)) return false;
   for (int i = 0; i < 3; ++i) {
     const Vec3 edge = a[(i + 1) % 3] - a[i];
@@ -44,14 +36,13 @@ Crossings crossings(const Mesh& mesh, const std::vector<std::int64_t>& body, std
   for (std::int32_t slot = 0; slot < static_cast<std::int32_t>(bvh.size()) && found.pairs <= most; ++slot) {
     poll_stop();
     const Corners own = corners_of(bvh.triangle(slot));
-    Box box;
-    for (const Vec3 corner : own) box.extend(corner);
+    const Box box = Box::of(own);
     open.push_back(0);
     while (!open.empty()) {
       const Bvh::Node& node = bvh.nodes()[open.back()];
       open.pop_back();
       for (int side = 0; side < 2; ++side) {
-        if (!do_boxes_meet(node.box[side], box)) continue;
+        if (!node.box[side].meets(box)) continue;
         if (node.child[side] >= 0) {
           open.push_back(node.child[side]);
           continue;

@@ -28,11 +28,6 @@ constexpr double kFarther = 0.25;
 // A distance below this share of the threshold need not be known more exactly.
 constexpr double kNear = 0.5;
 
-bool meet(const Box& a, const Box& b) {
-  return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
-         a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
-}
-
 // The region deeper than t under all planes. Most objects are outside it, and mostly because of the same plane as those
 // before them.
 class Depths {
@@ -50,9 +45,7 @@ class Depths {
   bool misses(const Box& box) {
     const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
     const auto is_off = [&](std::int32_t plane) {
-      const Vec3 n = planes_.normal(plane);
-      const double reach = std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z;
-      return planes_.depth(plane, middle) + reach <= t_;
+      return planes_.depth(plane, middle) + reach_along(planes_.normal(plane), half) <= t_;
     };
     if (is_off(last_)) return true;
     const std::int32_t plane = planes_.nearest(middle).plane;
@@ -111,7 +104,7 @@ Mesh joint_hull(const std::vector<Vec3>& first, const std::vector<Vec3>& second)
 }
 
 struct Cell {
-  Vec3 corner[3];
+  Corners corner;
   Vec3 middle;
   double radius;
   std::int32_t hint;                                      // the slot of a nearby face of the solid
@@ -130,8 +123,7 @@ Feasibility Filling::feasibility(const Mesh& hull, double threshold) const {
   return is_missed(hull, hull.faces, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe;
 }
 
-HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)) {
-  for (const Vec3 p : all) box.extend(p);
+HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)), box(Box::of(all)) {
   if (all.size() <= kMaybe) {
     some = all;
     return;
@@ -177,8 +169,7 @@ Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCo
 bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
   const ConvexPlanes planes(hull);
   Depths depths(planes, threshold);
-  Box inner;
-  for (const Vec3 p : hull.vertices) inner.extend(p);
+  Box inner = Box::of(hull.vertices);
   inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
   inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
   const std::vector<Bvh::Node>& nodes = surface_.bvh().nodes();
@@ -188,14 +179,13 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
     const Bvh::Node& node = nodes[open.back()];
     open.pop_back();
     for (int side = 0; side < 2; ++side) {
-      if (!meet(node.box[side], inner) || depths.misses(node.box[side])) continue;
+      if (!node.box[side].meets(inner) || depths.misses(node.box[side])) continue;
       if (node.child[side] >= 0) {
         open.push_back(node.child[side]);
         continue;
       }
       for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) {
-        const Triangle& face = solid_.faces[surface_.bvh().face(~node.child[side] + i)];
-        const Vec3 p = solid_.vertices[face[0]], q = solid_.vertices[face[1]], r = solid_.vertices[face[2]];
+        const auto [p, q, r] = corners_of(solid_, solid_.faces[surface_.bvh().face(~node.child[side] + i)]);
         for (const Vec3 corner : {p, q, r})
           if (inner.holds(corner) && depths.holds(corner)) return true;
         if (depths.meets(p, q, r)) return true;
@@ -228,10 +218,7 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
     const Cell cell = open.top();
     open.pop();
     // Across the longest side, so that cells stay well shaped.
-    int from = 0;
-    for (int k = 1; k < 3; ++k)
-      if (norm2(cell.corner[(k + 1) % 3] - cell.corner[k]) > norm2(cell.corner[(from + 1) % 3] - cell.corner[from]))
-        from = k;
+    const int from = longest_side(cell.corner);
     const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
     const Vec3 between = 0.5 * (p + q);
     if (look_at(Cell(p, between, tip, cell.hint)) || look_at(Cell(between, q, tip, cell.hint))) return true;

@@ -127,17 +127,11 @@ struct Facet {
   }
 };
 
-bool overlap(const Box& a, const Box& b) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (a.lower[axis] > b.upper[axis] + kCoincident || b.lower[axis] > a.upper[axis] + kCoincident) return false;
-  return true;
-}
-
 std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
   std::vector<Facet> result;
   for (const Triangle& face : mesh.faces) {
     const Facet facet(mesh, face);
-    if (facet.height > kCoincident && overlap(facet.box, box)) result.push_back(facet);
+    if (facet.height > kCoincident && facet.box.meets(box, kCoincident)) result.push_back(facet);
   }
   return result;
 }
@@ -167,9 +161,9 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
     const Facet facet(a, face);
     if (facet.height <= kCoincident) continue;  // its edges belong to its neighbours
     bool whole = true;
-    if (overlap(facet.box, common)) {
+    if (facet.box.meets(common, kCoincident)) {
       for (const Facet& other : others) {
-        if (!overlap(facet.box, other.box) || !facet.touches(other)) continue;
+        if (!facet.box.meets(other.box, kCoincident) || !facet.touches(other)) continue;
         if (whole)
           polygons.assign(
               1, {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])});
@@ -191,12 +185,6 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
         out.faces.push_back({first, first + i, first + i + 1});
     }
   }
-}
-
-void append(Mesh& out, const Mesh& mesh) {
-  const auto base = static_cast<std::int32_t>(out.vertices.size());
-  out.vertices.insert(out.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
-  for (const Triangle& face : mesh.faces) out.faces.push_back({face[0] + base, face[1] + base, face[2] + base});
 }
 
 }  // namespace
@@ -222,7 +210,7 @@ namespace {
 
 // Whether a triangle of one solid and an opposite one of the other share more than an edge.
 bool share_area(const Facet& facet, const Facet& other) {
-  if (!overlap(facet.box, other.box) || !facet.touches(other)) return false;
+  if (!facet.box.meets(other.box, kCoincident) || !facet.touches(other)) return false;
   Polygon common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
   const Point2 outline[3] = {facet.project(other.corner[0]), facet.project(other.corner[2]),
                              facet.project(other.corner[1])};

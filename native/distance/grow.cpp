@@ -70,10 +70,7 @@ class Growth {
         if (is_in(node.box[side])) {
           const Box& box = node.box[side];
           const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
-          open_.push({distance([&](Vec3 n) {
-                        return dot(n, middle) -
-                               (std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z);
-                      }),
+          open_.push({distance([&](Vec3 n) { return dot(n, middle) - reach_along(n, half); }),
                       node.child[side],
                       box,
                       -1,
@@ -89,7 +86,7 @@ class Growth {
   }
 
   void open_face(std::int32_t face) {
-    const auto [a, b, c] = corners(face);
+    const auto [a, b, c] = corners_of(solid_, solid_.faces[face]);
     const Vec3 product = cross(b - a, c - a);
     const double area = norm(product);
     if (!(area > 0)) return;
@@ -113,14 +110,12 @@ class Growth {
   bool is_in(const Box& box) const {
     const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
     return std::none_of(found_.begin(), found_.end(), [&](const HalfSpace& space) {
-      const Vec3 n = space.normal;
-      const double reach = std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z;
-      return dot(n, middle) - reach >= space.offset - depth_;
+      return dot(space.normal, middle) - reach_along(space.normal, half) >= space.offset - depth_;
     });
   }
 
   void meet(const Item& item) {
-    const auto [a, b, c] = corners(item.face);
+    const auto [a, b, c] = corners_of(solid_, solid_.faces[item.face]);
     Polygon polygon = {a, b, c};
     for (const HalfSpace& space : found_) {
       clip(polygon, spare_, space.normal, space.offset - depth_);
@@ -141,11 +136,6 @@ class Growth {
       }
     }
     found_.push_back({planes_.normal(best), planes_.offset(best) + std::max(0.0, most)});
-  }
-
-  std::array<Vec3, 3> corners(std::int32_t face) const {
-    const auto [a, b, c] = solid_.faces[face];
-    return {solid_.vertices[a], solid_.vertices[b], solid_.vertices[c]};
   }
 
   const Mesh& solid_;

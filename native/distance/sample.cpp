@@ -25,9 +25,7 @@ SurfaceSamples sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t
   std::vector<double> area_up_to(mesh.faces.size());
   double area = 0;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    const Triangle& face = mesh.faces[f];
-    const Vec3 a = mesh.vertices[face[0]];
-    area += norm(cross(mesh.vertices[face[1]] - a, mesh.vertices[face[2]] - a));
+    area += norm(long_normal(mesh, mesh.faces[f]));
     area_up_to[f] = area;
   }
   SurfaceSamples samples;
@@ -46,9 +44,8 @@ SurfaceSamples sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t
     const double step = static_cast<double>(i + 1);
     double u = fraction(shift_u + step * kStepU), v = fraction(shift_v + step * kStepV);
     if (u + v > 1) u = 1 - u, v = 1 - v;
-    const Triangle& face = mesh.faces[f];
-    const Vec3 a = mesh.vertices[face[0]];
-    samples.points[i] = a + u * (mesh.vertices[face[1]] - a) + v * (mesh.vertices[face[2]] - a);
+    const auto [a, b, c] = corners_of(mesh, mesh.faces[f]);
+    samples.points[i] = a + u * (b - a) + v * (c - a);
     samples.faces[i] = static_cast<std::int32_t>(f);
   }
   return samples;

@@ -12,37 +12,14 @@ namespace {
 
 constexpr double kRounding = 1e-12;  // points this far outside a plane count as on it
 
-using Corners = std::array<Vec3, 3>;
-
-// The side from corner k to corner k + 1 that is longest.
-int longest_side(const Corners& corner) {
-  int longest = 0;
-  for (int k = 1; k < 3; ++k)
-    if (norm2(corner[(k + 1) % 3] - corner[k]) > norm2(corner[(longest + 1) % 3] - corner[longest])) longest = k;
-  return longest;
-}
-
 std::array<Corners, 2> halves(const Corners& corner) {
   const int k = longest_side(corner);
   const Vec3 p = corner[k], q = corner[(k + 1) % 3], tip = corner[(k + 2) % 3], middle = 0.5 * (p + q);
   return {{{p, middle, tip}, {middle, q, tip}}};
 }
 
-// How far a box reaches from its middle along a plane's normal.
-double reach_along(Vec3 normal, Vec3 half) {
-  return std::fabs(normal.x) * half.x + std::fabs(normal.y) * half.y + std::fabs(normal.z) * half.z;
-}
-
 struct Body {
-  explicit Body(const Mesh& hull) : planes(hull) {
-    for (const Vec3 p : hull.vertices) box.extend(p);
-  }
-
-  bool is_near(const Box& other, double reach) const {
-    return box.lower.x - reach <= other.upper.x && other.lower.x <= box.upper.x + reach &&
-           box.lower.y - reach <= other.upper.y && other.lower.y <= box.upper.y + reach &&
-           box.lower.z - reach <= other.upper.z && other.lower.z <= box.upper.z + reach;
-  }
+  explicit Body(const Mesh& hull) : planes(hull), box(Box::of(hull.vertices)) {}
 
   ConvexPlanes planes;
   Box box;
@@ -95,10 +72,8 @@ class Cover {
       if (child >= 0) {
         for (int side = 0; side < 2; ++side) visit({child, side}, near);
       } else {
-        for (std::int32_t k = 0; k < node.leaf_size[branch.side]; ++k) {
-          const Triangle& face = solid_.faces[bvh_.face(~child + k)];
-          take({solid_.vertices[face[0]], solid_.vertices[face[1]], solid_.vertices[face[2]]}, near);
-        }
+        for (std::int32_t k = 0; k < node.leaf_size[branch.side]; ++k)
+          take(corners_of(solid_, solid_.faces[bvh_.face(~child + k)]), near);
       }
     }
     near_.resize(first);
@@ -111,7 +86,7 @@ class Cover {
     for (std::size_t i = above.first; i < above.last; ++i) {
       const Near candidate = near_[i];
       const Body& body = bodies_[candidate.body];
-      if (!body.is_near(box, reach_)) continue;
+      if (!body.box.meets(box, reach_)) continue;
       const std::size_t first = planes_.size();
       for (std::size_t k = candidate.first; k < candidate.last; ++k) {
         const std::int32_t plane = planes_[k];

@@ -1,11 +1,10 @@
 #include "distance/union_distance.hpp"
 
-#include <unordered_map>
-
 #include "base/stop.hpp"
 #include "cut/clip.hpp"
 #include "distance/surface_field.hpp"
 #include "mesh/curve.hpp"
+#include "mesh/weld.hpp"
 
 namespace rlacd {
 namespace {
@@ -22,57 +21,30 @@ constexpr std::size_t kMostPieces = 4096;
 // Two facets face the same way when the angle between them is below 60 degrees.
 constexpr double kSameWay = 0.5;
 
-bool overlap(const Box& a, const Box& b, double slack) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (a.lower[axis] > b.upper[axis] + slack || b.lower[axis] > a.upper[axis] + slack) return false;
-  return true;
-}
-
-Box box_of(const Corners& corner) {
-  Box box;
-  for (const Vec3 p : corner) box.extend(p);
-  return box;
-}
-
-double distance2_to_box(const Box& box, Vec3 p) {
-  double sum = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double d = std::max({box.lower[axis] - p[axis], p[axis] - box.upper[axis], 0.0});
-    sum += d * d;
-  }
-  return sum;
-}
-
 // Polygons merged into one mesh, in which equal corners are one vertex: its distance is computed once.
 class Gathering {
  public:
   void add(const Polygon& polygon) {
-    corner_.clear();
-    for (const Vec3 p : polygon) corner_.push_back(number_of(p));
-    for (std::size_t i = 2; i < corner_.size(); ++i) mesh_.faces.push_back({corner_[0], corner_[i - 1], corner_[i]});
+    const auto first = static_cast<std::int32_t>(soup_.vertices.size());
+    soup_.vertices.insert(soup_.vertices.end(), polygon.begin(), polygon.end());
+    for (auto i = static_cast<std::int32_t>(2); i < static_cast<std::int32_t>(polygon.size()); ++i)
+      soup_.faces.push_back({first, first + i - 1, first + i});
   }
-  Mesh take() { return std::move(mesh_); }
+  Mesh take() {
+    const std::vector<std::int32_t> first = first_in_place(soup_.vertices);
+    std::vector<std::int32_t> number(first.size());
+    Mesh mesh;
+    for (std::size_t v = 0; v < first.size(); ++v) {
+      const bool is_new = first[v] == static_cast<std::int32_t>(v);
+      number[v] = is_new ? static_cast<std::int32_t>(mesh.vertices.size()) : number[first[v]];
+      if (is_new) mesh.vertices.push_back(soup_.vertices[v]);
+    }
+    for (const auto& [a, b, c] : soup_.faces) mesh.faces.push_back({number[a], number[b], number[c]});
+    return mesh;
+  }
 
  private:
-  using Key = std::array<double, 3>;
-  struct Hash {
-    std::size_t operator()(const Key& p) const {
-      std::size_t all = 0;
-      for (const double x : p) all = (all ^ std::hash<double>()(x)) * 0x9e3779b97f4a7c15u;
-      return all;
-    }
-  };
-
-  std::int32_t number_of(Vec3 p) {
-    const auto next = static_cast<std::int32_t>(mesh_.vertices.size());
-    const auto [place, is_new] = number_.try_emplace(Key{p.x, p.y, p.z}, next);
-    if (is_new) mesh_.vertices.push_back(p);
-    return place->second;
-  }
-
-  Mesh mesh_;
-  std::unordered_map<Key, std::int32_t, Hash> number_;
-  std::vector<std::int32_t> corner_;
+  Mesh soup_;
 };
 
 // Whether a triangle lies farther than `gap` beyond a plane.
@@ -91,21 +63,9 @@ std::int32_t plane_before(const ConvexPlanes& planes, const Corners& corner, dou
 
 }  // namespace
 
-HullUnion::Member::Member(Mesh hull) : mesh(std::move(hull)), planes(mesh), bvh(mesh) {
-  for (const Triangle& face : mesh.faces)
-    for (const std::int32_t corner : face) box.extend(mesh.vertices[corner]);
-}
-
-double HullUnion::Member::distance(Vec3 p, double enough) const {
-  // The distance to the farthest facet plane that p is beyond is a lower bound of the distance to the hull.
-  const double beyond = -planes.nearest(p).depth;
-  if (beyond <= 0) return 0;
-  return beyond >= enough ? beyond : std::sqrt(bvh.closest(p).distance2);
-}
-
 HullUnion::HullUnion(std::vector<Mesh> hulls, int threads) : members_(hulls.size()) {
   parallel_for(hulls.size(), hulls.size() < 8 ? 1 : threads,
-               [&](std::size_t i) { members_[i] = std::make_shared<const Member>(std::move(hulls[i])); });
+               [&](std::size_t i) { members_[i] = std::make_shared<const ConvexBody>(std::move(hulls[i])); });
 }
 
 HullUnion HullUnion::only(const std::vector<std::int32_t>& some) const {
@@ -117,7 +77,7 @@ HullUnion HullUnion::only(const std::vector<std::int32_t>& some) const {
 double HullUnion::distance(Vec3 p) const {
   double best = kInfinity;
   for (const auto& member : members_)
-    if (distance2_to_box(member->box, p) < best * best) best = std::min(best, member->distance(p, best));
+    if (member->box().distance2(p) < best * best) best = std::min(best, std::max(0.0, member->distance(p, best)));
   return best;
 }
 
@@ -131,16 +91,16 @@ class HullField {
     if (hint >= 0) best = {from(hint, p), hint};
     for (std::size_t k = 0; k < members_.size() && best.value > enough; ++k) {
       if (static_cast<std::int32_t>(k) == hint) continue;
-      if (!(distance2_to_box(members_[k]->box, p) < best.value * best.value)) continue;
-      const double distance = members_[k]->distance(p, best.value);
+      if (!(members_[k]->box().distance2(p) < best.value * best.value)) continue;
+      const double distance = std::max(0.0, members_[k]->distance(p, best.value));
       if (distance < best.value) best = {distance, static_cast<std::int32_t>(k)};
     }
     return best;
   }
-  double from(std::int32_t hull, Vec3 p) const { return members_[hull]->distance(p, kInfinity); }
+  double from(std::int32_t hull, Vec3 p) const { return std::max(0.0, members_[hull]->distance(p)); }
 
  private:
-  const std::vector<std::shared_ptr<const HullUnion::Member>>& members_;
+  const std::vector<std::shared_ptr<const ConvexBody>>& members_;
 };
 
 HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
@@ -150,22 +110,22 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
   };
   std::vector<std::vector<Facet>> facets(members_.size());
   parallel_for(members_.size(), threads, [&](std::size_t own) {
-    const Mesh& mesh = members_[own]->mesh;
+    const Mesh& mesh = members_[own]->mesh();
     std::vector<std::int32_t> between(members_.size(), -1);  // the plane that the last facet lay beyond
     Clipper clipper;
     for (const Triangle& face : mesh.faces) {
       poll_stop();
       const Corners corner = corners_of(mesh, face);
-      const Vec3 normal = normalized(cross(corner[1] - corner[0], corner[2] - corner[0]));
-      const Box box = box_of(corner);
+      const Vec3 normal = normalized(long_normal(corner));
+      const Box box = Box::of(corner);
       Facet& facet = facets[own].emplace_back();
       facet.pieces = {{corner.begin(), corner.end()}};
       for (std::size_t m = 0; m < members_.size() && !facet.pieces.empty(); ++m) {
-        if (m == own || !overlap(box, members_[m]->box, gap)) continue;
+        if (m == own || !box.meets(members_[m]->box(), gap)) continue;
         // If another hull's facet faces the other way (or across), the hull is grown by the gap: a touching facet is
         // covered. If it faces the same way, the hull is shrunk by less than that: of two facets in one plane neither
         // covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
-        const ConvexPlanes& planes = members_[m]->planes;
+        const ConvexPlanes& planes = members_[m]->planes();
         if (const std::int32_t plane = plane_before(planes, corner, gap, between[m]); plane >= 0) {
           between[m] = plane;
           continue;
@@ -213,8 +173,8 @@ std::vector<char> HullUnion::held_faces(const Mesh& surface, int threads) const 
     std::vector<std::int32_t> near;
     std::size_t left = end - begin;
     for (std::size_t m = 0; m < members_.size() && left > 0; ++m) {
-      const ConvexPlanes& planes = members_[m]->planes;
-      if (!overlap(box, members_[m]->box, kInsideSlack) || !planes.that_meet(box, kInsideSlack, near)) continue;
+      const ConvexPlanes& planes = members_[m]->planes();
+      if (!box.meets(members_[m]->box(), kInsideSlack) || !planes.that_meet(box, kInsideSlack, near)) continue;
       const auto holds = [&](std::int32_t vertex) {
         return std::all_of(near.begin(), near.end(), [&](std::int32_t plane) {
           return planes.depth(plane, surface.vertices[vertex]) >= -kInsideSlack;
@@ -235,7 +195,7 @@ Greatest HullUnion::under(const Mesh& surface, double tolerance, int threads) co
   if (members_.empty()) return {{kInfinity, kInfinity}, {}};
   std::vector<HalfSpaces> grown;
   for (const auto& member : members_) {
-    for (double& offset : grown.emplace_back(member->planes).offset) offset += kInsideSlack;
+    for (double& offset : grown.emplace_back(member->planes()).offset) offset += kInsideSlack;
   }
 
   constexpr std::size_t kChunk = 64;
@@ -251,10 +211,10 @@ Greatest HullUnion::under(const Mesh& surface, double tolerance, int threads) co
     poll_stop();
     if (is_held[f]) return;
     const Corners corner = corners_of(surface, surface.faces[f]);
-    const Box box = box_of(corner);
+    const Box box = Box::of(corner);
     outside[f] = {{corner.begin(), corner.end()}};
     for (std::size_t m = 0; m < members_.size(); ++m) {
-      if (!overlap(box, members_[m]->box, kInsideSlack)) continue;
+      if (!box.meets(members_[m]->box(), kInsideSlack)) continue;
       if (outside[f].size() > kMostPieces) break;  // uncut pieces are not wrong here, only more work
       clipper.subtract(outside[f], grown[m]);
     }

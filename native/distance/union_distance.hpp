@@ -18,7 +18,7 @@
 #include "base/geometry.hpp"
 #include "distance/branch_and_bound.hpp"
 #include "distance/bvh.hpp"
-#include "hull/convex_planes.hpp"
+#include "hull/convex_body.hpp"
 
 namespace rlacd {
 
@@ -44,17 +44,6 @@ class HullUnion {
   double distance(Vec3 p) const;
 
  private:
-  struct Member {
-    explicit Member(Mesh hull);
-    // 0 inside, else the distance to the surface; may return any number >= `enough` once the distance is known to be
-    // that large.
-    double distance(Vec3 p, double enough) const;
-
-    Mesh mesh;
-    ConvexPlanes planes;
-    Bvh bvh;
-    Box box;
-  };
   friend class HullField;
 
   HullUnion() = default;
@@ -62,7 +51,7 @@ class HullUnion {
   // Which faces have all their corners in one of the hulls.
   std::vector<char> held_faces(const Mesh& surface, int threads) const;
 
-  std::vector<std::shared_ptr<const Member>> members_;
+  std::vector<std::shared_ptr<const ConvexBody>> members_;
 };
 
 }  // namespace rlacd

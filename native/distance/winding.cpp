@@ -6,8 +6,6 @@
 namespace rlacd {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 // Solid angle of the triangle seen from p (Van Oosterom and Strackee, 1983), positive when p is behind it.
 double solid_angle(const TriangleFrame& t, Vec3 p) {
   const Vec3 a = t.a - p, b = t.a + t.ab - p, c = t.a + t.ac - p;

@@ -4,9 +4,7 @@
 
 namespace rlacd {
 
-ConvexBody::ConvexBody(Mesh mesh) : mesh_(std::move(mesh)), planes_(mesh_) {
-  for (const Vec3 vertex : mesh_.vertices) box_.extend(vertex);
-}
+ConvexBody::ConvexBody(Mesh mesh) : mesh_(std::move(mesh)), planes_(mesh_), box_(Box::of(mesh_.vertices)) {}
 
 double ConvexBody::distance(Vec3 p, double enough) const {
   const double outside = -planes_.nearest(p).depth;

@@ -28,6 +28,7 @@ class ConvexBody {
   // The closest point of the surface to a point outside.
   Vec3 closest(Vec3 p) const { return bvh().closest(p).point; }
 
+  const Mesh& mesh() const { return mesh_; }
   const ConvexPlanes& planes() const { return planes_; }
   const Box& box() const { return box_; }
 

@@ -50,9 +50,8 @@ bool is_thin(const Mesh& hull, double extent) {
   double volume = 0, area = 0;  // six times and twice
   const Vec3 origin = hull.vertices[hull.faces[0][0]];
   for (const Triangle& face : hull.faces) {
-    const Vec3 a = hull.vertices[face[0]], b = hull.vertices[face[1]], c = hull.vertices[face[2]];
-    const Vec3 product = cross(b - a, c - a);
-    volume += dot(a - origin, product);
+    const Vec3 product = long_normal(hull, face);
+    volume += dot(hull.vertices[face[0]] - origin, product);
     area += norm(product);
   }
   return 2 * volume / 3 <= kThin * extent * area;
@@ -87,8 +86,7 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
   std::vector<Facet> facets;
   facets.reserve(hull.faces.size());
   for (const Triangle& face : hull.faces) {
-    const Vec3 a = hull.vertices[face[0]];
-    const Vec3 product = cross(hull.vertices[face[1]] - a, hull.vertices[face[2]] - a);
+    const Vec3 product = long_normal(hull, face);
     const double area = norm(product);
     if (!(area > 0)) continue;
     const Vec3 n = (1 / area) * product;

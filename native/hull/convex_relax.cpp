@@ -73,10 +73,7 @@ Mesh relax_around(Mesh outer, const Mesh& inner, const std::vector<Above>& bound
       const std::optional<Vec3> lowest = lowest_point(objective, constraints, kReach);
       if (lowest && dot(objective, *lowest) < dot(objective, v[w]) - 1e-12) v[w] = *lowest;
     }
-    const Hull hull = convex_hull(v);
-    Mesh next;
-    for (const std::int32_t i : hull.indices) next.vertices.push_back(v[i]);
-    next.faces = hull.faces;
+    Mesh next = hull_mesh(v);
     const double reached = mesh_volume(next.vertices, next.faces);
     outer = std::move(next);
     if (!(reached < (1 - kEnoughProgress) * volume)) break;

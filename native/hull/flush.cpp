@@ -85,8 +85,7 @@ FlushBody::FlushBody(const Mesh& hull) {
   std::map<std::array<std::int64_t, 3>, std::size_t> known;
   std::vector<std::vector<std::int32_t>> corners;
   for (const Triangle& face : hull.faces) {
-    const Vec3 a = hull.vertices[face[0]];
-    const Vec3 normal = normalized(cross(hull.vertices[face[1]] - a, hull.vertices[face[2]] - a));
+    const Vec3 normal = normalized(long_normal(hull, face));
     if (norm2(normal) == 0) continue;  // a sliver without a direction
     const std::array<std::int64_t, 3> key = {std::llround(kSameNormal * normal.x), std::llround(kSameNormal * normal.y),
                                              std::llround(kSameNormal * normal.z)};

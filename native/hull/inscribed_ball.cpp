@@ -6,8 +6,7 @@
 namespace rlacd {
 
 bool holds_ball(const Mesh& hull, double radius) {
-  Box box;
-  for (const Vec3 p : hull.vertices) box.extend(p);
+  const Box box = Box::of(hull.vertices);
   const double size = max_abs(box.upper - box.lower);
   if (!(size > 0)) return false;
   Mesh unit = hull;  // the linear program's tolerances are absolute

@@ -92,9 +92,8 @@ std::vector<Vec3> corners_of_intersection(const std::vector<Above>& planes) {
   const Mesh polar = hull_mesh(dual);
   std::vector<Vec3> corners;
   for (const Triangle& face : polar.faces) {
-    const Vec3 a = polar.vertices[face[0]];
-    const Vec3 normal = cross(polar.vertices[face[1]] - a, polar.vertices[face[2]] - a);
-    corners.push_back(1 / dot(normal, a) * normal);
+    const Vec3 normal = long_normal(polar, face);
+    corners.push_back(1 / dot(normal, polar.vertices[face[0]]) * normal);
   }
   return corners;
 }
@@ -106,8 +105,7 @@ std::array<Vec3, 3> main_directions(const Mesh& hull) {
   for (int i = 0; i < 3; ++i) {
     double most = 0;
     for (const Triangle& face : hull.faces) {
-      const Vec3 a = hull.vertices[face[0]];
-      const Vec3 normal = cross(hull.vertices[face[1]] - a, hull.vertices[face[2]] - a);
+      const Vec3 normal = long_normal(hull, face);
       const double size = i == 0   ? norm(normal)
                           : i == 1 ? norm(cross(best[0], normal))
                                    : std::fabs(dot(cross(best[0], best[1]), normal));
@@ -159,8 +157,7 @@ double missing_scale(const Mesh& outer, const Mesh& inner) {
   double scale = 1;
   for (const Triangle& face : outer.faces) {
     poll_stop();
-    const Vec3 a = outer.vertices[face[0]];
-    const Vec3 normal = normalized(cross(outer.vertices[face[1]] - a, outer.vertices[face[2]] - a));
+    const Vec3 normal = normalized(long_normal(outer, face));
     const double own = reach(outer, normal);
     if (own > 0) scale = std::max(scale, reach(inner, normal) / own);
   }

@@ -1,7 +1,6 @@
 #include "mesh/curve.hpp"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
 #include "base/stop.hpp"
@@ -30,42 +29,19 @@ std::uint32_t place_on_curve(Vec3 p, const Box& box) {
   return place;
 }
 
-// The order of items by their place, stable: a radix sort.
-std::vector<std::int32_t> order_of(std::vector<std::uint32_t> place) {
-  constexpr int kBits = 10;
-  std::vector<std::int32_t> order(place.size()), other(place.size());
-  std::vector<std::uint32_t> moved(place.size());
-  std::iota(order.begin(), order.end(), 0);
-  for (int shift = 0; shift < 30; shift += kBits) {
-    poll_stop();
-    std::array<std::size_t, (1 << kBits) + 1> begin{};
-    for (const std::uint32_t p : place) ++begin[(p >> shift & ((1 << kBits) - 1)) + 1];
-    for (std::size_t d = 1; d < begin.size(); ++d) begin[d] += begin[d - 1];
-    for (std::size_t i = 0; i < place.size(); ++i) {
-      const std::size_t slot = begin[place[i] >> shift & ((1 << kBits) - 1)]++;
-      other[slot] = order[i];
-      moved[slot] = place[i];
-    }
-    order.swap(other);
-    place.swap(moved);
-  }
-  return order;
-}
-
-Box box_of(const std::vector<Vec3>& points) {
-  Box box;
-  for (const Vec3 p : points) box.extend(p);
-  return box;
-}
-
-}  // namespace
-
+// The order of points, all in a box, along the curve; points of one cell stay in their order.
 std::vector<std::int32_t> order_along_a_curve(const std::vector<Vec3>& points, const Box& box) {
   poll_stop();
   std::vector<std::uint32_t> place(points.size());
   for (std::size_t i = 0; i < place.size(); ++i) place[i] = place_on_curve(points[i], box);
-  return order_of(std::move(place));
+  std::vector<std::int32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0);
+  poll_stop();
+  std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) { return place[a] < place[b]; });
+  return order;
 }
+
+}  // namespace
 
 std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
   std::vector<Vec3> middles;
@@ -74,14 +50,14 @@ std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
     const Vec3 sum = mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c];
     middles.push_back({sum.x / 3, sum.y / 3, sum.z / 3});
   }
-  return order_along_a_curve(middles, box_of(mesh.vertices));
+  return order_along_a_curve(middles, Box::of(mesh.vertices));
 }
 
 Mesh along_a_curve(const Mesh& mesh) {
   Mesh sorted;
   sorted.vertices.reserve(mesh.vertices.size());
   std::vector<std::int32_t> number(mesh.vertices.size());
-  for (const std::int32_t v : order_along_a_curve(mesh.vertices, box_of(mesh.vertices))) {
+  for (const std::int32_t v : order_along_a_curve(mesh.vertices, Box::of(mesh.vertices))) {
     number[v] = static_cast<std::int32_t>(sorted.vertices.size());
     sorted.vertices.push_back(mesh.vertices[v]);
   }

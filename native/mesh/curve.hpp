@@ -1,4 +1,4 @@
-// Orders along a space-filling curve (Morton's), of 2^10 cells along each axis of a box. Linear time.
+// Orders along a space-filling curve (Morton's), of 2^10 cells along each axis of a box.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,6 @@
 
 namespace rlacd {
 
-// The order of points, all in a box, along the curve; points of one cell stay in their order.
-std::vector<std::int32_t> order_along_a_curve(const std::vector<Vec3>& points, const Box& box);
 // The order of the middles of faces, in the box of all vertices.
 std::vector<std::int32_t> order_of_faces(const Mesh& mesh);
 

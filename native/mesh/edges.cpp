@@ -15,33 +15,6 @@ namespace {
 
 constexpr std::size_t kBetweenPolls = 4096;
 
-struct Run {
-  std::int32_t high;  // the larger of the edge's vertices
-  std::uint32_t halfedge;
-};
-
-// The halfedges of each vertex that is the smaller of their two, sorted by the larger and then by number.
-Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t vertices) {
-  Buckets<Run> runs(vertices);
-  for (const Triangle& f : faces)
-    for (int c = 0; c < 3; ++c) runs.count(std::min(f[c], f[c == 2 ? 0 : c + 1]));
-  runs.allocate();
-  for (std::size_t f = 0; f < faces.size(); ++f) {
-    if (f % kBetweenPolls == 0) poll_stop();
-    for (int c = 0; c < 3; ++c) {
-      const std::int32_t a = faces[f][c], b = faces[f][c == 2 ? 0 : c + 1];
-      runs.add(std::min(a, b), {std::max(a, b), static_cast<std::uint32_t>(3 * f + c)});
-    }
-  }
-  for (std::size_t v = 0; v < vertices; ++v) {
-    if (v % kBetweenPolls == 0) poll_stop();
-    const auto [begin, end] = runs.range(v);
-    std::sort(begin, end,
-              [](const Run& a, const Run& b) { return a.high != b.high ? a.high < b.high : a.halfedge < b.halfedge; });
-  }
-  return runs;
-}
-
 // The other halfedge along the same edge; empty if there are not always two, in opposite directions.
 std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::size_t vertices) {
   Buckets<Run> runs = sorted_halfedges(faces, vertices);
@@ -86,6 +59,27 @@ bool are_fans(const std::vector<Triangle>& faces, const std::vector<std::uint32_
 }
 
 }  // namespace
+
+Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t vertices) {
+  Buckets<Run> runs(vertices);
+  for (const Triangle& f : faces)
+    for (int c = 0; c < 3; ++c) runs.count(std::min(f[c], f[c == 2 ? 0 : c + 1]));
+  runs.allocate();
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    if (f % kBetweenPolls == 0) poll_stop();
+    for (int c = 0; c < 3; ++c) {
+      const std::int32_t a = faces[f][c], b = faces[f][c == 2 ? 0 : c + 1];
+      runs.add(std::min(a, b), {std::max(a, b), static_cast<std::uint32_t>(3 * f + c)});
+    }
+  }
+  for (std::size_t v = 0; v < vertices; ++v) {
+    if (v % kBetweenPolls == 0) poll_stop();
+    const auto [begin, end] = runs.range(v);
+    std::sort(begin, end,
+              [](const Run& a, const Run& b) { return a.high != b.high ? a.high < b.high : a.halfedge < b.halfedge; });
+  }
+  return runs;
+}
 
 Edges edges_of(const std::vector<Triangle>& faces, std::size_t vertices) {
   Buckets<Run> runs = sorted_halfedges(faces, vertices);

@@ -31,6 +31,13 @@ class Buckets {
   std::vector<Item> items_;
 };
 
+// The halfedges of each vertex that is the smaller of their two, sorted by the larger and then by number.
+struct Run {
+  std::int32_t high;  // the larger of the edge's vertices
+  std::uint32_t halfedge;
+};
+Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t vertices);
+
 // Halfedge 3 f + c runs from corner c of face f to its next corner.
 struct Edges {
   std::vector<std::int64_t> of_halfedge;              // [3F]

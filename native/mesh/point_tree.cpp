@@ -9,12 +9,6 @@ namespace {
 
 constexpr std::int32_t kLeaf = 8;  // points
 
-double distance2(const Box& box, Vec3 x) {
-  const auto gap = [](double low, double at, double high) { return std::max({low - at, at - high, 0.0}); };
-  return norm2(
-      {gap(box.lower.x, x.x, box.upper.x), gap(box.lower.y, x.y, box.upper.y), gap(box.lower.z, x.z, box.upper.z)});
-}
-
 }  // namespace
 
 PointTree::PointTree(std::vector<Vec3> points) : points_(std::move(points)), order_(points_.size()) {
@@ -50,7 +44,7 @@ void PointTree::within(Vec3 x, double radius, std::vector<std::int32_t>& found) 
   const double most = radius * radius;
   for (std::size_t n = 0; n < nodes_.size();) {
     const Node& node = nodes_[n];
-    if (distance2(node.box, x) > most) {
+    if (node.box.distance2(x) > most) {
       n = node.next;
       continue;
     }

@@ -7,7 +7,6 @@
 namespace rlacd {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // Faces closer in angle than this (radians) coincide to the precision of single-precision files.
 constexpr double kSameAngle = 1e-4;
 constexpr std::size_t kBetweenPolls = 4096;

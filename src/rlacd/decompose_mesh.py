@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.find_parts import Reached, covered, find_parts
-from rlacd.finish import Finished, finish, misses_some
+from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report
 from rlacd.io.read.conventions import UNITS
 from rlacd.io.read.load import load_mesh

@@ -1,4 +1,4 @@
-"""From a mesh to the parts of its solid: repair, simplify, cut, merge, search, lift.
+"""From a mesh to the parts of its solid: repair, simplify, cut, merge, search, lift; to at most so many parts.
 
 Each stage returns the best so far when the run stops, and none sends the data back.
 """
@@ -6,6 +6,7 @@ Each stage returns the best so far when the run stops, and none sends the data b
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,13 +15,14 @@ from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.criteria.limited import BOX, FEWEST
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, MOST_PER_FACE, cut_and_merge
-from rlacd.merge import COARSER, best_within, drop_slivers, grow_cover, merge_parts
+from rlacd.merge import drop_slivers, grow_cover, merge_parts
+from rlacd.merge.merge import united_in_turn
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
-from rlacd.proxy import Model
+from rlacd.proxy.model import Model
 from rlacd.repair.repair import repair
-from rlacd.run import Run
+from rlacd.run import Run, Work
 from rlacd.search import SearchContext, SearchSummary, at_least, cost, eliminate_parts, search
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
@@ -236,3 +238,49 @@ def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
 def _scale(criterion: Criterion) -> float | None:
     """How far a hull may reach beyond its part, if the criterion bounds that: an input of networks."""
     return criterion.overhang if math.isfinite(criterion.overhang) else None
+
+
+COARSER = 1.5
+"""The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
+only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
+
+
+def best_within(
+    most: int,
+    whole: Part,
+    decompose: Callable[[float], Sequence[Part]],
+    unite: Callable[[Part, Part], Part],
+    criterion: Criterion,
+    run: Run,
+) -> list[Part]:
+    """Find the decomposition into at most `most` parts whose largest error is least.
+
+    Parameters
+    ----------
+    most : int
+        Fewer than the decomposition without a limit has.
+    whole : Part
+        The solid as one part: what remains where there is no time.
+    decompose : callable
+        Decomposes the solid under a criterion whose threshold is larger by a factor; 1 gives what it has without a
+        limit.
+    unite : callable
+        Returns the union of two parts.
+    criterion : Criterion
+        Measures the errors.
+    """
+    best, least = [whole], math.inf
+    factor, begin = 1.0, run.work.done
+    try:
+        least = criterion.error(whole)
+        while True:
+            parts = decompose(factor)
+            for state, error in united_in_turn(parts, unite, criterion, Work(MOST_CUTTING), run):
+                if len(state) <= most and error < least:
+                    best, least = state, error
+            if len(parts) <= 1 or run.stopped_by is not None:
+                return best
+            factor *= COARSER if run.work.done - begin < MOST_CUTTING else COARSER**4
+    except Stopped:
+        run.note_stop()
+    return best

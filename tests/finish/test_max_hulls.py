@@ -98,7 +98,7 @@ def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() ->
 
 
 def test_coarser_thresholds_are_tried_where_the_finest_has_used_up_its_account(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rlacd.merge.to_count.MEASURING", 3e4)
+    monkeypatch.setattr("rlacd.find_parts.MOST_CUTTING", 3e4)
     closed = from_manifold(mug())
     result = rlacd.decompose((closed.vertices, closed.faces), max_hulls=4, quality="fast")
     assert error(result, "concavity") < 0.5

@@ -160,7 +160,7 @@ def test_a_contact_is_where_two_boxes_share_a_face() -> None:
     for wrong in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match="depth"):
             first.contact(second, wrong, 1e-6)
-    with pytest.raises(ValueError, match="side out of range"):
+    with pytest.raises(ValueError, match="out of range"):
         first.layer(second, np.array([6], dtype=np.int32), 0.1, 0.0)
 
 

@@ -17,7 +17,7 @@ from fuzz.geometry import Polytope, distance_to_union, winding_number
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
-from rlacd.repair.tangles import is_tangle
+from rlacd.repair.windings import is_tangle
 from rlacd.solid.solid import Solid
 
 Mesh = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]

@@ -18,7 +18,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -32,16 +33,13 @@ from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, dots, heights
 from rlacd.solid.component import Part
-from rlacd.solid.frame import Frame
+from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 MOST_CELLS = 256
 """Maximum number of grid cells along the longest side: for radii that need more, the balls are spaced more widely."""
-
-TOUCH = 1e-9
-"""A hull that reaches no deeper than this into a ball does not touch it."""
 
 LEAST_RADIUS = 0.1
 """A ball that has to shrink below this share of the radius is dropped."""
@@ -66,6 +64,7 @@ class Conflicts:
     most: float = 0.0
 
 
+@dataclass(frozen=True, repr=False)
 class Navigable(Criterion):
     """The navigable space of one solid, as a criterion.
 
@@ -85,23 +84,17 @@ class Navigable(Criterion):
         Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
     """
 
-    def __init__(
-        self,
-        radius: float,
-        tolerance: float,
-        balls: Balls,
-        warnings: tuple[str, ...] = (),
-        conflicts: Conflicts | None = None,
-        hull: Hull | None = None,
-    ) -> None:
-        self.radius = radius
-        self.tolerance = tolerance
-        self.balls = balls
-        self.allowance = 0.0
-        self.warnings = warnings
-        self.conflicts = conflicts or Conflicts()
-        self.hull = hull
-        self._intrusions = Intrusions(balls)
+    radius: float
+    tolerance: float
+    balls: Balls
+    warnings: tuple[str, ...] = ()
+    conflicts: Conflicts = Conflicts()
+    hull: Hull | None = None
+    allowance: float = 0.0
+
+    @cached_property
+    def _intrusions(self) -> Intrusions:
+        return Intrusions(self.balls)
 
     def __repr__(self) -> str:
         return f"Navigable(radius {self.radius:.4g}, tolerance {self.tolerance:.4g}, {len(self.balls)} balls)"
@@ -229,7 +222,7 @@ class Navigable(Criterion):
             return False
         if self._is_small(part) or len(self.balls) == 0:
             return True
-        if not self._intrusions.any_beyond(part, max(self.allowance, TOUCH)):
+        if not self._intrusions.any_beyond(part, max(self.allowance, ROUNDING)):
             return True
         if self.allowance == 0:
             return False
@@ -241,9 +234,8 @@ class Navigable(Criterion):
 
     def scaled(self, factor: float) -> Navigable:
         """Coarser: hulls may reach into the balls by so much that tolerance plus allowance grow by `factor`."""
-        other = Navigable.__new__(Navigable)
-        other.__dict__.update(self.__dict__)
-        other.allowance = max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance)
+        other = replace(self, allowance=max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance))
+        vars(other)["_intrusions"] = self._intrusions  # the balls are the same
         return other
 
     def settled(self, parts: Sequence[Part]) -> Navigable:
@@ -261,16 +253,7 @@ class Navigable(Criterion):
         )
         if conflicts == Conflicts():
             return self
-        settled = Navigable(
-            self.radius,
-            self.tolerance,
-            Balls(self.balls.centres[kept], radii[kept]),
-            self.warnings,
-            conflicts,
-            self.hull,
-        )
-        settled.allowance = self.allowance
-        return settled
+        return replace(self, balls=Balls(self.balls.centres[kept], radii[kept]), conflicts=conflicts)
 
     def _is_small(self, part: Part) -> bool:
         small = (self.tolerance + self.allowance) / 2
@@ -308,7 +291,7 @@ class Intrusions:
         if known is None:
             within = part.within
             candidates = None if within is None else self.of(within)[0]
-            known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, TOUCH)
+            known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, ROUNDING)
             with self._lock:  # another thread may have done the same, with the same result
                 self._known[part] = known
         return known

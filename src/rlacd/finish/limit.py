@@ -5,6 +5,7 @@ They grow to points just outside them, where repair moved the surface or a slive
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -12,18 +13,17 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria import Criterion
-from rlacd.finish.in_input import plain_hull
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, dots, heights
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.distance import hull_union
-from rlacd.solid.hull import NO_SIDES, Hull, keeps, limit_hull
+from rlacd.solid.hull import NO_SIDES, TOLERANCE, Hull, keeps, limit_hull
+
+LARGEST = float(np.finfo(np.float64).max)
+"""The largest coordinate."""
 
 SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
-
-MOST_GROWTH = 0.02
-"""Nor by more than this (the longest side of the input is 2), however large the threshold."""
 
 GROWTHS_TRIED = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
@@ -37,7 +37,7 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
     """
     if not math.isfinite(criterion.overhang):
         return part
-    growth = min(SHARE_OF_OVERHANG * criterion.overhang, MOST_GROWTH)
+    growth = SHARE_OF_OVERHANG * criterion.overhang
     for _ in range(GROWTHS_TRIED):
         hull = limit_hull(part.hull, limits, growth, sides)
         if hull is part.hull:
@@ -76,9 +76,6 @@ def limit_roughly(part: Part, limits: HullLimits) -> Part:
 SIDE_AREA = 0.02
 """A side has at least this share of the area of the convex hull: the facets of curved surfaces have less."""
 
-FLUSH = 1e-6
-"""What lies within this of a side's plane is in it, and hulls stay within it."""
-
 
 def resting_sides(solid: Component) -> FloatArray:
     """Find the sides of a solid's convex hull over which its centre of mass lies.
@@ -86,7 +83,8 @@ def resting_sides(solid: Component) -> FloatArray:
     Returns
     -------
     FloatArray
-        Half-spaces n.x <= d around the solid: rows of unit n, and d, [P, 4].
+        Half-spaces n.x <= d around the solid: rows of unit n, and d, [P, 4]. What lies within `TOLERANCE` of a side's
+        plane is in it.
     """
     hull, (_, centre, _) = solid.hull, _native.mesh_mass(solid.vertices, solid.faces)
     corners = hull.vertices[hull.faces]
@@ -101,10 +99,10 @@ def resting_sides(solid: Component) -> FloatArray:
             continue
         normal = normals[face] / areas[face]
         offset = dots(corners[face], normal).max()
-        coplanar = (dots(corners, normal) > offset - FLUSH).all(axis=1)
+        coplanar = (dots(corners, normal) > offset - TOLERANCE).all(axis=1)
         seen |= coplanar
         if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
-            sides.append([*normal, offset + FLUSH])
+            sides.append([*normal, offset + TOLERANCE])
     return np.array(sides).reshape(-1, 4)
 
 
@@ -135,10 +133,6 @@ def kept_within(part: Part, sides: FloatArray, criterion: Criterion) -> Part:
     return clipped if criterion.is_met(clipped) or not criterion.is_met(part) else part
 
 
-MOST_POINTS_TAKEN_IN = 10_000
-"""Of more points than this, only every second, third, ... is looked at."""
-
-
 def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> list[Part]:
     """Grow the hull nearest to each point to take it in, unless the hull's part then breaks the criterion.
 
@@ -146,7 +140,8 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     ----------
     parts : sequence of Part
     points : float64 [N, 3]
-        A hull that holds one already is skipped: its part is going to be dropped.
+        A hull that holds one already is skipped: its part is going to be dropped. Of more than `DENSE`, only every
+        second, third, ... is looked at.
     criterion : Criterion
 
     Returns
@@ -154,7 +149,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     list of Part
         In the same order, some with larger hulls.
     """
-    points = points[:: 1 + len(points) // MOST_POINTS_TAKEN_IN]
+    points = points[:: 1 + len(points) // DENSE]
     distance = np.array([hull_union([part.hull], 1).distance(points, 1) for part in parts])
     taker = np.where(distance > 0, distance, np.inf).argmin(axis=0)
     grown = list(parts)
@@ -167,3 +162,37 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
         if criterion.is_met(larger) or not criterion.is_met(part):
             grown[i] = larger
     return grown
+
+
+def plain_hull(points: FloatArray, limits: HullLimits) -> Hull:
+    """Get a box around points [N, 3], or a tetrahedron if a box has too many vertices or triangles."""
+    hull = Hull.of(_box_around(points) if limits.allow(vertices=8, faces=12) else _tetrahedron_around(points))
+    assert hull is not None
+    return hull
+
+
+def _box_around(points: FloatArray) -> FloatArray:
+    """Corners [8, 3] of a box around the points, padded on every side by the resolution of their largest coordinate.
+
+    One floating-point step along an axis may vanish next to a large coordinate on another axis.
+    """
+    step = step_of(points)
+    lower = np.maximum(points.min(axis=0), step - LARGEST) - step
+    upper = np.minimum(points.max(axis=0), LARGEST - step) + step
+    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
+
+
+def step_of(points: FloatArray) -> float:
+    """The resolution of the points' largest coordinate."""
+    limits = np.finfo(np.float64)
+    return float(np.abs(points).max() * limits.eps + limits.smallest_subnormal)
+
+
+def _tetrahedron_around(points: FloatArray) -> FloatArray:
+    """Corners [4, 3] of a tetrahedron around that box: one of its corners and three on the extended edges."""
+    box = _box_around(points)
+    lower, upper = box[0], box[-1]
+    to_lower = lower / 2 + upper / 2 > 0  # edges lead towards the origin, where coordinates do not overflow
+    corner, edge = np.where(to_lower, upper, lower), np.where(to_lower, lower - upper, upper - lower)
+    # 1/4 + 1/4 + 1/4 < 1: the far corner of the box stays inside in spite of rounding.
+    return np.concatenate([corner[None], corner + np.diag(4 * edge)])

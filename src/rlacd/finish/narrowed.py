@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.kept_open import least_kept
+from rlacd.criteria.limited import least_kept
 from rlacd.find_parts import Reached
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
 from rlacd.solid.distance import hull_union
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import Hull
 from rlacd.solid.passages import passage_balls
 from rlacd.solid.primitive import Balls
 
-NARROWEST = 0.008
+NARROWEST = 8 * HALF_THICKNESS
 """Radius of the narrowest passages looked for (the longest side is 2): folds of scans and gaps of sheets are such."""
 
 LEAST_LOSS = 0.1
@@ -32,17 +33,14 @@ LEAST_EXTENT = 0.1
 any extent, 11 one of this."""
 
 STARTS = 600
-"""Points of the surface from which balls start, and as many triangles."""
-
-MOST_BALLS = 500
-"""Of more, those that lose most are looked at."""
+"""Points of the surface from which balls start, and as many triangles; of more balls, those that lose most count."""
 
 MOST_LISTED = 50
 
 LOOKED_AT = 5
 """Places along a passage at which what is left is measured."""
 
-ACCURACY = 0.05
+ACCURACY = LEAST_LOSS / 2
 """Share of its radius to within which what is left of a ball is measured; less counts as closed."""
 
 _NEIGHBOURS = 8
@@ -68,7 +66,7 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> 
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
 
     balls = passage_balls(reached.solid.mesh, surface, (NARROWEST, most), STARTS, threads, lose)
-    balls = balls.some(np.argsort(union.distance(balls.centres, threads) / balls.radii, kind="stable")[:MOST_BALLS])
+    balls = balls.some(np.argsort(union.distance(balls.centres, threads) / balls.radii, kind="stable")[:STARTS])
     passage, found = _passages(balls, surface, threads), []
     first = np.sort(np.unique(passage, return_index=True)[1])[:MOST_LISTED]
     long = [own for own in (balls.some(passage == passage[i]) for i in first) if _is_long(own)]

@@ -8,17 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import LOST_VOLUME, Component, Part
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, Hull, keeps
 from rlacd.solid.primitive import Primitive
-
-PRIMITIVE_SLACK = 1e-9
-"""Primitives are larger than what they are fitted to by this, so that rounding leaves no point outside (frame)."""
 
 SIMPLER = 1.25
 """A simpler primitive is preferred unless its volume exceeds that of the tightest by this factor."""
@@ -30,7 +27,7 @@ the frame's."""
 SAME_DIRECTION = 0.9998
 """Cosine of the angle (1 degree) below which two directions are tried once."""
 
-ROUND_AXES = 4
+ROUND_AXES = DIRECTIONS // 3
 """Axes about which capsules and cylinders are fitted: those with the least volume by a lower bound."""
 
 RADII = np.linspace(1.0, 1.4, 21)
@@ -42,7 +39,7 @@ def primitive_part(
     criterion: Criterion,
     kinds: Collection[PrimitiveKind],
     limits: HullLimits = NO_LIMITS,
-    slack: float = PRIMITIVE_SLACK,
+    slack: float = ROUNDING,
     solid: Component | None = None,
 ) -> Part:
     """Get the part with a primitive for a hull, if one meets the criterion; otherwise the same part.
@@ -184,7 +181,7 @@ class _Shadow:
         self._axes = axes
         self._points = points @ axes
         seen = np.ascontiguousarray(self._points[:, :2])
-        self.outline: FloatArray = seen[_native.outline(seen)]
+        self.outline = outline(seen)
         x, y = (self.outline - seen[0]).T
         self.area = float(np.roll(y, -1) @ x - np.roll(x, -1) @ y) / 2
         along = self._points[:, 2]
@@ -228,6 +225,16 @@ class _Shadow:
             return Primitive("capsule", place, self._axes, (wider, max(last - first, 0.0)))
 
         return _least(map(of_radius, (radius * RADII).tolist()))
+
+
+def outline(points: FloatArray) -> FloatArray:
+    """Corners [K, 2] of the convex hull of points [N, 2], counter-clockwise; none if they lie on a line."""
+    prism = Hull.of(np.column_stack([np.tile(points, (2, 1)), np.repeat([0.0, 1.0], len(points))]))
+    if prism is None:
+        return points[:0]
+    corners = prism.vertices[prism.vertices[:, 2] == 0, :2]
+    x, y = (corners - corners.mean(axis=0)).T
+    return corners[np.argsort(np.arctan2(y, x))]
 
 
 def _candidate_axes(hull: Hull) -> FloatArray:

@@ -22,17 +22,17 @@ from rlacd.options.presets import Preset, find_preset
 from rlacd.run import Run
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import Interval, Place, hull_distances
-from rlacd.solid.frame import Frame
+from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
 
-COVERAGE_TOLERANCE = 5e-3
+COVERAGE_TOLERANCE = 5 * HALF_THICKNESS
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
 
-NEARLY = 1e-3
-"""No point of the input should lie farther outside the hulls than this, which is half the thickness of a sheet."""
+NEARLY = HALF_THICKNESS
+"""No point of the input should lie farther outside the hulls than this."""
 
 FINE = NEARLY / 10
 """Width of the intervals where the usual one would decide a warning, or whether hulls have to grow to the input."""

@@ -18,14 +18,11 @@ from rlacd.merge.merge import is_alone, merge_parts
 from rlacd.merge.slivers import drop_slivers
 from rlacd.run import Run, work
 from rlacd.solid.arrays import FloatArray, heights
-from rlacd.solid.component import ClippedPart, Component, Part, Plane
+from rlacd.solid.component import DENSE, ClippedPart, Component, Part, Plane
 from rlacd.solid.hull import TOLERANCE, Hull
 
 CROSSING = 1 / 3
 """Bodies cross where at least this share of the parts share material with others."""
-
-MOST_FACES = 10_000
-"""Solids of more faces are left alone: clipping one of 33,000 to what had grown took 5 seconds."""
 
 DEPTH = 0.4
 """How deep the solid's surface may come into what has grown, as a share of the criterion's overhang: at 0.1, the
@@ -54,7 +51,7 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
         The solid that was decomposed.
     """
     judges = criterion.screen.looks_inside and math.isfinite(criterion.overhang)
-    if not judges or solid.size > MOST_FACES or sum(not is_alone(part) for part in merged) < CROSSING * len(merged):
+    if not judges or solid.size > DENSE or sum(not is_alone(part) for part in merged) < CROSSING * len(merged):
         return merged
     try:
         parts = _regrown(merged, criterion, run, solid)

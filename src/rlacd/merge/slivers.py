@@ -12,16 +12,14 @@ from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.distance import hull_union
-from rlacd.solid.hull import Hull
+from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.hull import SLIVER_RADIUS, Hull
 from rlacd.solid.topology import BoolArray
 
-SLIVER_RADIUS = 0.01
-"""A hull is a sliver if the radius of its inscribed ball is below this share of its largest extent."""
+FILM = HALF_THICKNESS / 5
+"""Mean thickness below which a part is a film left by rounding: real sheets are ten times thicker."""
 
-FILM = 2e-4
-"""Mean thickness below which a part is a film left by rounding: repair makes real sheets ten times thicker."""
-
-SLIVER_LOSS = 2e-3
+SLIVER_LOSS = 2 * HALF_THICKNESS
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
 
 

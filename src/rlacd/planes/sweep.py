@@ -18,14 +18,15 @@ from rlacd import _native
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, all_planes, axis_and_principal
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
+from rlacd.solid.hull import SLIVER_RADIUS
 
 Made = TypeVar("Made")
 
-SLIVER = 0.02
-"""A side thinner than this share of its largest extent (an inscribed ball of 1/100) is a sliver."""
+SLIVER = 2 * SLIVER_RADIUS
+"""A side thinner than this share of its largest extent is a sliver."""
 
-ROUNDING_FACTOR = 10
-"""Least volume of a side as a multiple of the negligible volume: the sweep and the cut round differently."""
+LEAST_SIDE = 10 * NEGLIGIBLE_VOLUME
+"""Least volume of a side: the sweep and the cut round differently."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +62,8 @@ class Sweep:
     def valid(self, sliver: float = SLIVER) -> BoolArray:
         """Whether each plane meets the solid and leaves no side thinner than `sliver` times its largest extent."""
         return (
-            (self.solid_below > ROUNDING_FACTOR * NEGLIGIBLE_VOLUME)
-            & (self.solid_above > ROUNDING_FACTOR * NEGLIGIBLE_VOLUME)
+            (self.solid_below > LEAST_SIDE)
+            & (self.solid_above > LEAST_SIDE)
             & (self.thickness_below > sliver * self.extent_below)
             & (self.thickness_above > sliver * self.extent_above)
         )
@@ -146,7 +147,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
         candidates.offsets,
         exponent,
         TIE * (most if math.isinf(exponent) else most**exponent),
-        ROUNDING_FACTOR * NEGLIGIBLE_VOLUME,
+        LEAST_SIDE,
         SLIVERS,
         threads,
     )

@@ -10,12 +10,11 @@ from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.planes.sweep import Sweep, paper_planes, sweep, valid_planes
 from rlacd.policies.greedy import excess_norm
 from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray
+from rlacd.solid.component import NEGLIGIBLE_VOLUME as TINY
 from rlacd.solid.component import Component
 
 STEPS = (1, 2)
 """Distances of the neighbours that are looked at, in planes of the same direction."""
-
-TINY = 1e-12
 
 FEATURES = 38
 
@@ -102,7 +101,7 @@ def surface_points(component: Component, count: int) -> Float32Array:
     return seen
 
 
-PLANES = 150
+PLANES = 6 * OFFSETS_PER_AXIS
 
 
 def sweep_features(component: Component, threshold: float) -> Float32Array:

@@ -18,9 +18,7 @@ from typing import Protocol
 
 from rlacd.errors import OptionError
 from rlacd.solid.component import Component, Plane
-
-UNIT = 1e-6
-"""How far the length of a normal may be from 1."""
+from rlacd.solid.hull import TOLERANCE
 
 
 class Policy(Protocol):
@@ -75,4 +73,4 @@ class CheckedPolicy:
 def _is_plane(answer: object) -> bool:
     if not isinstance(answer, Plane) or len(answer.normal) != 3:
         return False
-    return abs(math.hypot(*answer.normal) - 1) <= UNIT and math.isfinite(answer.offset)
+    return abs(math.hypot(*answer.normal) - 1) <= TOLERANCE and math.isfinite(answer.offset)

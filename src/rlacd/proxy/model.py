@@ -1,4 +1,8 @@
-"""What is cut in place of a solid: the solid itself, or a simpler copy of a dense one."""
+"""What is cut in place of a solid: the solid itself, or a simpler copy of a dense one, whose parts are carried back.
+
+Every hull takes in what of the solid's surface it misses (`Filling.uncovered`), so that together the hulls cover the
+solid; its part is then the solid clipped to it. Each part is tested on the solid itself; one that fails is cut there.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +10,164 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion
+from rlacd.cut import CutTree
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import merge_lifted
 from rlacd.policies import Policy
-from rlacd.proxy.lift import Lift
-from rlacd.proxy.simplify import FEW_TRIANGLES, Proxy, simplify
+from rlacd.proxy.simplify import Proxy, simplify
 from rlacd.run import Run
-from rlacd.solid.component import Component, Part
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE, Component, Part
+from rlacd.solid.frame import GROWTH_TO_SPARE, HALF_THICKNESS
+from rlacd.solid.hull import TOLERANCE, Hull, limit_hull
 from rlacd.solid.solid import Shape
+
+SIMPLE_FIRST = 2 * HALF_THICKNESS
+"""The hulls of a proxy's parts are simplified within this first: they have to grow anyway. Grown hulls are simplified
+within half of it: noise gives them many corners."""
 
 MARGIN = 1.5
 """Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
+
+
+@dataclass
+class _Lifted:
+    """A part on its way to the solid.
+
+    Attributes
+    ----------
+    hull : Hull
+    is_fresh : bool
+        Whether it comes from the proxy, and was not cut on the solid.
+    part : Part or None
+        Its part of the solid, if that is known for this hull.
+    is_met : bool
+        Whether that is known to meet the goal.
+    """
+
+    hull: Hull
+    is_fresh: bool
+    part: Part | None = None
+    is_met: bool = False
+
+    @property
+    def on_solid(self) -> Part:
+        """Its part of the solid, which is known."""
+        assert self.part is not None, "clipped first"
+        return self.part
+
+    def grow(self, points: FloatArray) -> None:
+        """Take in points.
+
+        A part that was cut on the solid stays what it is, without the slivers that were left out, and its hull is not
+        simplified: there may be no room for it below the threshold.
+        """
+        grown = Hull.of(np.concatenate([self.hull.vertices, points]))
+        assert grown is not None, "a hull stays solid when it grows"
+        self.hull = limit_hull(grown, tolerance=SIMPLE_FIRST / 2 if self.is_fresh else TOLERANCE)
+        self.part = None if self.is_fresh or self.part is None else self.part.with_hull(self.hull)
+        self.is_met = False
+
+
+@dataclass(frozen=True)
+class Lift:
+    """Carries parts of a proxy to the solid.
+
+    Attributes
+    ----------
+    solid : Component
+    deviation : float
+        Of the proxy.
+    goal : Criterion
+        Tests the parts on the solid.
+    policy : Policy
+        Chooses the planes where parts are cut again.
+    run : Run
+        When it stops, the parts stay those of the proxy, with hulls that cover the solid.
+    """
+
+    solid: Component
+    deviation: float
+    goal: Criterion
+    policy: Policy
+    run: Run
+
+    def __call__(self, parts: Sequence[Part], mend: bool = True) -> list[Part]:
+        """Get the parts of the solid; together they cover it.
+
+        Parameters
+        ----------
+        parts : sequence of Part
+            They cover the proxy.
+        mend : bool
+            Cut parts again if they meet their criterion on the proxy only.
+        """
+        with self.run.shielded():
+            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), True) for part in parts]
+            self._cover(lifted)
+            hulls = [each.hull for each in lifted]
+        try:
+            return self._tested(lifted) if mend else self.run.map(self._clipped, hulls)
+        except Stopped:
+            self.run.note_stop()
+            return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
+
+    def _tested(self, lifted: list[_Lifted]) -> list[Part]:
+        """Clip the solid to the hulls, and cut it there where one fails, until all meet the goal."""
+        self._clip(lifted)
+        while failing := self._failing(lifted):
+            for i in reversed(failing):
+                lifted[i : i + 1] = self._cut_again(lifted[i].on_solid)
+            self._cover(lifted)
+            self._clip(lifted)
+        return [each.on_solid for each in lifted]
+
+    def _cut_again(self, part: Part) -> list[_Lifted]:
+        """Cut a part of the solid."""
+        tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
+        new = cut_and_merge(tree, self.goal, self.run).parts or [part]
+        return [_Lifted(part.hull, False, part) for part in new]
+
+    def confirmed(self, hull: Hull) -> Part | None:
+        """Get what the solid fills of a hull; None if it does not meet the goal."""
+        part = self._clipped(hull)
+        return part if self.goal.is_met(part) else None
+
+    def _cover(self, lifted: Sequence[_Lifted]) -> None:
+        """Grow hulls where necessary to cover the solid's surface; those that need not grow stay the same."""
+        points = self.solid.filling.uncovered(
+            [each.hull.vertices for each in lifted],
+            [each.hull.faces for each in lifted],
+            2 * self.deviation + SIMPLE_FIRST,
+            GROWTH_TO_SPARE,
+            self.run.threads,
+        )
+        for each, own in zip(lifted, points, strict=True):
+            if len(own):
+                each.grow(own)
+
+    def _clip(self, lifted: Sequence[_Lifted]) -> None:
+        """Get what the solid fills of hulls that have changed."""
+        changed = [each for each in lifted if each.part is None]
+        for each, part in zip(changed, self.run.map(self._clipped, [each.hull for each in changed]), strict=True):
+            each.part = part
+
+    def _clipped(self, hull: Hull) -> Part:
+        """What the solid fills of a hull; the hull itself if that is nothing."""
+        part = self.solid.inside(hull)
+        return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
+
+    def _failing(self, lifted: Sequence[_Lifted]) -> list[int]:
+        """Indices of the parts that fail on the solid, but for those that were cut there before."""
+        fresh = [i for i, each in enumerate(lifted) if each.is_fresh and not each.is_met]
+        verdicts = self.run.map(self.goal.is_met, [lifted[i].on_solid for i in fresh])
+        for i, is_met in zip(fresh, verdicts, strict=True):
+            lifted[i].is_met = is_met
+        return [i for i in fresh if not lifted[i].is_met]
 
 
 @dataclass(frozen=True)
@@ -40,7 +190,7 @@ class Model:
     def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, run: Run) -> Model:
         """Make the model of a solid; `pieces` are closed solids whose union it is (see `simplify`)."""
         proxy = None
-        if math.isfinite(goal.overhang) and len(solid.faces) >= FEW_TRIANGLES:
+        if math.isfinite(goal.overhang) and len(solid.faces) >= DENSE:
             try:
                 with run.stage("simplify"):
                     proxy = simplify(solid, goal.overhang, run.threads, pieces)
@@ -62,7 +212,7 @@ class Model:
         if self.proxy is None:
             return parts
         with run.stage("lift"):
-            lift = Lift(self.solid, self.proxy.deviation, goal, self.tighter(goal), policy, run)
+            lift = Lift(self.solid, self.proxy.deviation, goal, policy, run)
             parts = lift(parts, mend=run.stopped_by is None)
             if merge and run.stopped_by is None:  # the margin may have kept some apart
                 looser = goal.scaled(1 + self._margin)

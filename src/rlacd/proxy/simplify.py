@@ -2,8 +2,8 @@
 
 What a decomposition costs grows with the triangles, what it needs only with the shape. Noise costs parts too, and a
 proxy averages it: its faces lie in the middle of those they replace (M. Garland and P. Heckbert, "Surface
-Simplification Using Quadric Error Metrics", SIGGRAPH 1997). Nothing is promised about a proxy: `rlacd.proxy.lift` makes
-and checks every hull on the solid itself.
+Simplification Using Quadric Error Metrics", SIGGRAPH 1997). Nothing is promised about a proxy: `rlacd.proxy.model`
+makes and checks every hull on the solid itself.
 
 Where noisy walls of two bodies touch, their union is riddled with tunnels, sometimes thousands, which no simplification
 removes. So the pieces that repair united are simplified one by one, and united again.
@@ -21,11 +21,10 @@ import numpy as np
 from rlacd import _native
 from rlacd.repair.union import CrossingsError, unite
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.component import Component
+from rlacd.solid.component import DENSE, Component
+from rlacd.solid.distance import PLACES
 from rlacd.solid.solid import Shape, mesh_of
-
-FEW_TRIANGLES = 10_000
-"""Solids with fewer triangles are decomposed as they are: little time is to be gained, and a few parts to be lost."""
+from rlacd.solid.topology import point_bodies
 
 NEAR = 0.1
 """A proxy deviates by at most this share of the threshold, but for `OFTEN`."""
@@ -40,8 +39,8 @@ STEP = 0.7
 """Ratio of the numbers of triangles of one proxy and the next. Planes are fitted to each anew: those of the original
 are noisy, and tell nothing about points far from them."""
 
-COARSEST, COARSEST_PIECE = 100, 12
-"""No proxy has fewer triangles, nor a piece of one if it had more before."""
+COARSEST = 12
+"""No proxy, or piece of one, has fewer triangles, if it had more before."""
 
 LOST_OF_SOLID, LOST_OF_PIECES = 0.02, 0.1
 """A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Pieces
@@ -49,14 +48,6 @@ may lose more: a sheet of even thickness has less volume once its noise, and so 
 
 WORTHWHILE = 0.5
 """A proxy has at most this share of the solid's triangles; also the step while it is larger than any looked at."""
-
-TYPICAL_REDUCTION = 8
-"""Proxies with more than one triangle in this many are only looked at where smaller ones are not near enough."""
-
-VERTICES_MEASURED, LEAST_MEASURED = 2000, 50
-"""Number of the solid's vertices whose distances are measured, besides one of each body; and of each of its pieces, at
-least."""
-
 
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 """Vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]``, closed."""
@@ -107,11 +98,10 @@ def simplify(solid: Component, threshold: float, threads: int = 1, pieces: Seque
 
 def _copies(solid: Component, threshold: float, threads: int, pieces: Sequence[Shape]) -> Iterator[_Copy | None]:
     """Copies of a solid made in several ways, the best first; None for each way in which none is near enough."""
-    mesh, size = (solid.vertices, solid.faces), len(solid.faces)
+    mesh = solid.vertices, solid.faces
     if pieces:
-        yield _smallest(mesh, threshold, threads, FEW_TRIANGLES)
+        yield _smallest(mesh, threshold, threads, DENSE)
         yield _of_pieces(pieces, solid, threshold, threads)
-    yield _smallest(mesh, threshold, threads, max(FEW_TRIANGLES, size // TYPICAL_REDUCTION))
     yield _smallest(mesh, threshold, threads)
 
 
@@ -121,8 +111,8 @@ def _of_pieces(pieces: Sequence[Shape], solid: Component, threshold: float, thre
     size = sum(len(faces) for _, faces in meshes)
     copies = []
     for mesh in meshes:
-        samples = max(LEAST_MEASURED, VERTICES_MEASURED * len(mesh[1]) // size)
-        copy = _smallest(mesh, threshold, threads, FEW_TRIANGLES, samples, COARSEST_PIECE, LOST_OF_PIECES)
+        samples = PLACES * len(mesh[1]) // size
+        copy = _smallest(mesh, threshold, threads, DENSE, samples, LOST_OF_PIECES)
         copies.append(copy or _Copy(mesh, np.zeros(1)))
     if sum(len(copy.mesh[1]) for copy in copies) > WORTHWHILE * size:
         return None
@@ -140,20 +130,19 @@ def _smallest(
     threshold: float,
     threads: int,
     largest: float = math.inf,
-    samples: int = VERTICES_MEASURED,
-    coarsest: int = COARSEST,
+    samples: int = PLACES,
     lost: float = LOST_OF_SOLID,
 ) -> _Copy | None:
     """The smallest copy that is near enough; None if none with at most `largest` triangles is, or so many are needed
     that it is not worthwhile."""
     largest = min(largest, WORTHWHILE * len(mesh[1]))
-    if largest < coarsest:
+    if largest < COARSEST:
         return None
     volume = _native.mesh_volume(*mesh)
     looked_at = mesh[0][_samples(mesh, samples)]
     best: _Copy | None = None
     copy = mesh
-    while (count := math.floor((STEP if len(copy[1]) <= largest else WORTHWHILE) * len(copy[1]))) >= coarsest:
+    while (count := math.floor((STEP if len(copy[1]) <= largest else WORTHWHILE) * len(copy[1]))) >= COARSEST:
         copy = _reduced(copy, count, threads)
         if len(copy[1]) <= largest:
             if not _is_alike(copy, volume, lost):
@@ -169,7 +158,7 @@ def _smallest(
 
 def _samples(mesh: Mesh, samples: int) -> IntArray:
     """Indices of one vertex of each body and of some others, the same ones every time."""
-    _, firsts = np.unique(_native.point_bodies(*mesh), return_index=True)
+    _, firsts = np.unique(point_bodies(*mesh), return_index=True)
     count = len(mesh[0])
     others = np.random.default_rng(0).choice(count, min(samples, count), replace=False)
     return np.concatenate([firsts, others]).astype(np.int32)

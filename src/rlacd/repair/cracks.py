@@ -9,18 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rlacd._native import PointTree, poll_stop
+from rlacd._native import PointTree, components, poll_stop
 from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import (
-    BoolArray,
-    Edges,
-    IntArray,
-    components,
-    first_of_doubled,
-    has_marked,
-    marked,
-    nondegenerate,
-)
+from rlacd.solid.topology import BoolArray, Edges, IntArray, first_of_doubled, has_marked, marked, nondegenerate
 
 MOST_FREE_EDGES = 500_000
 """A soup with more free edges is not a scan with holes: tracing loops is the one step that walks edge by edge."""

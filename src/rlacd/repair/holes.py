@@ -19,27 +19,17 @@ from functools import cached_property
 
 import numpy as np
 
-from rlacd._native import poll_stop
-from rlacd.repair.caps import caps_of, smooth_share
+from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
-from rlacd.repair.rims import Rims, rims_of
+from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
 from rlacd.repair.soup import FLAPS, Soup
-from rlacd.repair.tangles import is_tangle
-from rlacd.repair.windings import trust_windings
+from rlacd.repair.windings import is_tangle, trust_windings
 from rlacd.repair.work import Work
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.solid import Hole
-from rlacd.solid.topology import (
-    BoolArray,
-    IntArray,
-    components,
-    face_areas,
-    first_of_doubled,
-    marked,
-    signed_tetrahedra,
-)
+from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled, marked
 
 HOLE, HOLE_SHARE = 0.1, 0.02
 """A nearly closed body, with holes of at most this share of its area, is closed with caps up to this far away: a scan
@@ -47,17 +37,18 @@ with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
 # The same share for the ends of a bar: it is four times as long as wide if one is open.
 _END = 3 * HOLE_SHARE
-# The volume per area of a tube is half the radius of a hole at its end, to this accuracy; that of a bottle, which is
-# wider than its neck, is more, and that of folded sheets less.
-_TUBE = 0.2
-# Limits on a wound's edges and on its share of the area of its body.
-_WOUND_EDGES, _WOUND = 12, 0.1
-# The cap of a wound continues the faces along this share of its rim.
-_SMOOTH_SHARE = 0.3
-# If there are this many wounds, and they are at least the same share of all holes, the mesh is damaged.
-_DAMAGED, _DAMAGED_SHARE = 4, 0.3
 # A ring of more edges than this is a mouth, not a wound, if its corners lie on a circle to this accuracy.
 _RING, _ROUND = 6, 0.1
+# The volume per area of a tube is half the radius of a hole at its end, to this accuracy; that of a bottle, which is
+# wider than its neck, is more, and that of folded sheets less.
+_TUBE = 2 * _ROUND
+# Limits on a wound's edges and on its share of the area of its body.
+_WOUND_EDGES, _WOUND = 2 * _RING, 5 * HOLE_SHARE
+# If there are this many wounds, the mesh is damaged.
+_DAMAGED = 4
+# So much is a good part: of a wound's rim, along which its cap continues the faces; of all holes of a damaged mesh,
+# which are wounds.
+_GOOD_PART = 0.3
 
 
 @dataclass
@@ -164,7 +155,7 @@ class _Caps:
         np.maximum.at(depth, self._hole_of[self._on], self._distance)
         there = self._is_reached
         np.maximum.at(reached, self._hole_of[self._on[there]], self._distance[there])
-        smooth = smooth_share(self._soup, self._rims, self._faces, self._hole_of) >= _SMOOTH_SHARE
+        smooth = smooth_share(self._soup, self._rims, self._faces, self._hole_of) >= _GOOD_PART
         ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
         columns = (own, self._cap_area / body_area, of_all / body_area, depth, reached, smooth, ring, is_tube)
         holes = [_Hole(*row) for row in zip(loops, *(column.tolist() for column in columns), strict=True)]
@@ -272,7 +263,7 @@ def _find_wounds(holes: list[_Hole]) -> None:
     for hole in holes:
         has_few_edges = len(hole.loop) <= _WOUND_EDGES
         hole.is_wound = has_few_edges and (hole.is_smooth or len(hole.loop) == 3) and hole.share <= _WOUND
-    is_damaged = sum(hole.is_wound for hole in holes) >= max(_DAMAGED, _DAMAGED_SHARE * len(holes))
+    is_damaged = sum(hole.is_wound for hole in holes) >= max(_DAMAGED, _GOOD_PART * len(holes))
     for hole in holes:
         is_harmless = hole.share <= HOLE_SHARE or hole.depth <= HOLE or hole.is_smooth
         hole.is_wound |= is_damaged and is_harmless and hole.share <= _WOUND

@@ -15,20 +15,18 @@ from collections.abc import Callable
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import poll_stop
+from rlacd._native import face_areas, poll_stop, signed_tetrahedra
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, probes
 from rlacd.repair.holes import close_holes, may_have_holes
-from rlacd.repair.record import STEPS as NAMES
-from rlacd.repair.record import measure
 from rlacd.repair.soup import MOST_PATCHES, Soup
-from rlacd.repair.tangles import MOST_TANGLED, is_tangle
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import are_unbuilt, build_slabs, build_walls, has_sheets, skins
-from rlacd.repair.windings import are_crowded, are_oriented, sort_out, take_as_they_are
-from rlacd.repair.work import Piece, Wanted, Work, query_of
+from rlacd.repair.windings import are_crowded, are_oriented, is_tangle, sort_out, take_as_they_are
+from rlacd.repair.work import STEPS as NAMES
+from rlacd.repair.work import Piece, Wanted, Work, measure, query_of
 from rlacd.repair.wraps import (
     fill_rooms,
     fill_slits,
@@ -41,19 +39,11 @@ from rlacd.repair.wraps import (
     wrap_sheets,
 )
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import (
-    NO_FILM,
-    BoolArray,
-    IntArray,
-    bodies_of,
-    compacted,
-    detach_films,
-    face_areas,
-    signed_tetrahedra,
-)
+from rlacd.solid.topology import NO_FILM, BoolArray, IntArray, bodies_of, compacted, detach_films
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
@@ -176,7 +166,7 @@ def repair(
     poll_stop()
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
     taken = one_body(welded_vertices, welded_faces)
-    if taken is not None and not (len(corners) <= MOST_TANGLED and is_tangle(query_of(taken[0], threads))):
+    if taken is not None and not (len(corners) <= DENSE and is_tangle(query_of(taken[0], threads))):
         shape, was_inward = taken
         row = BodyRepair(0, "reoriented" if was_inward else "closed", len(welded_faces), len(welded_faces), 0.0)
         return Solid(shape, (welded_vertices, welded_faces), frame, (row,), mesh.warnings, is_as_given=True)

@@ -7,30 +7,23 @@ from functools import cached_property
 
 import numpy as np
 
-from rlacd._native import poll_stop
+from rlacd._native import components, face_areas, long_normals, poll_stop
 from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import (
-    NO_FILM,
-    BoolArray,
-    Edges,
-    IntArray,
-    Sides,
-    components,
-    face_areas,
-    has_marked,
-    long_normals,
-    sides_of,
-)
+from rlacd.solid.hull import TOLERANCE
+from rlacd.solid.topology import NO_FILM, BoolArray, Edges, IntArray, Sides, has_marked, sides_of
 
-FLAT = 1e-6
+FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
 
 FLAPS = 0.05
 """A solid may have a few faces sticking out of it, up to this share of its area, beside flaps."""
 
+MOST_UNITED = 4000
+"""Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead."""
+
 # Sheets of a body are thickened one by one if there are at most so many, and they are no layers: of a body with more
-# faces than this, each lies in the boxes of more than so many sheets, on average. Layers take minutes to unite.
-MOST_PATCHES, _MOST_LAYERED, _LAYERS = 100, 4000, 1.5
+# faces than are united, each lies in the boxes of more than so many sheets, on average. Layers take minutes to unite.
+MOST_PATCHES, _LAYERS = 100, 1.5
 # Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
 _FOLD = 0.94
 
@@ -96,7 +89,7 @@ class Soup:
         poll_stop()
         patches = np.unique(self.body * count + patch) // max(count, 1)
         together = np.bincount(patches) > MOST_PATCHES
-        for one in np.flatnonzero((np.bincount(self.body) > _MOST_LAYERED) & ~together):
+        for one in np.flatnonzero((np.bincount(self.body) > MOST_UNITED) & ~together):
             own = self.body == one
             together[one] = _layers(self.vertices[self.faces[own]], patch[own]) > _LAYERS
         patch = np.where(together[self.body], count + self.body, patch)

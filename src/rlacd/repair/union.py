@@ -10,7 +10,7 @@ from manifold3d import Manifold, OpType
 
 from rlacd import _native
 from rlacd._native import poll_stop
-from rlacd.repair.soup import FLAT
+from rlacd.repair.soup import FLAT, MOST_UNITED
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.arrays import IntArray as Indices
 from rlacd.solid.component import concatenated
@@ -23,11 +23,8 @@ from rlacd.solid.topology import IntArray, compacted
 # neighbour in a plane within 1e-12.
 _FLAT_MESH = 1e-11
 
-# Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead.
-MOST_UNITED = 4000
-
 # Number of triangles united at once; the work may be stopped between batches.
-_MESHES_UNITED = 20_000
+_MESHES_UNITED = 5 * MOST_UNITED
 
 # Pairs of crossing triangles, or corners of their arrangement, that are united at once; pairs after which solids are
 # not united exactly, and more per triangle: manifold3d takes about

@@ -16,14 +16,12 @@ from rlacd import _native
 from rlacd._native import label_cells, nearest_labels, poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.topology import BoolArray, IntArray
 
 DEFAULT_GAP = 0.03
 """Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units, by
 default."""
-
-# Distances between cells are roots of whole numbers: this much more than a radius adds only rounding.
-_GRID_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -91,12 +89,12 @@ class Reach:
         """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
         reached = self.reached.astype(self.room.dtype)
-        return np.asarray(nearest_labels(reached, cell, depth / self.pitch + _GRID_ROUNDING) == 0)
+        return np.asarray(nearest_labels(reached, cell, depth / self.pitch + ROUNDING) == 0)
 
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
-        return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + _GRID_ROUNDING)
+        return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + ROUNDING)
 
     def around_cells(self, cells: IntArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
@@ -139,7 +137,7 @@ class Reach:
 def _grown(cells: BoolArray, radius: float) -> BoolArray:
     """Return ``[X, Y, Z]`` which cells are at most `radius` cells away from one of `cells`."""
     result = np.zeros_like(cells)
-    reach = int(radius + _GRID_ROUNDING)
+    reach = int(radius + ROUNDING)
     padded = np.pad(cells, reach)
     tall = {0: padded}  # grown along the last axis alone
     for z in range(1, reach + 1):
@@ -148,7 +146,7 @@ def _grown(cells: BoolArray, radius: float) -> BoolArray:
         tall[z][..., :-z] |= padded[..., z:]
     x, y, z = cells.shape
     for dx, dy in itertools.product(range(-reach, reach + 1), repeat=2):
-        left = (radius + _GRID_ROUNDING) ** 2 - dx**2 - dy**2
+        left = (radius + ROUNDING) ** 2 - dx**2 - dy**2
         if left >= 0:
             poll_stop()
             result |= tall[int(left**0.5)][reach + dx : reach + dx + x, reach + dy : reach + dy + y, reach : reach + z]

@@ -1,4 +1,9 @@
-"""Which side of a face is inside, where the angles between faces cannot tell; bodies for which windings suffice."""
+"""Which side of a face is inside, by windings: where angles between faces cannot tell, and where windings suffice; and
+bodies that cross themselves so badly that their solid is inside out in places, and cannot be cut.
+
+Both sides of a cut are closed along rims. Where a solid is inside out, rims cross each other, and caps add as many
+faces as the cut has removed: the pieces have ever less volume, but no fewer faces, and none of them becomes convex.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from rlacd.repair.soup import FLAPS, FLAT, Soup
+from rlacd import _native
+from rlacd._native import signed_tetrahedra
+from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.soup import FLAPS, FLAT, Soup, face_normals
 from rlacd.repair.union import split_labels
 from rlacd.repair.work import Piece, Work
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE
+from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import BoolArray, is_balanced, marked, signed_tetrahedra
+from rlacd.solid.topology import BoolArray, IntArray, is_balanced, marked
 
 BESIDE = HALF_THICKNESS / 5
 """Distance from a face at which the winding number is evaluated."""
@@ -75,3 +86,31 @@ def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> S
     trusting = replace(soup, known_edges=soup.edges, trusted=before | doubted[soup.body])
     better = doubted & (trusting.sheet_share(bodies, flap) < share / 2)
     return replace(soup, known_edges=soup.edges, trusted=before | better[soup.body]) if better.any() else soup
+
+
+TANGLED = 0.02
+"""Share of a surface that is inside out from which it is a tangle. Of 600 meshes that people have made, all have up to
+0.012 but for one with 0.042, which became 1,408 hulls; tangles found by fuzzing have 0.027 and more. Dense bodies are
+none: noise turns some of their triangles over, and their proxies average that."""
+
+
+def is_tangle(solid: SurfaceQuery) -> bool:
+    """Whether a closed surface is inside out in too many places."""
+    return bool(_inside_out(solid, PLACES)[1].mean() > TANGLED)
+
+
+def tangled_bodies(solid: SurfaceQuery, vertices: FloatArray, faces: IntArray, body: IntArray) -> IntArray:
+    """Return the bodies of which too much is inside out, given the faces that the solid was built from."""
+    points, is_wrong = _inside_out(solid, DENSE)  # enough to tell in which bodies
+    at = body[SurfaceQuery(vertices, faces, solid.threads).closest(points)[1]]
+    count = len(np.bincount(body))
+    is_tangled = np.bincount(at, is_wrong, count) > TANGLED * np.bincount(at, minlength=count)
+    return np.flatnonzero(is_tangled & (np.bincount(body) <= DENSE))
+
+
+def _inside_out(solid: SurfaceQuery, count: int) -> tuple[FloatArray, BoolArray]:
+    """Points ``[N, 3]`` spread evenly over a closed surface, and whether it is inside out there."""
+    points, on = _native.sample_surface(solid.vertices, solid.faces.astype(np.int32), count, 0)
+    step = BESIDE * face_normals(solid.vertices, solid.faces[on].astype(np.int64))
+    beside = (solid.winding(points + way * step, is_closed=True) for way in (1, -1))
+    return points, np.minimum(*beside) < 0

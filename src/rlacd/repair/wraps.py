@@ -7,10 +7,8 @@ from manifold3d import Manifold
 
 from rlacd._native import poll_stop
 from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
-from rlacd.repair.soup import Soup, boxes_of, face_normals, no_faces
-from rlacd.repair.tangles import MOST_TANGLED, is_tangle, tangled_bodies
+from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.union import (
-    MOST_UNITED,
     area_of,
     as_manifold,
     size_of,
@@ -21,21 +19,22 @@ from rlacd.repair.union import (
 )
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.repair.walls import skins
+from rlacd.repair.windings import is_tangle, tangled_bodies
 from rlacd.repair.work import Piece, Work, query_of
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.topology import BoolArray, IntArray
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
-# A room of an outer skin is filled from this share of the solid's volume on: rooms in furniture have 0.04 and more,
-# crevices at most 0.0023.
+# A room of an outer skin is filled from this share of the solid's volume on, slits up to it: rooms in furniture have
+# 0.04 and more, crevices at most 0.0023.
 _SLIT_VOLUME = 0.01
-# A slit is filled from this depth on, up to this width (multiples of the gap), if all slits hold no more than this
-# share of the volume: what is shallower needs no cut, and what is wider leaves steps of the grid. Between caps it may
-# be wider, as in a fridge whose bodies close each other. It may have no volume, but this share of the surface has to go
-# with the slits.
-_DEEP, _BESIDE, _BETWEEN_CAPS, _LITTLE, _BARED = 1.5, 1 / 16, 1 / 4, 1e-2, 0.004
+# A slit is filled from this depth on, up to this width (multiples of the gap): what is shallower needs no cut, and what
+# is wider leaves steps of the grid. Between caps it may be wider, as in a fridge whose bodies close each other. It may
+# have no volume, but this share of the surface has to go with the slits.
+_DEEP, _BESIDE, _BETWEEN_CAPS, _BARED = 1.5, 1 / 16, 1 / 4, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
 _TUNNELS = 25
 # Where a filled room has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
@@ -82,7 +81,7 @@ def wrap_all(work: Work) -> None:
 
 def is_inside_out(work: Work) -> bool:
     """Whether some bodies cross too much of their own surface to be cut."""
-    return work.volume != 0 and np.bincount(work.soup.body).min() <= MOST_TANGLED and is_tangle(work.query())
+    return work.volume != 0 and np.bincount(work.soup.body).min() <= DENSE and is_tangle(work.query())
 
 
 def rebuild_tangles(work: Work) -> None:
@@ -210,7 +209,7 @@ def fill_slits(work: Work) -> None:
         return
     wrap = _wrap(work, work.reach.around_points(points), _WRAP_ERROR, query)
     filled = unite([as_manifold(work.solid), wrap])
-    is_little = abs(volume_of(filled) / work.volume - 1) < _LITTLE
+    is_little = abs(volume_of(filled) / work.volume - 1) < _SLIT_VOLUME
     if is_little and area_of(filled) < (1 - _BARED) * area_of(work.solid):
         work.solid = filled
         work.parts.append(Piece(wrap, int(_with_slits(work).argmax())))

@@ -26,6 +26,9 @@ LOST_VOLUME = 1e-6
 """Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
 
 
+DENSE = 10_000
+"""Solids and bodies of so many triangles are dense: a simpler copy is decomposed, and their noise is that of a scan."""
+
 Piece = tuple[FloatArray, IntArray, float, FloatArray, IntArray, float]
 """What kernels make of a solid: vertices [V, 3], faces [F, 3] and volume, and those of its hull."""
 

@@ -8,37 +8,29 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, heights, length
-from rlacd.solid.component import Part
+from rlacd.solid.component import DENSE, Part
 from rlacd.solid.frame import HALF_THICKNESS, Frame, thickened
-from rlacd.solid.hull import Hull
+from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.manifold import to_manifold
+from rlacd.solid.manifold import LATE, to_manifold
 from rlacd.solid.solid import Solid, surface_of
-from rlacd.solid.topology import compacted
+from rlacd.solid.topology import compacted, point_bodies
 
 MOST_HULLS = 2000
 """If there are more bodies, neighbours along a space-filling curve share a hull."""
 
-SECONDS = 0.3
-"""After this time the remaining bodies get a looser hull: exact hulls of half a million corners take seconds."""
-
-FEW_POINTS = 10_000
-"""After that time, bodies with fewer points than this get their box only."""
-
-_WIDER = 1e-9
 _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-_POINTS_AT_ONCE = 100_000
 
 
 def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
     """Return the hull of every body of an input, without repairing anything.
 
     Faces that share a corner, or have corners at the same place, form one body. The hull of a body holds all of its
-    points. If an exact hull would take too long, the supporting planes in 26 directions are used instead.
+    points. After `LATE` seconds the rest get looser hulls, as exact ones of half a million corners take seconds: boxes,
+    and from `DENSE` points on the supporting planes in 26 directions, found in blocks of so many points.
 
     Parameters
     ----------
@@ -60,7 +52,7 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
         vertices = frame.to_frame(mesh.vertices)
         faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
         bodies = _bodies(vertices, faces) if len(faces) else [frame.to_frame(used)]
-    with run.hurried(SECONDS):
+    with run.hurried(LATE):
         hulls = [_hull(points, run) for points in bodies]
     warning = (
         f"There was no time to repair the mesh: the result is the convex hulls of its bodies as they are in the file "
@@ -72,10 +64,11 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
 
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
     """The points [N, 3] of each body, or of several bodies near each other."""
-    body = _native.point_bodies(vertices, faces)
+    used = np.unique(faces)
+    _, body = np.unique(point_bodies(vertices, faces)[used], return_inverse=True)
     count = int(body.max()) + 1
-    order = np.argsort(body, kind="stable")[int((body < 0).sum()) :]
-    first = np.searchsorted(body[order], np.arange(count))
+    order = np.argsort(body, kind="stable")
+    vertices, first = vertices[used], np.searchsorted(body[order], np.arange(count))
     if count > MOST_HULLS:
         group = np.empty(count, dtype=np.int64)
         group[np.argsort(_along_a_curve(vertices[order[first]]), kind="stable")] = (
@@ -103,7 +96,7 @@ def _hull(points: FloatArray, run: Run) -> Hull:
             return exact
     except Stopped:
         with run.shielded():
-            return _touching(points) if len(points) > FEW_POINTS else _box(points)
+            return _touching(points) if len(points) > DENSE else _box(points)
     with run.shielded():
         return Hull.of(thickened(points)) or _box(points)
 
@@ -111,11 +104,11 @@ def _hull(points: FloatArray, run: Run) -> Hull:
 def _touching(points: FloatArray) -> Hull:
     """The polytope of the supporting planes of points [N, 3] in `_DIRECTIONS`."""
     reach = np.full(len(_DIRECTIONS), -np.inf)
-    for first in range(0, len(points), _POINTS_AT_ONCE):
-        np.maximum(reach, heights(points[first : first + _POINTS_AT_ONCE], _DIRECTIONS).max(axis=0), out=reach)
+    for first in range(0, len(points), DENSE):
+        np.maximum(reach, heights(points[first : first + DENSE], _DIRECTIONS).max(axis=0), out=reach)
     box = _box(points)
     body = to_manifold(box.vertices, box.faces)
-    for direction, offset in zip(_DIRECTIONS, reach + 2 * _WIDER, strict=True):
+    for direction, offset in zip(_DIRECTIONS, reach + 2 * TOLERANCE, strict=True):
         body = body.trim_by_plane(-direction, -offset / length(direction))
     return Hull.of(surface_of(body)[0]) or box
 
@@ -124,7 +117,7 @@ def _box(points: FloatArray) -> Hull:
     """The box around points [N, 3], at least as thick as a repaired sheet."""
     box = np.array([points.min(axis=0), points.max(axis=0)])
     is_thin = box[1] - box[0] < HALF_THICKNESS
-    box += np.where(is_thin, HALF_THICKNESS, _WIDER) * np.array([[-1.0], [1.0]])
+    box += np.where(is_thin, HALF_THICKNESS, TOLERANCE) * np.array([[-1.0], [1.0]])
     hull = Hull.of(np.array(list(itertools.product(*box.T))))
     assert hull is not None, "a box with a thickness has a hull"
     return hull

@@ -12,18 +12,20 @@ from dataclasses import dataclass
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.hull import Hull
+from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.hull import TOLERANCE, Hull
 
 Interval = tuple[float, float]
 """A certified lower and upper bound."""
 
 Place = tuple[float, float, float]
 
-DISTANCE_ACCURACY = 2e-3
+DISTANCE_ACCURACY = 2 * HALF_THICKNESS
 """Default width of the intervals: 0.1 % of the input's longest side in the normalised frame."""
 
-CRACK = 1e-6
-"""Cracks between hulls narrower than this are closed: the two sides of a cut are not part of the union's surface."""
+
+PLACES = 2000
+"""Number of places at which it is looked how something compares with what it stands for."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +78,12 @@ def hull_distances(
     -----
     Facets are clipped exactly against the other hulls, and the surface's triangles against all hulls; the maximum over
     the remaining pieces is found by branch and bound, with distance to a triangle or to a hull convex on each piece.
-    Without hulls, nothing is added (0) and everything is missed (infinity).
+    Cracks between hulls narrower than `TOLERANCE` are closed: the two sides of a cut are not part of the union's
+    surface. Without hulls, nothing is added (0) and everything is missed (infinity).
     """
     union = hull_union(hulls, threads)
     surface = surface or _native.Surface(vertices, faces)
-    least_over, over, over_at = union.over(surface, tolerance, CRACK, threads or 0)
+    least_over, over, over_at = union.over(surface, tolerance, TOLERANCE, threads or 0)
     least_under, under, under_at = union.under(vertices, faces, tolerance, threads or 0)
     return HullDistances((least_over, over), (least_under, under), over_at, under_at)
 

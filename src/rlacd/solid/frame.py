@@ -18,8 +18,17 @@ SMALLEST = 1e-300
 NOTHING = 2.0**-280
 """Frame coordinates below this become 0: products of three, which exact predicates rely on, would underflow."""
 
+ROUNDING = 1e-9
+"""What rounding may add to a length in the frame, or along a grid of cells, and some."""
+
+HALF_THICKNESS = 1e-3
+"""Half the thickness of the slab a sheet becomes, in frame units; other lengths are multiples of it."""
+
+GROWTH_TO_SPARE = HALF_THICKNESS / 2
+"""Hulls may grow by this more than they must to take in a surface: fewer, larger triangles are looked at."""
+
 # Coordinates below this, in the frame, are written as 0: what is left of a difference means nothing.
-_NAUGHT = 1e-4
+_NAUGHT = HALF_THICKNESS / 10
 
 
 @dataclass(frozen=True)
@@ -70,10 +79,6 @@ class Frame:
         place[np.abs(place) < _NAUGHT / self.scale] = 0.0
         where = "(" + ", ".join(f"{x:.4g}" for x in place) + ")"
         return where if body is None else f"{where}, body {body}"
-
-
-HALF_THICKNESS = 1e-3
-"""Half the thickness of the slab a sheet becomes, in frame units."""
 
 
 def thickened(points: FloatArray) -> FloatArray:

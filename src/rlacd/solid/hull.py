@@ -62,7 +62,10 @@ TOLERANCE = 1e-6
 """Lengths in the frame that do not count: corners that change the hull by no more are always removed, hulls that are no
 farther apart touch, and one that moves no farther on its way to the input's unit is not measured again."""
 
-_NO_LIMIT = 2**31 - 1
+SLIVER_RADIUS = 0.01
+"""A hull is a sliver if the radius of its inscribed ball is below this share of its largest extent."""
+
+_NO_LIMIT = np.iinfo(np.int32).max
 
 NO_SIDES = np.empty((0, 4))
 

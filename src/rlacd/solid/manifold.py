@@ -13,14 +13,14 @@ import numpy as np
 from manifold3d import Error, Manifold, Mesh64
 from numpy.typing import NDArray
 
-from rlacd._native import Stopped, poll_stop, seconds_left
+from rlacd._native import Stopped, face_areas, poll_stop, seconds_left, signed_tetrahedra
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import face_areas, signed_tetrahedra
+from rlacd.solid.frame import ROUNDING
 
 Faces: TypeAlias = NDArray[np.int64] | NDArray[np.int32]
 
-# If manifold3d moves faces by more than `_MOVED` on average, corners are moved by less than `_HAIR` (frame units).
-_MOVED, _HAIR = 1e-5, 1e-9
+# If manifold3d moves faces by more than this on average, corners are moved by less than `ROUNDING`.
+_MOVED = 1e-5
 _HAIRS = 4  # about one in a hundred leaves two faces so nearly coplanar that it does not help
 
 
@@ -38,7 +38,7 @@ def to_manifold(vertices: FloatArray, faces: Faces) -> Manifold:
     for seed in range(_HAIRS):
         if moved <= _MOVED:
             break
-        hair = np.random.default_rng(seed).uniform(-_HAIR / 2, _HAIR / 2, np.shape(vertices))
+        hair = np.random.default_rng(seed).uniform(-ROUNDING / 2, ROUNDING / 2, np.shape(vertices))
         other = _taken_over(vertices + hair, faces)
         if not other.is_empty() and (less := _moved(other, vertices, faces)) < moved:
             manifold, moved = other, less
@@ -63,7 +63,7 @@ LONG_BOOLEAN = 50_000
 """A number of triangles that manifold3d processes in some tenths of a second."""
 
 LATE = 0.3
-"""Seconds by which a boolean may overrun the time left."""
+"""Seconds by which a boolean, or hulls of what was not repaired, may overrun the time left."""
 
 _SEGMENTS = 64
 

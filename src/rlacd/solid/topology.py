@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd._native import poll_stop
+from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.solid.arrays import FloatArray
 
 Index = TypeVar("Index", bound=np.signedinteger)
@@ -67,12 +67,11 @@ def first_of_doubled(faces: IntArray, count: int) -> BoolArray:
     return _native.first_of_doubled(np.ascontiguousarray(faces), count)
 
 
-def components(count: int, a: IntArray, b: IntArray) -> tuple[int, IntArray]:
-    """Connected components of ``count`` nodes under the links ``a[i] - b[i]``: their number, and a label per node.
-
-    Labels are numbered by the first node of each component.
-    """
-    return _native.components(count, a, b)
+def point_bodies(vertices: FloatArray, faces: NDArray[np.integer]) -> IntArray:
+    """The body ``[V]`` of each vertex: faces are connected by corners they share, or that are in one place."""
+    first = _native.first_in_place(vertices)
+    a, b, c = first[faces].T
+    return components(len(vertices), np.concatenate([a, a]), np.concatenate([b, c]))[1][first]
 
 
 @dataclass(frozen=True)
@@ -204,21 +203,6 @@ class Sides:
     def facing(self) -> IntArray:
         """The sides that bound each wedge ``[W, 2]``, on its first and on its second halfedge."""
         return self.find_wedges()[1]
-
-
-def signed_tetrahedra(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return ``[F]`` the signed volume between the origin and each face."""
-    return _native.signed_tetrahedra(vertices, faces)
-
-
-def long_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return ``[F, 3]`` the normal of each face, twice as long as its area."""
-    return _native.long_normals(vertices, faces)
-
-
-def face_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return ``[F]`` the area of each face."""
-    return _native.face_areas(vertices, faces)
 
 
 def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
