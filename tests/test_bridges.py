@@ -165,7 +165,8 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
     solid, blocks = heap_of_blocks(np.random.default_rng(seed))
     hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
     pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
-    _, feasibilities = Concavity(threshold).screen.feasibilities(solid.filling, hulls, pairs, 1)
+    corners = [hull.corners for hull in hulls]
+    _, feasibilities = Concavity(threshold).screen.feasibilities(solid.filling, corners, pairs, 1)
     for (i, j), feasibility in zip(pairs, feasibilities, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
         alone = Concavity(threshold).screen.feasibility(solid.filling, joint)
@@ -177,11 +178,12 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
 def test_all_pairs_in_one_go_are_the_pairs_one_by_one(run: Run) -> None:
     root, parts = arms_and_beam(CROSS)
     hulls = [part.hull for part in parts]
+    corners = [hull.corners for hull in hulls]
     pairs = np.array([(i, j) for j in range(len(parts)) for i in range(j)], dtype=np.int32)
     seen = set()
     for criterion in (Concavity(0.02), Concavity(0.2), Concavity(0.6)):
         for threads in (1, 3):
-            volumes, feasibilities = criterion.screen.feasibilities(root.filling, hulls, pairs, threads)
+            volumes, feasibilities = criterion.screen.feasibilities(root.filling, corners, pairs, threads)
             for (i, j), volume, feasibility in zip(pairs, volumes, feasibilities, strict=True):
                 joint = Hull.around(hulls[i], hulls[j])
                 assert feasibility == Feasibility.NEVER or volume == joint.volume
@@ -191,7 +193,7 @@ def test_all_pairs_in_one_go_are_the_pairs_one_by_one(run: Run) -> None:
                 seen.add(int(feasibility))
     assert len(seen) > 1
     with pytest.raises(ValueError, match="out of range"):
-        TIGHT.screen.feasibilities(root.filling, hulls, np.array([(0, len(hulls))], dtype=np.int32), 1)
+        TIGHT.screen.feasibilities(root.filling, corners, np.array([(0, len(hulls))], dtype=np.int32), 1)
 
 
 def test_time_may_run_out_before_pairs_are_looked_at() -> None:

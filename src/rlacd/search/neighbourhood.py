@@ -14,14 +14,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from rlacd._native import Stopped
-from rlacd.run import Run
+from rlacd.run import Begun, Run
 from rlacd.search.context import SearchContext
 from rlacd.search.part_graph import Cluster, PartGraph
 from rlacd.search.recut import Exchange, recut
@@ -93,7 +92,7 @@ class _Begun:
     """A trial under way: its own run, and what it will find."""
 
     run: Run
-    found: Future[Exchange | None]
+    found: Begun[Exchange | None]
 
 
 class Neighbourhood:
@@ -115,7 +114,7 @@ class Neighbourhood:
         self._patience = patience
         self._policies = [ranking(context.near_sweeps) for ranking in context.rankings]
         self._random = np.random.default_rng(context.seed)
-        self._graph = PartGraph(parts, context.criterion)
+        self._graph = PartGraph(parts, context.criterion, run)
         self._best = list(parts)
         self._steps = self._accepted = self._without_gain = 0
         self._begun: deque[_Begun] = deque()
