@@ -46,8 +46,8 @@ class SearchContext:
     rankings : sequence of Ranking
         Used to cut neighbourhoods and, if time allows, for further passes over the whole solid; the more successful
         ones are used more often.
-    enough : int
-        No decomposition has fewer parts: the search ends there.
+    enough : callable
+        Returns the least number of parts of any decomposition: the search ends there. May wait for that.
     near_sweeps : SweepCache
         Coarser sweeps of components in neighbourhoods.
     """
@@ -57,5 +57,5 @@ class SearchContext:
     seed: int = 0
     sweeps: SweepCache = field(default_factory=SweepCache)
     rankings: Sequence[Ranking] = PORTFOLIO
-    enough: int = 1
+    enough: Callable[[], int] = lambda: 1
     near_sweeps: SweepCache = field(default_factory=lambda: SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES))

@@ -171,16 +171,14 @@ class Neighbourhood:
 
     @property
     def _is_least(self) -> bool:
-        return len(self._graph.parts) <= self._context.enough
+        return len(self._graph.parts) <= self._context.enough()
 
     @property
     def _gave_up(self) -> bool:
         return self._without_gain >= max(self._patience * len(self._graph.parts), LEAST_TRIALS)
 
     def _may_continue(self) -> bool:
-        if self._is_least or self._gave_up:
-            return False
-        return self._run.step(self._steps, None, len(self._best))
+        return not self._gave_up and self._run.step(self._steps, None, len(self._best))
 
     def _recutting(self) -> _Trial | None:
         """Draw a cluster and a policy by which it has not been recut."""
@@ -212,12 +210,14 @@ class Neighbourhood:
         try:
             while True:
                 while self._begun and (len(self._begun) == LAG or self._allowance < self._price):
+                    if self._is_least:  # asked here for the first time: the first trials begin before it is known
+                        return
                     self._settle()
                 if (trial := next(trials, None)) is None:
                     break
                 alone = self._run.alone(self._allowance)
                 self._begun.append(_Begun(alone, self._run.start(partial(trial, alone))))
-            while self._begun:
+            while self._begun and not self._is_least:
                 self._settle()
         except Stopped:  # raised between two exchanges: the best state so far is kept
             self._run.note_stop()

@@ -159,7 +159,7 @@ def search(
         exhausted=done.exhausted,
         work=run.work.done - first_pass,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
-        at_least=context.enough,
+        at_least=context.enough(),
     )
     return done.parts, summary
 
@@ -191,7 +191,11 @@ class _Search:
         run, context, cache = self.run, self.context, CutCache()
         found = [parts]
         for ranking in rankings:
-            if run.is_over or len(parts) <= context.enough or self.seconds_of_a_pass > SHARE_OF_TIME * run.seconds_left:
+            if (
+                run.is_over
+                or len(parts) <= context.enough()
+                or self.seconds_of_a_pass > SHARE_OF_TIME * run.seconds_left
+            ):
                 break
             tree = CutTree(context.root, ranking(context.sweeps), run, cache)
             with run.quietly(), run.limited(ANOTHER_PASS * self.first_pass):
