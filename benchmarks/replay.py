@@ -136,8 +136,10 @@ class _Machine:
                 yield from self._work(costs[0])
                 continue
             tasks = [_Task(cost) for cost in costs] if kind != "wait" else begun[number]
-            self._waiting += tasks if kind != "wait" else []
-            if kind == "begin":
+            if kind == "map":  # the first thread takes part, whatever else waits
+                self._waiting.extendleft(reversed(tasks))
+            elif kind == "begin":
+                self._waiting += tasks
                 begun[number] = tasks
                 continue
             while not all(task.is_done for task in tasks):
