@@ -120,6 +120,7 @@ class Neighbourhood:
         self._begun: deque[_Begun] = deque()
         self._recut: set[tuple[Cluster, int]] = set()
         self._offered: dict[tuple[int, Cluster], int] = {}
+        self._price = 0.0  # units that the last trials took
         self._exhausted = False
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
@@ -163,8 +164,7 @@ class Neighbourhood:
                 self._steps += 1
                 yield drawn
             elif self._begun:  # what they find may bring new clusters
-                if not self._settle():
-                    return
+                self._settle()
             elif (failed := failed + 1) == LAG:
                 self._exhausted = True
                 return
@@ -209,35 +209,37 @@ class Neighbourhood:
         """Make trials, `LAG` at a time, and apply what they find in the order in which they began."""
         try:
             while True:
-                if len(self._begun) == LAG and not self._settle():
-                    return
+                while self._begun and (len(self._begun) == LAG or self._allowance < self._price):
+                    if self._is_least:  # asked here for the first time: the first trials begin before it is known
+                        return
+                    self._settle()
                 if (trial := next(trials, None)) is None:
                     break
-                alone = self._run.alone(self._run.work.left)
+                alone = self._run.alone(self._allowance)
                 self._begun.append(_Begun(alone, self._run.start(partial(trial, alone))))
-            while self._begun and self._settle():
-                pass
+            while self._begun and not self._is_least:
+                self._settle()
         except Stopped:  # raised between two exchanges: the best state so far is kept
             self._run.note_stop()
         finally:
             self._run.drop([begun.found for begun in self._begun])
             self._begun.clear()
 
-    def _settle(self) -> bool:
-        """Apply what the first of the trials under way has found, unless parts that it changes have gone.
+    @property
+    def _allowance(self) -> float:
+        """Units for another trial: an equal share of what those under way leave, or twice what the last ones took."""
+        free = self._run.work.left
+        if math.isinf(free):
+            return free
+        free -= sum(begun.run.work.most for begun in self._begun)
+        return max(free // (LAG - len(self._begun)), min(free, 2 * self._price))
 
-        False if the search is over. Each trial may do all the work that was left when it began, so what was done in the
-        last ones may be more than is left: it does not count then.
-        """
-        account = self._run.work
-        if self._is_least or self._run.is_over:  # the first trials begin before it is known how few parts can do
-            return False
-        begun = self._begun[0]
+    def _settle(self) -> None:
+        """Apply what the first of the trials under way has found, unless parts that it changes have gone."""
+        begun, account = self._begun[0], self._run.work
         exchange = self._run.result(begun.found)
         self._begun.popleft()
-        if begun.run.work.is_spent or not account.pay(begun.run.work.done):
-            account.close()
-            return False
+        account.pay(begun.run.work.done)
         taken = exchange is not None and self._graph.apply(exchange)
         gain = exchange.gain if exchange is not None and taken else 0
         self._accepted += taken
@@ -245,7 +247,9 @@ class Neighbourhood:
         if taken:
             self._best = min(self._best, self.parts, key=cost)
         account.pay(self._graph.collect())
-        return True
+        self._price = max(begun.run.work.done, self._price / 2)
+        if begun.run.work.is_spent and not self._begun:
+            account.close()
 
     @property
     def parts(self) -> list[Part]:
