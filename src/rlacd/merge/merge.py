@@ -226,7 +226,7 @@ class _Adjoining:
         vertices, volumes, filled = alive.sums(pairs)
         if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
             return [], []
-        hulls = alive.joint_volumes(pairs, self.run.threads)
+        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
         kept = ~screen.excludes(volumes, hulls)
         return _priced(pairs[kept], (hulls - filled)[kept]), []
 
@@ -432,7 +432,7 @@ def _bounded_pairs(
     alive: NumberedParts, new: Sequence[int], reach: float, criterion: Criterion, run: Run
 ) -> list[_BoundedPair]:
     pairs = alive.boxes.pairs(new, reach)
-    volumes, hulls = alive.sums(pairs)[1], alive.joint_volumes(pairs, run.threads)
+    volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.corners, pairs, run.threads)
     errors = map(criterion.screen.least_error, volumes.tolist(), hulls.tolist())
     queue = [_BoundedPair(error, *pair, False) for error, pair in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)

@@ -59,7 +59,3 @@ class NumberedParts:
     def sums(self, pairs: IntArray) -> FloatArray:
         """Sums over both parts of each pair [P, 2]: hull vertices, volumes, and what may be filled for free [3, P]."""
         return np.asarray(self._summands[:, pairs[:, 0]] + self._summands[:, pairs[:, 1]])
-
-    def joint_volumes(self, pairs: IntArray, threads: int) -> FloatArray:
-        """The volumes [P] of the joint hulls of pairs [P, 2]."""
-        return _native.joint_hull_volumes(self.corners, pairs, threads)

@@ -21,7 +21,7 @@ import numpy as np
 
 from rlacd._native import Stopped
 from rlacd.run import Begun, Run
-from rlacd.search.context import SearchContext
+from rlacd.search.context import FEW_PARTS, SearchContext
 from rlacd.search.part_graph import Cluster, PartGraph
 from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
@@ -171,7 +171,9 @@ class Neighbourhood:
 
     @property
     def _is_least(self) -> bool:
-        return len(self._graph.parts) <= self._context.enough()
+        """Whether no fewer parts can do; of many parts, this is not asked before recuts begin, for it takes a while."""
+        count = len(self._graph.parts)
+        return (self._steps > 0 or count <= FEW_PARTS) and count <= self._context.enough()
 
     @property
     def _gave_up(self) -> bool:
@@ -206,11 +208,11 @@ class Neighbourhood:
         return lambda run: redistribute(part, takers, context.criterion, np.random.default_rng(seed), context.root, run)
 
     def _make(self, trials: Iterator[_Trial]) -> None:
-        """Make trials, `LAG` at a time, and apply what they find in the order in which they began."""
+        """Make trials, `LAG` at a time, and apply what they find."""
         try:
             while True:
                 while self._begun and (len(self._begun) == LAG or self._allowance < self._price):
-                    if self._is_least:  # asked here for the first time: the first trials begin before it is known
+                    if self._is_least:
                         return
                     self._settle()
                 if (trial := next(trials, None)) is None:
@@ -236,7 +238,7 @@ class Neighbourhood:
 
     def _settle(self) -> None:
         """Apply what the first of the trials under way has found, unless parts that it changes have gone."""
-        begun, account = self._begun[0], self._run.work
+        account, begun = self._run.work, self._begun[0]
         exchange = self._run.result(begun.found)
         self._begun.popleft()
         account.pay(begun.run.work.done)
@@ -246,7 +248,6 @@ class Neighbourhood:
         self._without_gain = 0 if gain > 0 else self._without_gain + 1
         if taken:
             self._best = min(self._best, self.parts, key=cost)
-        account.pay(self._graph.collect())
         self._price = max(begun.run.work.done, self._price / 2)
         if begun.run.work.is_spent and not self._begun:
             account.close()

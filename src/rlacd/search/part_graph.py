@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
+from rlacd import _native
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.numbered import NumberedParts
 from rlacd.run import Run, work
@@ -33,13 +34,13 @@ class PartGraph:
     criterion : Criterion
         Decides what may be filled for free.
     run : Run
+        Pays for looking which parts touch.
     """
 
     def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run) -> None:
         self._numbered = NumberedParts((), criterion.screen)
         self._run = run
         self._gaps: dict[int, dict[int, float]] = {}
-        self._work = 0.0
         self.replace((), parts)
 
     @property
@@ -64,18 +65,13 @@ class PartGraph:
         parts, numbered, run = self.parts, self._numbered, self._run
         self._gaps.update((i, {}) for i in new)
         near = numbered.boxes.pairs(new, TOUCHING_FACES)
-        self._work += work.joining(numbered.sums(near)[0].sum(), len(near))
-        self._work += sum(work.gluing(parts[i].size + parts[j].size) for i, j in near.tolist())
+        gluing = sum(work.gluing(parts[i].size + parts[j].size) for i, j in near.tolist())
+        run.work.pay(work.joining(numbered.sums(near)[0].sum(), len(near)) + gluing)
         do_touch = run.map(lambda pair: touch(parts[pair[0]], parts[pair[1]]), near.tolist())
         touching = near[np.array(do_touch, dtype=bool)]
-        added = numbered.joint_volumes(touching, run.threads) - numbered.sums(touching)[2]
+        added = _native.joint_hull_volumes(numbered.corners, touching, run.threads) - numbered.sums(touching)[2]
         for (i, j), volume in zip(touching.tolist(), added.tolist(), strict=True):
             self._gaps[i][j] = self._gaps[j][i] = max(volume, 0.0) ** (1 / 3)
-
-    def collect(self) -> float:
-        """Get the work done since the last call."""
-        done, self._work = self._work, 0.0
-        return done
 
     def apply(self, exchange: Exchange) -> bool:
         """Apply an exchange; False if some of the parts it takes out are already gone."""

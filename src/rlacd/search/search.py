@@ -12,7 +12,7 @@ from rlacd.cut import CutCache, CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import drop_slivers, grow_cover
 from rlacd.run import Run
-from rlacd.search.context import Ranking, SearchContext
+from rlacd.search.context import FEW_PARTS, Ranking, SearchContext
 from rlacd.search.neighbourhood import PATIENCE, Neighbourhood, SearchOutcome, cost
 from rlacd.solid.component import Part
 
@@ -36,9 +36,6 @@ ANOTHER_PASS = 1.5
 
 HOPELESS = 5
 """... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
-
-FEW_PARTS = 20
-"""With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
 SHARE_OF_TIME = 2 / 5
 """Further passes are made while one takes at most this share of the seconds left."""
