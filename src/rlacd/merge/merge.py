@@ -122,7 +122,9 @@ class _Verdict(NamedTuple):
 class _Pairing(Protocol):
     """A way to find pairs of parts that may be united, and to unite them."""
 
-    criterion: Criterion
+    @property
+    def criterion(self) -> Criterion:
+        """Every union meets it."""
 
     def pairs(
         self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
@@ -434,7 +436,7 @@ def _bounded_pairs(
     pairs = alive.boxes.pairs(new, reach)
     volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.corners, pairs, run.threads)
     errors = map(criterion.screen.least_error, volumes.tolist(), hulls.tolist())
-    queue = [_BoundedPair(error, *pair, False) for error, pair in zip(errors, pairs.tolist(), strict=True)]
+    queue = [_BoundedPair(error, i, j, False) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)
     return queue
 
