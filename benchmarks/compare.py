@@ -45,8 +45,8 @@ def compare(
     settings = {}
     for name in words(methods):
         method = make_method(name)
-        is_given = threshold is not None and method.setting == "threshold"
-        settings[name] = (name, threshold if is_given else method.default)
+        given = threshold if method.setting == "threshold" else None
+        settings[name] = (name, method.default if given is None else given)
     groups = bench.run_together(settings)
     page = Page("Side by side", [about(bench)])
     page.add(comparison(groups), "## Mesh by mesh", mesh_by_mesh(groups))

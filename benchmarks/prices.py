@@ -36,10 +36,10 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
         ConcavityScreen,
         "feasibilities",
         lambda screen, solid, hulls, pairs, threads: (
+            sum(len(hulls[i]) for i in pairs.ravel().tolist()),
             len(pairs),
-            sum(len(hulls[i].vertices) for i in pairs.ravel().tolist()),
         ),
-        lambda pairs, vertices: pairs * work.screening(0) + work.screening(vertices) - work.screening(0),
+        work.screening,
     ),
     "gluing": (Part, "glued", lambda a, b, hull=None: (a.size + b.size,), work.gluing),
     "filling": (

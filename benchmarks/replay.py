@@ -56,13 +56,13 @@ def steps_of(spans: list[dict[str, Any]]) -> Iterator[Step]:
     at = _counted(whole, 0)
     for span in spans:
         if span["tid"] == whole["tid"] and span["cat"] in ("map", "begin", "wait"):
-            number, inside = span["args"]["number"], list[dict[str, Any]]()
+            number, inside, end = span["args"]["number"], list[dict[str, Any]](), span["ts"] + span["dur"]
             if span["cat"] == "map":
-                while items and items[0]["ts"] < span["ts"] + span["dur"]:
+                while items and items[0]["ts"] < end:
                     inside.append(items.popleft())
             elif span["cat"] == "begin" and number in begun:  # otherwise it was dropped
                 inside = [begun[number]]
-            own = sum(_cost(one) for one in inside if one["tid"] == whole["tid"])
+            own = sum(_cost(one) for one in inside if one["tid"] == whole["tid"] and one["ts"] < end)
             yield Step("do", [Cost(*(_counted(span, 1) - at - own))])
             yield Step(span["cat"], [Cost(*_cost(one)) for one in inside], number)
             at = _counted(span, 1)
@@ -136,8 +136,10 @@ class _Machine:
                 yield from self._work(costs[0])
                 continue
             tasks = [_Task(cost) for cost in costs] if kind != "wait" else begun[number]
-            self._waiting += tasks if kind != "wait" else []
-            if kind == "begin":
+            if kind == "map":  # the first thread takes part, whatever else waits
+                self._waiting.extendleft(reversed(tasks))
+            elif kind == "begin":
+                self._waiting += tasks
                 begun[number] = tasks
                 continue
             while not all(task.is_done for task in tasks):

@@ -139,7 +139,7 @@ class Bench:
 
     def _ask(self, task: Task, hulls: Path, answer: Path, threads: int = 1) -> str | None:
         """Give a task to a process, which reuses hulls that exist; returns None, or a description of its failure."""
-        own: dict[int, _Child] = self._own.__dict__
+        own: dict[int, _Child] = self._own.__dict__.setdefault("children", {})
         child = own.get(threads)
         if child is None or child.process.poll() is not None or child.done >= self.limits.tasks:
             if child is not None:

@@ -9,6 +9,7 @@ MESHES holds V-HACD's and CoACD's examples, as `test/vhacd` and `test/coacd_exam
 from __future__ import annotations
 
 import io
+import json
 import os
 import shutil
 import sys
@@ -52,6 +53,8 @@ def main(docs: Path, meshes: Path) -> None:
         stacked([panels(rlacd.decompose(body)) for body in open_bodies()]).save(docs / "open_bodies.webp", quality=80)
     with step("a kettle by CoACD and by rlacd"):
         stacked(kettles(meshes / "test/coacd_examples/Kettle.ply")).save(docs / "side_by_side.webp", quality=80)
+    with step("what two threads do"):
+        traced(meshes / "test/vhacd/beshon.ply").save(docs / "threads.png", optimize=True)
     with step("the viewer"):
         shoot_viewer(docs)
     with step("the gallery"):
@@ -111,6 +114,29 @@ def kettles(path: Path) -> list[Image.Image]:
         ImageDraw.Draw(row).text((24, 20), text, font=ImageFont.load_default(size=22), fill="black")
         rows.append(row)
     return rows
+
+
+def traced(path: Path) -> Image.Image:
+    """A row for each thread of a decomposition and a colour for each stage, grey where the first thread waits."""
+    with TemporaryDirectory() as folder:
+        os.environ["RLACD_TRACE"] = file = str(Path(folder) / "trace.json")
+        rlacd.decompose(path, threads=2)
+        del os.environ["RLACD_TRACE"]
+        spans = sorted(json.loads(Path(file).read_text())["traceEvents"], key=lambda span: span["ts"])
+    whole, others = spans[0], sorted({span["tid"] for span in spans} - {spans[0]["tid"]})
+    stages = list(dict.fromkeys(span["name"] for span in spans if span["cat"] == "stage"))
+    colours = {stage: f"hsl({i * 300 // len(stages)}, 65%, 55%)" for i, stage in enumerate(stages)}
+    image = Image.new("RGB", (1600, 50 * (2 + len(others))), "white")
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(size=22)
+    for span in spans:
+        if span["cat"] in ("stage", "item", "begun", "wait"):
+            row = [whole["tid"], *others].index(span["tid"])
+            left, right = (1600 * (at - whole["ts"]) / whole["dur"] for at in (span["ts"], span["ts"] + span["dur"]))
+            colour = "lightgrey" if span["cat"] == "wait" else colours.get(span["name"], "white")
+            draw.rectangle((left, 50 * row, max(left, right - 1), 50 * row + 40), fill=colour)
+    for i, stage in enumerate(stages):
+        draw.text((20 + i * 1580 // len(stages), image.height - 40), stage, font=font, fill=colours[stage])
+    return image
 
 
 def shoot_viewer(docs: Path) -> None:

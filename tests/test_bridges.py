@@ -137,7 +137,8 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
     solid, blocks = heap_of_blocks(np.random.default_rng(seed))
     hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
     pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
-    _, feasibilities = Concavity(threshold).screen.feasibilities(solid.filling, hulls, pairs, 1)
+    corners = [hull.corners for hull in hulls]
+    _, feasibilities = Concavity(threshold).screen.feasibilities(solid.filling, corners, pairs, 1)
     for (i, j), feasibility in zip(pairs, feasibilities, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
         alone = Concavity(threshold).screen.feasibility(solid.filling, joint)

@@ -171,7 +171,7 @@ def cubes(*places: tuple[float, float, float]) -> list[Part]:
 
 def test_neighbours_share_a_face() -> None:
     parts = cubes(*((float(x), float(y), 0.0) for x in range(3) for y in range(2)))
-    here = PartGraph(parts, CRITERION)
+    here = PartGraph(parts, CRITERION, Run(1))
     assert here.around((0,)) == (1, 2)  # not 3, which has an edge in common
     assert here.around((0, 1)) == (2, 3)
     for seed in range(20):

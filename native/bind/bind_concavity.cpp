@@ -53,6 +53,7 @@ void bind_concavity(nb::module_& m) {
             new (self) HullCorners(std::move(points));
           },
           nb::arg("corners"))
+      .def("__len__", [](const HullCorners& self) { return self.all.size(); })
       .def_prop_ro(
           "box",
           [](const HullCorners& self) { return to_array<double>(std::vector<Vec3>{self.box.lower, self.box.upper}); },

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import NamedTuple
 
 from rlacd._native import Stopped
@@ -215,7 +216,9 @@ class _Decomposer:
                 if not searches or run.stopped_by is not None:
                     return parts, None
                 if asked is not None:
-                    context = replace(context, enough=at_least(self.model.solid, parts, asked.overhang, run))
+                    bound = run.start(partial(at_least, self.model.solid, parts, asked.overhang, run))
+                    enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
+                    context = replace(context, enough=enough)
                 parts, found = search(context, merged, run, quality, seconds, steps, policy)
                 if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
                     parts = min(parts, eliminate_parts(context, merged, run), key=cost)

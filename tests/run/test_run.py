@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+from functools import partial
 
 import pytest
 
@@ -48,3 +50,22 @@ def test_as_many_workers_as_the_process_may_use() -> None:
 def test_results_come_in_the_order_of_the_items() -> None:
     with Run(3) as run:
         assert run.map(lambda x: x * x, range(100)) == [x * x for x in range(100)]
+
+
+def test_items_do_not_wait_behind_what_was_begun_before() -> None:
+    may_end = threading.Event()
+    with Run(2) as run:
+        begun = [run.start(may_end.wait) for _ in range(4)]
+        assert run.map(len, ["a", "bb"]) == [1, 2]
+        may_end.set()
+        assert all(run.result(one) for one in begun)
+
+
+def test_one_thread_does_what_was_begun_when_it_is_asked_for() -> None:
+    done: list[int] = []
+    with Run(1) as run:
+        first, second = (run.start(partial(done.append, number)) for number in range(2))
+        assert not done
+        run.result(second)
+        run.drop([first])
+    assert done == [1]

@@ -82,10 +82,10 @@ class DistanceScreen(Screen):
         return Feasibility(filling.feasibility(hull.vertices, hull.faces, self.threshold))
 
     def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[Hull], pairs: IntArray, threads: int
+        self, filling: _native.Filling, hulls: Sequence[_native.HullCorners], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Test the solid's corners and points of the joint hulls."""
-        return filling.joint_feasibilities([hull.corners for hull in hulls], pairs, self.threshold, threads)
+        return filling.joint_feasibilities(hulls, pairs, self.threshold, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether the solid's surface reaches deeper into the hull than the threshold."""

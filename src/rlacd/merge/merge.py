@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple, Protocol
@@ -15,7 +14,8 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import Boxes, Stopped
 from rlacd.criteria.criterion import Criterion, Feasibility
-from rlacd.run import Run, Work, work
+from rlacd.merge.numbered import NumberedParts
+from rlacd.run import Begun, Run, Work, work
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
@@ -67,13 +67,13 @@ def merge_parts(
         Parts that could not be united further, in the order of their first piece, those from `beside` last.
     """
     pairs = _Adjoining(criterion, run)
-    alive = _unite_pairs([*parts, *beside], len(parts), pairs, run)
+    alive = _Merging([*parts, *beside], pairs, run).united(len(parts))
     if solid is None:
         return alive
     waiting = {id(part) for part in beside}
     new = [part for part in alive if id(part) not in waiting]
     old = [part for part in alive if id(part) in waiting]
-    return _unite_pairs([*new, *old], len(new), _Bridged(criterion, run, solid), run)
+    return _Merging([*new, *old], _Bridged(criterion, run, solid), run).united(len(new))
 
 
 def merge_lifted(
@@ -97,7 +97,8 @@ def merge_lifted(
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
     run : Run
     """
-    return _unite_pairs(parts, len(parts), _Lifted(rehearsal, run, proxy, few=0, confirmed=confirmed), run)
+    pairs = _Lifted(rehearsal, run, proxy, few=0, confirmed=confirmed)
+    return _Merging(parts, pairs, run).united(len(parts))
 
 
 class _Verdict(NamedTuple):
@@ -121,8 +122,12 @@ class _Verdict(NamedTuple):
 class _Pairing(Protocol):
     """A way to find pairs of parts that may be united, and to unite them."""
 
+    @property
+    def criterion(self) -> Criterion:
+        """Every union meets it."""
+
     def pairs(
-        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs of a new part and another in the boxes that may be united, with costs; and pairs that never can be.
 
@@ -133,73 +138,78 @@ class _Pairing(Protocol):
         """Unite two parts if that meets the criterion."""
 
 
-def _unite_pairs(parts: Sequence[Part], new: int, pairing: _Pairing, run: Run) -> list[Part]:
-    """Unite pairs of which at least one is among the first `new` parts or made from them."""
-    alive: dict[int, Part] = dict(enumerate(parts))
-    origin = {i: i for i in alive}
-    refused: dict[int, set[int]] = {i: set() for i in alive}  # parts that a part can never be united with
+class _Merging:
+    """Parts that are being united."""
 
-    def refuse(first: int, second: int) -> None:
-        refused[first].add(second)
-        refused[second].add(first)
+    def __init__(self, parts: Sequence[Part], pairing: _Pairing, run: Run) -> None:
+        self._alive = NumberedParts(parts, pairing.criterion.screen)
+        self._pairing = pairing
+        self._run = run
+        self._origin = list(range(len(parts)))  # the number of the first piece
+        self._refused: list[set[int]] = [set() for _ in parts]  # parts that a part can never be united with
+        self._queue: list[_Pair] = []
+        self._next: list[_Pair] = []  # the cheapest, in their order
+        self._begun: dict[_Pair, Begun[_Verdict]] = {}  # more than needed if an earlier one takes their parts away
 
-    def begin(pair: _Pair) -> Future[_Verdict]:
-        return run.start(partial(pairing.unite, alive[pair.first], alive[pair.second]))
+    def united(self, new: int) -> list[Part]:
+        """Unite pairs of which at least one is among the first `new` parts or made from them."""
+        run, alive = self._run, self._alive.parts
+        count = len(alive)
+        try:
+            self._find(range(new), self._alive.boxes)
+            while run.step(count - len(alive), None, len(alive)):
+                self._begin()
+                if not self._next:
+                    break
+                pair = self._next.pop(0)
+                union, price, for_good = run.result(self._begun.pop(pair))
+                # Pay in the order of the pairs: how many are begun, which depends on the threads, must not matter.
+                if not run.work.pay(price):
+                    break
+                if union is not None:
+                    self._replace(pair, union)
+                elif for_good:
+                    self._refuse(pair.first, pair.second)
+        except Stopped:  # raised between two unions
+            run.note_stop()
+        finally:
+            run.drop(self._begun.values())
+        return [alive[i] for i in sorted(alive, key=self._origin.__getitem__)]
 
-    begun: dict[_Pair, Future[_Verdict]] = {}  # more than are needed, if an earlier one takes their parts away
-    try:
-        boxes = _boxes(alive)
-        queue, never = pairing.pairs(alive, boxes, range(new))
-        heapq.heapify(queue)
+    def _begin(self) -> None:
+        """Begin the cheapest pairs whose parts both still exist."""
+        alive, unite = self._alive.parts, self._pairing.unite
+        while self._queue and len(self._next) < self._run.at_once:
+            pair = heapq.heappop(self._queue)
+            if pair.first in alive and pair.second in alive:
+                self._next.append(pair)
+                if pair not in self._begun:
+                    self._begun[pair] = self._run.start(partial(unite, alive[pair.first], alive[pair.second]))
+
+    def _replace(self, pair: _Pair, union: Part) -> None:
+        """Replace the parts of a pair by their union, and look for pairs that it makes."""
+        self._alive.remove(pair[1:])
+        newest = self._alive.add(union)
+        self._origin.append(min(self._origin[pair.first], self._origin[pair.second]))
+        never_with = (self._refused[pair.first] | self._refused[pair.second]) & self._alive.parts.keys()
+        self._refused.append(never_with)
+        for i in never_with:
+            self._refused[i].add(newest)
+        for waiting in self._next:
+            heapq.heappush(self._queue, waiting)
+        self._next = []
+        self._find([newest], self._alive.boxes.without([*never_with]))
+
+    def _find(self, new: Sequence[int], boxes: Boxes) -> None:
+        found, never = self._pairing.pairs(self._alive, boxes, new)
+        for pair in found:
+            heapq.heappush(self._queue, pair)
         for first, second in never:
-            refuse(first, second)
-        next_ones: list[_Pair] = []  # the cheapest, in their order
-        count = newest = len(alive)
-        while run.step(count - len(alive), None, len(alive)):
-            next_ones += _cheapest(queue, alive, run.at_once - len(next_ones))
-            if not next_ones:
-                break
-            begun |= {pair: begin(pair) for pair in next_ones if pair not in begun}
-            pair = next_ones.pop(0)
-            union, price, for_good = run.result(begun.pop(pair))
-            # Pay in the order of the pairs: how many are begun, which depends on the threads, must not matter.
-            if not run.work.pay(price):
-                break
-            if union is None:
-                if for_good:
-                    refuse(pair.first, pair.second)
-                continue
-            origin[newest] = min(origin[pair.first], origin[pair.second])
-            del alive[pair.first], alive[pair.second]
-            alive[newest] = union
-            boxes = boxes.without([pair.first, pair.second])
-            boxes.add(newest, union.hull.corners)
-            refused[newest] = refused.pop(pair.first) | refused.pop(pair.second)
-            never_with = refused[newest] & alive.keys()
-            for i in never_with:
-                refused[i].add(newest)
-            found, never = pairing.pairs(alive, boxes.without([*never_with]), [newest])
-            for first, second in never:
-                refuse(first, second)
-            for other in [*next_ones, *found]:
-                heapq.heappush(queue, other)
-            next_ones = []
-            newest += 1
-    except Stopped:  # raised between two unions
-        run.note_stop()
-    finally:
-        run.drop(begun.values())
-    return [alive[i] for i in sorted(alive, key=origin.__getitem__)]
+            self._refuse(first, second)
 
-
-def _cheapest(queue: list[_Pair], alive: dict[int, Part], most: int) -> list[_Pair]:
-    """Pop the cheapest pairs whose parts both still exist."""
-    batch: list[_Pair] = []
-    while queue and len(batch) < most:
-        pair = heapq.heappop(queue)
-        if pair.first in alive and pair.second in alive:
-            batch.append(pair)
-    return batch
+    def _refuse(self, first: int, second: int) -> None:
+        self._refused[first].add(second)
+        self._refused[second].add(first)
 
 
 @dataclass(frozen=True)
@@ -210,17 +220,17 @@ class _Adjoining:
     run: Run
 
     def pairs(
-        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs that the volume bound allows."""
         screen = self.criterion.screen
         pairs = boxes.pairs(new, screen.reach)
-        if not self.run.work.pay(_price(alive, pairs, work.joining)):
+        vertices, volumes, filled = alive.sums(pairs)
+        if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
             return [], []
-        volumes, hulls = joint_volumes(alive, pairs, self.run.threads)
+        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
         kept = ~screen.excludes(volumes, hulls)
-        costs = hulls - _sums(alive, pairs, screen.filled)
-        return _queue(pairs[kept], costs[kept]), []
+        return _priced(pairs[kept], (hulls - filled)[kept]), []
 
     def unite(self, first: Part, second: Part) -> _Verdict:
         """Glue the two parts."""
@@ -240,22 +250,22 @@ class _Bridged:
     few: int = FEW_TO_PAIR
 
     def pairs(
-        self, alive: Mapping[int, Part], boxes: Boxes, new: Sequence[int]
+        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
-        screen = self.criterion.screen
+        screen, run = self.criterion.screen, self.run
         reach = np.inf if len(boxes) <= self.few else screen.reach
         pairs = boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         never: list[tuple[int, int]] = []
-        for some in np.split(pairs, range(PAIRS_AT_ONCE, len(pairs), PAIRS_AT_ONCE)):
-            if not self.run.may_continue() or not self.run.work.pay(_price(alive, some, work.screening)):
+        for begin in range(0, len(pairs), PAIRS_AT_ONCE):
+            some = pairs[begin : begin + PAIRS_AT_ONCE]
+            vertices, _, filled = alive.sums(some)
+            if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
                 break
-            used, places = _places(some)
-            hulls = [alive[i].hull for i in used]
-            volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, places, self.run.threads)
+            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
             may = verdicts == Feasibility.MAYBE
-            found += _queue(some[may], volumes[may] - _sums(alive, some[may], screen.filled))
+            found += _priced(some[may], (volumes - filled)[may])
             never += map(tuple, some[verdicts == Feasibility.NEVER].tolist())
         return found, never
 
@@ -269,6 +279,10 @@ class _Bridged:
 
     def _united(self, first: Part, second: Part, hull: Hull) -> Part | None:
         return _clipped(first, second, hull, self.criterion, self.solid)
+
+
+def _priced(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
+    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
 
 
 @dataclass(frozen=True)
@@ -308,17 +322,17 @@ class Uniter:
         list of (int, float)
             Index and volume. Empty if too little work is left.
         """
-        hulls, screen = [part.hull, *(other.hull for other in others)], self.criterion.screen
-        corners = [hull.corners for hull in hulls]
+        screen = self.criterion.screen
+        corners = [part.hull.corners, *(other.hull.corners for other in others)]
         pairs = Boxes(corners).pairs([0], screen.reach)
         near = pairs[:, 1].tolist()
-        own = len(part.hull.vertices)
-        if not self.account.pay(sum(work.screening(own + len(hulls[i].vertices)) for i in near)):
+        vertices = len(near) * len(corners[0]) + sum(len(corners[i]) for i in near)
+        if not self.account.pay(work.screening(vertices, len(near))):
             return []
         if not screen.looks_inside:
             volumes = _native.joint_hull_volumes(corners, pairs, 1)
             return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True)]
-        volumes, verdicts = screen.feasibilities(self.solid.filling, hulls, pairs, 1)
+        volumes, verdicts = screen.feasibilities(self.solid.filling, corners, pairs, 1)
         found = zip(near, volumes.tolist(), verdicts.tolist(), strict=True)
         return [(i - 1, volume) for i, volume, verdict in found if verdict == Feasibility.MAYBE]
 
@@ -360,47 +374,6 @@ def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid:
     return clipped if fits and criterion.is_met(clipped) else None
 
 
-def neighbours(
-    alive: Mapping[int, Part], new: Sequence[int], reach: float, threads: int
-) -> Iterator[tuple[int, int, float, float]]:
-    """Pairs of a new part and any other with boxes within reach: (first, second, volume, joint hull's volume)."""
-    pairs = _boxes(alive).pairs(new, reach)
-    return zip(*pairs.T.tolist(), *(own.tolist() for own in joint_volumes(alive, pairs, threads)), strict=True)
-
-
-def joint_volumes(alive: Mapping[int, Part], pairs: IntArray, threads: int) -> tuple[FloatArray, FloatArray]:
-    """The volume of both parts of each pair [P, 2], and that of their joint hull."""
-    used, places = _places(pairs)
-    hulls = _native.joint_hull_volumes([alive[i].hull.corners for i in used], places, threads)
-    return _sums(alive, pairs, lambda part: part.volume), hulls
-
-
-def _boxes(alive: Mapping[int, Part]) -> Boxes:
-    return Boxes([part.hull.corners for part in alive.values()], list(alive))
-
-
-def _places(pairs: IntArray) -> tuple[list[int], IntArray]:
-    """The distinct ids in pairs [P, 2], and the pairs as indices into them."""
-    used = np.unique(pairs)
-    return used.tolist(), np.searchsorted(used, pairs).astype(np.int32)
-
-
-def _sums(alive: Mapping[int, Part], pairs: IntArray, of: Callable[[Part], float]) -> FloatArray:
-    """Sums [P] of something over the two parts of each pair [P, 2]."""
-    used, places = _places(pairs)
-    first, second = np.array([of(alive[i]) for i in used], dtype=np.float64)[places.T]
-    return np.asarray(first + second)
-
-
-def _price(alive: Mapping[int, Part], pairs: IntArray, price: Callable[[int], float]) -> float:
-    """Total price of pairs [P, 2], each priced by the number of vertices of its two hulls."""
-    return sum(map(price, _sums(alive, pairs, lambda part: len(part.hull.vertices)).astype(int).tolist()))
-
-
-def _queue(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
-    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
-
-
 def united_in_turn(
     parts: Sequence[Part],
     unite: Callable[[Part, Part], Part],
@@ -424,26 +397,27 @@ def united_in_turn(
         Pays for measuring. When it is spent, or the run ends, nothing is united any more.
     run : Run
     """
-    alive: dict[int, Part] = dict(enumerate(parts))
-    origin = {i: i for i in alive}
+    numbered = NumberedParts(parts, criterion.screen)
+    alive, origin = numbered.parts, list(range(len(parts)))
     try:
         errors = dict(zip(alive, run.map(criterion.error, parts), strict=True))
         reach = criterion.screen.reach
-        queue = _bounded_pairs(alive, list(alive), reach, criterion, run)
+        queue = _bounded_pairs(numbered, list(alive), reach, criterion, run)
         while True:
             yield [alive[i] for i in sorted(alive, key=origin.__getitem__)], max(errors.values())
             pair = _pop_least(queue, alive, unite, criterion, account)
             if pair is None and math.isfinite(reach):
                 reach = math.inf
-                queue = _bounded_pairs(alive, list(alive), reach, criterion, run)
+                queue = _bounded_pairs(numbered, list(alive), reach, criterion, run)
                 pair = _pop_least(queue, alive, unite, criterion, account)
             if pair is None or not run.step(len(parts) - len(alive), len(parts), len(alive)):
                 return
-            newest = len(origin)
-            origin[newest] = min(origin[pair.first], origin[pair.second])
-            alive[newest] = unite(alive.pop(pair.first), alive.pop(pair.second))
+            union = unite(alive[pair.first], alive[pair.second])
+            numbered.remove([pair.first, pair.second])
+            newest = numbered.add(union)
+            origin.append(min(origin[pair.first], origin[pair.second]))
             errors = {i: errors[i] for i in alive if i in errors} | {newest: pair.error}
-            for bounded in _bounded_pairs(alive, [newest], reach, criterion, run):
+            for bounded in _bounded_pairs(numbered, [newest], reach, criterion, run):
                 heapq.heappush(queue, bounded)
     except Stopped:  # between two unions
         run.note_stop()
@@ -457,13 +431,12 @@ class _BoundedPair(NamedTuple):
 
 
 def _bounded_pairs(
-    alive: dict[int, Part], new: Sequence[int], reach: float, criterion: Criterion, run: Run
+    alive: NumberedParts, new: Sequence[int], reach: float, criterion: Criterion, run: Run
 ) -> list[_BoundedPair]:
-    screen = criterion.screen
-    queue = [
-        _BoundedPair(screen.least_error(volume, hull_volume), first, second, False)
-        for first, second, volume, hull_volume in neighbours(alive, new, reach, run.threads)
-    ]
+    pairs = alive.boxes.pairs(new, reach)
+    volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.corners, pairs, run.threads)
+    errors = map(criterion.screen.least_error, volumes.tolist(), hulls.tolist())
+    queue = [_BoundedPair(error, i, j, False) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)
     return queue
 

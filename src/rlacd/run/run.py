@@ -6,14 +6,14 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from itertools import count
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 from manifold3d import Manifold
 
@@ -61,6 +61,9 @@ then still has to write files. The promise is 1 s and 10 %: the rest is for what
 
 _T = TypeVar("_T")
 _R = TypeVar("_R")
+
+Begun: TypeAlias = "Future[_R] | Callable[[], _R]"
+"""Some work under way on another thread, or still to do on this one."""
 
 
 class Run:
@@ -295,39 +298,36 @@ class Run:
                 others += (self._pool.submit(work) for _ in range(min(self.threads, len(items)) - 1))
             with self._trace.span("map", self._stage):
                 work()
+                others = [other for other in others if not other.cancel()]  # those behind other work come too late
                 self._watch(others)
             for other in others:
                 other.result()
         except BaseException as error:
             if not isinstance(error, (Exception, Stopped)):  # Ctrl-C does not wait
                 self.stop.trip()
-            wait(others)
+            self.drop(others)
             raise
         return results
 
-    def start(self, function: Callable[[], _R]) -> Future[_R]:
-        """Begin some work on another thread, or do it at once where there is only this one."""
+    def start(self, function: Callable[[], _R]) -> Begun[_R]:
+        """Begin some work on another thread; where there is only this one, it is done when its result is asked for."""
         return self._trace.begin(self._stage, function, self._started)
 
-    def _started(self, function: Callable[[], _R]) -> Future[_R]:
-        if self._pool is not None and self.threads > 1:
-            return self._pool.submit(function)
-        done: Future[_R] = Future()
-        done.set_result(function())
-        return done
+    def _started(self, function: Callable[[], _R]) -> Begun[_R]:
+        return self._pool.submit(function) if self._pool is not None and self.threads > 1 else function
 
-    def result(self, begun: Future[_R]) -> _R:
+    def result(self, begun: Begun[_R]) -> _R:
         """Wait for what was begun."""
         with self._trace.wait(self._stage, begun):
+            if not isinstance(begun, Future):
+                return begun()
             self._watch([begun])
         return begun.result()
 
     @staticmethod
-    def drop(begun: Collection[Future[_R]]) -> None:
+    def drop(begun: Iterable[Begun[_R]]) -> None:
         """Leave undone what has not been begun in earnest, and wait for the rest."""
-        for future in begun:
-            future.cancel()
-        wait(begun)
+        wait([each for each in begun if isinstance(each, Future) and not each.cancel()])
 
     @staticmethod
     def _watch(futures: Sequence[Future[_R]]) -> None:

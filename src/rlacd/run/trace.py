@@ -9,8 +9,7 @@ import json
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -19,6 +18,7 @@ from rlacd._native import kernel_times, time_kernels
 from rlacd.errors import OutputError
 
 _R = TypeVar("_R")
+_Begun = TypeVar("_Begun", bound=Hashable)
 
 Kind = Literal["run", "stage", "map", "item", "begin", "begun", "wait"]
 """Items belong to the map of that time; what is begun has the number with which it is waited for."""
@@ -30,7 +30,7 @@ class Trace:
     def __init__(self, path: str = "") -> None:
         self._path = path
         self._spans: list[dict[str, Any]] = []
-        self._numbers: dict[Future[Any], int] = {}
+        self._numbers: dict[Hashable, int] = {}
         if path:
             try:
                 Path(path).open("a").close()  # before the work: writing comes after it
@@ -58,7 +58,7 @@ class Trace:
         """The function, with a span for each item it is called for."""
         return self.span("item", name)(function) if self._path else function
 
-    def begin(self, name: str, work: Callable[[], _R], start: Callable[[Callable[[], _R]], Future[_R]]) -> Future[_R]:
+    def begin(self, name: str, work: Callable[[], _R], start: Callable[[Callable[[], _R]], _Begun]) -> _Begun:
         """Start some work."""
         if not self._path:
             return start(work)
@@ -68,7 +68,7 @@ class Trace:
         self._numbers[begun] = number
         return begun
 
-    def wait(self, name: str, begun: Future[Any]) -> AbstractContextManager[None]:
+    def wait(self, name: str, begun: Hashable) -> AbstractContextManager[None]:
         """The span of waiting for something."""
         return self.span("wait", name, self._numbers.get(begun))
 

@@ -69,14 +69,14 @@ def cutting(faces: int) -> float:
     return 145 + 0.73 * faces
 
 
-def joining(vertices: int) -> float:
-    """Compute the joint hull of parts whose hulls have `vertices` vertices in total."""
-    return 18 + 0.8 * vertices
+def joining(vertices: float, pairs: int = 1) -> float:
+    """Compute the joint hulls of pairs of parts whose hulls have `vertices` vertices in total."""
+    return 18 * pairs + 0.8 * vertices
 
 
-def screening(vertices: int) -> float:
-    """Test the joint hull of two parts against the solid, quickly; most are rejected at once."""
-    return 45 + 1.3 * vertices
+def screening(vertices: float, pairs: int = 1) -> float:
+    """Test the joint hulls of pairs of parts against the solid, quickly; most are rejected at once."""
+    return 45 * pairs + 1.3 * vertices
 
 
 def testing(vertices: int) -> float:

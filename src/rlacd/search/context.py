@@ -20,6 +20,9 @@ PLANES_PER_AXIS = 12
 CONCAVE_EDGES = 2
 """Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
 
+FEW_PARTS = 20
+"""With more parts than this, searching around the first pass gains more per unit of work than another pass."""
+
 
 def by_score(name: str) -> Ranking:
     """Get a ranking by one of the greedy policy's scores."""
@@ -46,8 +49,8 @@ class SearchContext:
     rankings : sequence of Ranking
         Used to cut neighbourhoods and, if time allows, for further passes over the whole solid; the more successful
         ones are used more often.
-    enough : int
-        No decomposition has fewer parts: the search ends there.
+    enough : callable
+        Returns the least number of parts of any decomposition: the search ends there. May wait for that.
     near_sweeps : SweepCache
         Coarser sweeps of components in neighbourhoods.
     """
@@ -57,5 +60,5 @@ class SearchContext:
     seed: int = 0
     sweeps: SweepCache = field(default_factory=SweepCache)
     rankings: Sequence[Ranking] = PORTFOLIO
-    enough: int = 1
+    enough: Callable[[], int] = lambda: 1
     near_sweeps: SweepCache = field(default_factory=lambda: SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES))

@@ -14,15 +14,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from rlacd._native import Stopped
-from rlacd.run import Run
-from rlacd.search.context import SearchContext
+from rlacd.run import Begun, Run
+from rlacd.search.context import FEW_PARTS, SearchContext
 from rlacd.search.part_graph import Cluster, PartGraph
 from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
@@ -88,7 +87,7 @@ class _Begun:
     """A trial under way: its own run, and what it will find."""
 
     run: Run
-    found: Future[Exchange | None]
+    found: Begun[Exchange | None]
 
 
 class Neighbourhood:
@@ -110,7 +109,7 @@ class Neighbourhood:
         self._patience = patience
         self._policies = [ranking(context.near_sweeps) for ranking in context.rankings]
         self._random = np.random.default_rng(context.seed)
-        self._graph = PartGraph(parts, context.criterion)
+        self._graph = PartGraph(parts, context.criterion, run)
         self._best = list(parts)
         self._steps = self._accepted = self._without_gain = 0
         self._begun: deque[_Begun] = deque()
@@ -160,16 +159,16 @@ class Neighbourhood:
 
     @property
     def _is_least(self) -> bool:
-        return len(self._graph.parts) <= self._context.enough
+        """Whether no fewer parts can do; of many parts, this is not asked before recuts begin, for it takes a while."""
+        count = len(self._graph.parts)
+        return (self._steps > 0 or count <= FEW_PARTS) and count <= self._context.enough()
 
     @property
     def _gave_up(self) -> bool:
         return self._without_gain >= max(self._patience * len(self._graph.parts), LEAST_TRIALS)
 
     def _may_continue(self) -> bool:
-        if self._is_least or self._gave_up:
-            return False
-        return self._run.step(self._steps, None, len(self._best))
+        return not self._gave_up and self._run.step(self._steps, None, len(self._best))
 
     def _recutting(self) -> _Trial | None:
         """Draw a cluster and a policy by which it has not been recut."""
@@ -194,16 +193,18 @@ class Neighbourhood:
         return lambda run: redistribute(part, takers, context.criterion, np.random.default_rng(seed), context.root, run)
 
     def _make(self, trials: Iterator[_Trial]) -> None:
-        """Make trials, `LAG` at a time, and apply what they find in the order in which they began."""
+        """Make trials, `LAG` at a time, and apply what they find."""
         try:
             while True:
                 while self._begun and (len(self._begun) == LAG or self._allowance < self._price):
+                    if self._is_least:
+                        return
                     self._settle()
                 if (trial := next(trials, None)) is None:
                     break
                 alone = self._run.alone(self._allowance)
                 self._begun.append(_Begun(alone, self._run.start(partial(trial, alone))))
-            while self._begun:
+            while self._begun and not self._is_least:
                 self._settle()
         except Stopped:  # raised between two exchanges: the best state so far is kept
             self._run.note_stop()
@@ -222,7 +223,7 @@ class Neighbourhood:
 
     def _settle(self) -> None:
         """Apply what the first of the trials under way has found, unless parts that it changes have gone."""
-        begun, account = self._begun[0], self._run.work
+        account, begun = self._run.work, self._begun[0]
         exchange = self._run.result(begun.found)
         self._begun.popleft()
         account.pay(begun.run.work.done)
@@ -232,7 +233,6 @@ class Neighbourhood:
         self._without_gain = 0 if gain > 0 else self._without_gain + 1
         if taken:
             self._best = min(self._best, self.parts, key=cost)
-        account.pay(self._graph.collect())
         self._price = max(begun.run.work.done, self._price / 2)
         if begun.run.work.is_spent and not self._begun:
             account.close()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
+from rlacd import _native
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import neighbours
-from rlacd.run import work
+from rlacd.merge.numbered import NumberedParts
+from rlacd.run import Run, work
 from rlacd.search.recut import Exchange
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import TOUCHING_FACES, Part, touch
@@ -32,50 +33,45 @@ class PartGraph:
         They get the ids 0, 1, ...
     criterion : Criterion
         Decides what may be filled for free.
+    run : Run
+        Pays for looking which parts touch.
     """
 
-    def __init__(self, parts: Sequence[Part], criterion: Criterion) -> None:
-        self.parts: dict[int, Part] = {}
-        self._screen = criterion.screen
+    def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run) -> None:
+        self._numbered = NumberedParts((), criterion.screen)
+        self._run = run
         self._gaps: dict[int, dict[int, float]] = {}
-        self._next = 0
-        self._work = 0.0
         self.replace((), parts)
 
-    def replace(self, gone: Iterable[int], new: Sequence[Part]) -> None:
+    @property
+    def parts(self) -> dict[int, Part]:
+        """The parts under their ids."""
+        return self._numbered.parts
+
+    def replace(self, gone: Collection[int], new: Sequence[Part]) -> None:
         """Replace parts by others, which get new ids."""
         for i in gone:
-            del self.parts[i]
             for j in self._gaps.pop(i):
                 del self._gaps[j][i]
-        self._add(new)
+        self._numbered.remove(gone)
+        self._meet([self._numbered.add(part) for part in new])
         self._ids = np.array(list(self.parts), dtype=np.int64)
         self._boxes = np.array([part.box for part in self.parts.values()]).reshape(-1, 2, 3)
         self._pairs = [(i, j) for i, gaps in self._gaps.items() for j in gaps if i < j]
         self._pair_gaps = np.array([self._gaps[i][j] for i, j in self._pairs])
 
-    def _add(self, new: Sequence[Part]) -> None:
-        if not new:
-            return
-        ids = list(range(self._next, self._next + len(new)))
-        self._next += len(new)
-        self.parts.update(zip(ids, new, strict=True))
-        self._gaps.update((i, {}) for i in ids)
-        filled = {i: self._screen.filled(part) for i, part in self.parts.items()}
-        near = list(neighbours(self.parts, ids, TOUCHING_FACES, 1))
-        self._work += sum(
-            work.joining(len(self.parts[i].hull.vertices) + len(self.parts[j].hull.vertices))
-            + work.gluing(self.parts[i].size + self.parts[j].size)
-            for i, j, _, _ in near
-        )
-        for i, j, _, hull_volume in near:
-            if touch(self.parts[i], self.parts[j]):
-                self._gaps[i][j] = self._gaps[j][i] = max(hull_volume - filled[i] - filled[j], 0.0) ** (1 / 3)
-
-    def collect(self) -> float:
-        """Get the work done since the last call."""
-        done, self._work = self._work, 0.0
-        return done
+    def _meet(self, new: Sequence[int]) -> None:
+        """Find the parts that new ones touch."""
+        parts, numbered, run = self.parts, self._numbered, self._run
+        self._gaps.update((i, {}) for i in new)
+        near = numbered.boxes.pairs(new, TOUCHING_FACES)
+        gluing = sum(work.gluing(parts[i].size + parts[j].size) for i, j in near.tolist())
+        run.work.pay(work.joining(numbered.sums(near)[0].sum(), len(near)) + gluing)
+        do_touch = run.map(lambda pair: touch(parts[pair[0]], parts[pair[1]]), near.tolist())
+        touching = near[np.array(do_touch, dtype=bool)]
+        added = _native.joint_hull_volumes(numbered.corners, touching, run.threads) - numbered.sums(touching)[2]
+        for (i, j), volume in zip(touching.tolist(), added.tolist(), strict=True):
+            self._gaps[i][j] = self._gaps[j][i] = max(volume, 0.0) ** (1 / 3)
 
     def apply(self, exchange: Exchange) -> bool:
         """Apply an exchange; False if some of the parts it takes out are already gone."""

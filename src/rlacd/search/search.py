@@ -12,7 +12,7 @@ from rlacd.cut import CutCache, CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import drop_slivers, grow_cover
 from rlacd.run import Run
-from rlacd.search.context import Ranking, SearchContext
+from rlacd.search.context import FEW_PARTS, Ranking, SearchContext
 from rlacd.search.neighbourhood import PATIENCE, Neighbourhood, SearchOutcome, cost
 from rlacd.solid.component import Part
 
@@ -36,9 +36,6 @@ ANOTHER_PASS = 1.5
 
 HOPELESS = 5
 """... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
-
-FEW_PARTS = 20
-"""With more parts than this, searching around the first pass gains more per unit of work than another pass."""
 
 SHARE_OF_TIME = 2 / 5
 """Further passes are made while one takes at most this share of the seconds left."""
@@ -159,7 +156,7 @@ def search(
         exhausted=done.exhausted,
         work=run.work.done - first_pass,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
-        at_least=context.enough,
+        at_least=context.enough(),
     )
     return done.parts, summary
 
@@ -191,7 +188,11 @@ class _Search:
         run, context, cache = self.run, self.context, CutCache()
         found = [parts]
         for ranking in rankings:
-            if run.is_over or len(parts) <= context.enough or self.seconds_of_a_pass > SHARE_OF_TIME * run.seconds_left:
+            if (
+                run.is_over
+                or len(parts) <= context.enough()
+                or self.seconds_of_a_pass > SHARE_OF_TIME * run.seconds_left
+            ):
                 break
             tree = CutTree(context.root, ranking(context.sweeps), run, cache)
             with run.quietly(), run.limited(ANOTHER_PASS * self.first_pass):

@@ -1,0 +1,61 @@
+"""Parts under numbers, and what the prices and costs of their pairs are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from rlacd import _native
+from rlacd.criteria.criterion import Screen
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Part
+
+
+class NumberedParts:
+    """Parts under ascending numbers that are never used again.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        They get the numbers 0, 1, ...
+    screen : Screen
+        Tells what a joint hull may fill for free on account of each part.
+
+    Attributes
+    ----------
+    parts : dict of int to Part
+    corners : list of HullCorners
+        Of the parts' hulls, by number, also of those that are gone.
+    boxes : Boxes
+    """
+
+    def __init__(self, parts: Sequence[Part], screen: Screen) -> None:
+        self.parts: dict[int, Part] = {}
+        self.corners: list[_native.HullCorners] = []
+        self.boxes = _native.Boxes([])
+        self._screen = screen
+        self._summands = np.empty((3, 2 * len(parts)))  # unions of pairs never make more of them
+        for part in parts:
+            self.add(part)
+
+    def add(self, part: Part) -> int:
+        """Add a part, and get its number."""
+        number, hull = len(self.corners), part.hull
+        if number == self._summands.shape[1]:
+            self._summands = np.concatenate([self._summands, np.empty((3, number + 1))], axis=1)
+        self._summands[:, number] = len(hull.vertices), part.volume, self._screen.filled(part)
+        self.parts[number] = part
+        self.corners.append(hull.corners)
+        self.boxes.add(number, hull.corners)
+        return number
+
+    def remove(self, numbers: Collection[int]) -> None:
+        """Remove parts."""
+        for number in numbers:
+            del self.parts[number]
+        self.boxes = self.boxes.without([*numbers])
+
+    def sums(self, pairs: IntArray) -> FloatArray:
+        """Sums over both parts of each pair [P, 2]: hull vertices, volumes, and what may be filled for free [3, P]."""
+        return np.asarray(self._summands[:, pairs[:, 0]] + self._summands[:, pairs[:, 1]])
