@@ -142,7 +142,7 @@ def test_the_report_of_a_decomposition_says_the_same(corpus: Path) -> None:
 @pytest.mark.parametrize("side", [-1, 1])
 def test_no_warning_is_due_to_how_coarsely_a_report_measures(side: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Near the limit of a warning, distances are measured more finely than the usual interval is wide."""
-    ring = trimesh.creation.torus(1, 0.4, major_sections=48, minor_sections=24)
+    ring = trimesh.creation.torus(1, 0.4, major_sections=48, minor_sections=20)
     result = rlacd.decompose(ring, threshold=1.0, quality="fast", threads=1)
     frame = Frame.of(ring.vertices)
     hulls = [hull for part in result if (hull := Hull.of(frame.to_frame(part.vertices)))]

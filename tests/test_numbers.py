@@ -18,7 +18,6 @@ from benchmarks.runner import find_meshes
 
 import rlacd
 from rlacd.batch import assets
-from rlacd.batch.batch import LARGE
 from rlacd.cut import MANY_COMPONENTS
 from rlacd.cut_and_merge import MOST_CUTTING, MOST_MERGING, MOST_PER_FACE
 from rlacd.finish import narrowed, primitives, report
@@ -31,16 +30,16 @@ from rlacd.planes.sweep import SLIVER
 from rlacd.policies.greedy import EDGES_PER_COMPONENT
 from rlacd.pool import ProcessLimits
 from rlacd.pool.on_ray import MACHINES
-from rlacd.proxy.simplify import FEW_TRIANGLES
-from rlacd.repair import holes, tangles, work, wraps
+from rlacd.repair import holes, windings, work, wraps
 from rlacd.search.neighbourhood import CLUSTER, LEAST_TRIALS
 from rlacd.search.search import BOUNDED_PATIENCE, LEAST_WORK, MOST_WORK, TIMES_FIRST_PASS
+from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.view import connections, server
 
 ROOT = Path(__file__).resolve().parents[1]
 GB = 2**30
-WORDS = {3: "three", 4: "four", 5: "five"}
+WORDS = {2: "two", 3: "three", 4: "four", 5: "five"}
 ORDINALS = {3: "third", 4: "quarter"}
 HALVES = {0.5: "half"}
 
@@ -67,7 +66,7 @@ LIMITS = {
         f"at {MOST_CUTTING / 1e6:g} million units and {MOST_PER_FACE} per triangle",
         f"merging at {MOST_MERGING / 1e6:g} million",
         f"more than {MANY_COMPONENTS:,} pieces",
-        f"at most {grow.MOST_FACES:,} triangles",
+        f"at most {DENSE:,} triangles",
         f"if a {ORDINALS[1 / grow.CROSSING]} of the parts",
         f"clusters of {WORDS[CLUSTER]}",
     ],
@@ -78,18 +77,17 @@ LIMITS = {
         f"radius is {100 * Options.gap:g} % of the longest side",
         f"({100 * holes.HOLE_SHARE:g} % of its area, up to {holes.HOLE:g} away)",
         f"may have {100 * holes._END:g} % of its area",
-        f"in more than {100 * tangles.TANGLED:g} % of the surface",
+        f"in more than {100 * windings.TANGLED:g} % of the surface",
     ],
     "docs/batch.md": [
         f"`--memory` ({ProcessLimits().memory // GB} GB)",
         f"`--limit` ({ProcessLimits().seconds:g} s)",
-        f"over {LARGE / 1e6:g} MB",
         f"up to {WORDS[MACHINES]} times",
         f"(`{assets.RESERVED[0]}`)",
     ],
     "docs/viewer.md": [
         f"up to {server.LARGEST_MESH >> 20} MiB",
-        f"{connections.MOST_CONNECTIONS} connections and {connections.MOST_STREAMS} open pages",
+        f"{connections.MOST_CONNECTIONS} connections",
         f"localhost:{server.USUAL_PORT}",
     ],
     "docs/reference/report.md": [
@@ -104,7 +102,7 @@ LIMITS = {
     ],
     "docs/training.md": [f"a side thinner than {100 * SLIVER:g} %"],
     "docs/guides/scans.md": [
-        f"more than {FEW_TRIANGLES:,} triangles",
+        f"more than {DENSE:,} triangles",
         f"more than {report.COVERAGE_TOLERANCE:g} outside",
     ],
     "docs/guides/robots.md": [

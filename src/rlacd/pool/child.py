@@ -2,8 +2,8 @@
 
 Requests come through stdin and answers leave through what stdout was at the start: pipes that every system has. A
 request that crashes, hangs, exhausts memory or makes a library print does so here. The process exits when its parent
-does or, where a library that hangs holds the interpreter, `GRACE` seconds after the limit of its request. A message is a
-JSON header that names its blobs, then the blobs.
+does or, where a library that hangs holds the interpreter, `GRACE` seconds after the limit of its request. A message is
+a JSON header that names its blobs, then the blobs.
 """
 
 from __future__ import annotations
