@@ -65,7 +65,7 @@ class SearchOutcome:
     accepted : int
         Trials accepted.
     exhausted : bool
-        Nothing new was left to try, or no trial had saved a part for a long time.
+        No trial had saved a part for a long time, or no fewer can do.
     """
 
     parts: list[Part]
@@ -83,7 +83,7 @@ _Trial = Callable[[Run], Exchange | None]
 
 
 @dataclass(frozen=True)
-class _Begun:
+class _UnderWay:
     """A trial under way: its own run, and what it will find."""
 
     run: Run
@@ -112,7 +112,7 @@ class Neighbourhood:
         self._graph = PartGraph(parts, context.criterion, run)
         self._best = list(parts)
         self._steps = self._accepted = self._without_gain = 0
-        self._begun: deque[_Begun] = deque()
+        self._begun: deque[_UnderWay] = deque()
         self._recut: set[tuple[Cluster, int]] = set()
         self._price = 0.0  # units that the last trials took
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
@@ -203,7 +203,7 @@ class Neighbourhood:
                 if (trial := next(trials, None)) is None:
                     break
                 alone = self._run.alone(self._allowance)
-                self._begun.append(_Begun(alone, self._run.start(partial(trial, alone))))
+                self._begun.append(_UnderWay(alone, self._run.start(partial(trial, alone))))
             while self._begun and not self._is_least:
                 self._settle()
         except Stopped:  # raised between two exchanges: the best state so far is kept

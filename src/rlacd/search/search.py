@@ -60,7 +60,7 @@ class SearchSummary:
     accepted : int
         Trials that were accepted.
     exhausted : bool
-        Nothing new was left to try, or no trial had saved a part for a long time.
+        No trial had saved a part for a long time, or no fewer can do.
     work : int
         Units of work done (see `rlacd.run.work`).
     allowed : int or None
