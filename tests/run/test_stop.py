@@ -32,7 +32,7 @@ SMALL: dict[str, Mesh] = {
     "spike": spiked_ball(1e6, 200),
     "terrain": terrain(8),
     "sheet": sheet(60),
-    "ball": noisy_ball(300, 0.05),
+    "ball": noisy_ball(200, 0.05),
 }
 
 LONG = {"ball", "sheet", "terrain", "screws"}
