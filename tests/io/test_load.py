@@ -127,8 +127,8 @@ def test_off_that_is_not_read_is_refused_for_what_it_is(box, tmp_path):
     for content, says in (
         (b"OFF BINARY\n" + bytes(200), "binary OFF file"),
         (b"STCNOFF BINARY\n" + bytes(200), "binary OFF file"),
-        (b"nOFF\n5\n1 0 0\n1 2 3 4 5\n", "other than 3 dimensions"),
-        (b"4OFF\n3 1 0\n0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n", "other than 3 dimensions"),
+        (b"nOFF\n3\n1 0 0\n1 2 3\n", "nOFF or 4OFF, for any number of dimensions"),
+        (b"4OFF\n3 1 0\n0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n", "nOFF or 4OFF, for any number of dimensions"),
         (b"OFF\n", "lacks the counts"),
         (b"NOFF", "lacks the counts"),
         (b"# OFF", "lacks the counts"),
@@ -196,6 +196,18 @@ def test_what_is_no_object_in_gltf_is_damage(box, tmp_path, key, value):
         load_mesh(path)
 
 
+@pytest.mark.parametrize(
+    ("key", "name", "value"),
+    [("accessors", "count", 999), ("accessors", "byteOffset", 4), ("bufferViews", "byteStride", 1)],
+)
+def test_arrays_of_gltf_that_their_views_cannot_hold_are_refused_in_plain_words(box, tmp_path, key, name, value):
+    path = write_mesh(box, tmp_path / "mesh.gltf")
+    scene = json.loads(path.read_text())
+    path.write_text(json.dumps(scene | {key: [one | {name: value} for one in scene[key]]}))
+    with pytest.raises(MeshFileError, match=r"it declares \d+ rows but has no room for them"):
+        load_mesh(path)
+
+
 def test_nothing_is_fetched(tmp_path, monkeypatch):
     def refuse(*args, **kwargs):
         raise AssertionError("loading opened a socket")
@@ -222,7 +234,7 @@ def test_a_damaged_zae_file_is_not_told_to_take_its_own_name(box, tmp_path):
     path = tmp_path / "box.zae"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("box.dae", box.export(file_type="dae").replace(b"</p>", b" x</p>", 1))
-    with pytest.raises(MeshFileError, match="damaged or cut off") as said:
+    with pytest.raises(MeshFileError, match="they are damaged") as said:
         load_mesh(path)
     assert "rename" not in str(said.value)
 
@@ -268,6 +280,14 @@ def test_text_ply_is_read_whole_or_refused(kind: str, tail: bytes, tmp_path: Pat
         path.write_bytes(wrong.encode() + "\n".join(lines).encode() + tail)
         with pytest.raises(MeshFileError, match="damaged"):
             load_mesh(path)
+    extra = head.replace(
+        "end_header", "property int a\nproperty list uchar int vertex_indices\nproperty int a\nend_header"
+    )
+    path.write_text(extra + "\n".join([*lines[:40], *(f"{line} 7 1 5 8" for line in lines[40:])]))
+    assert load_mesh(path).faces.tolist() == faces.tolist(), "the first of a name is read"
+    path.write_text(head.replace("list uchar int", "int") + "\n".join([*lines[:40], *"1" * 60]))
+    with pytest.raises(MeshFileError, match="its faces have no list vertex_indices"):
+        load_mesh(path)
     for end in ("", "3 1 nan 2", "3 1 2", "3 1 0 2 5", "3 1 0.5 2", "3 1 -1 2", "3 1 40 2"):
         path.write_bytes(head.encode() + "\n".join([*lines[:-1], end]).encode() + tail)
         with pytest.raises(MeshFileError, match=r"damaged|cut off"):

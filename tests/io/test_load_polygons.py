@@ -243,7 +243,7 @@ BOX = [(0, 0), (2, 0), (2, 2), (0, 2)]
 
 @pytest.mark.parametrize("prefix", [b"", b"c:"])
 def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
-    """The layout of accessors and controllers, whatever the prefix of the tags; what is not read is refused."""
+    """The layout of accessors and controllers, whatever the prefix of the tags; what is not read is named."""
 
     def load(content: bytes) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
         content = content.replace(b"Z_UP", b"Y_UP")
@@ -258,11 +258,22 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
     solid, warned = load(box)
     assert warned == ()
     assert solid.volume == pytest.approx(4)
-    for instead in (b"<skew>45 1 0 0 0 2 0</skew>", b"<ph><p>0 0</p><h>0 0</h></ph>"):
-        with pytest.raises(MeshError, match=r"box\.dae has (skewed parts|polygons with holes).*export it again"):
-            load(box.replace(b"<node>", b"<node>" + instead))
-    with pytest.raises(MeshError, match="NaN"):
-        load(box.replace(b"<node>", b"<node><lookat>0 0 0 1 0 0 0 0 1</lookat>"))
+    skew, lookat = b"<skew>45 1 0 0 0 2 0</skew>", b"<lookat>0 0 0 1 0 0 0 0 1</lookat>"
+    for moved in (skew, lookat):
+        with pytest.raises(MeshError, match=r"a <skew> or <lookat> there is not read"):
+            load(box.replace(b"<node>", b"<node>" + moved))
+    holed = b"<polygons><ph><p>0 0</p><h>0 0</h></ph></polygons>"
+    with pytest.raises(MeshError, match=r"box\.dae has polygons with holes, .*: triangulate them"):
+        load(box.replace(b"<polygons", holed + b"<polygons"))
+    unused = b'<geometry id="h"><mesh>' + holed + b"</mesh></geometry></library_geometries>"
+    harmless = box.replace(b"</library_geometries>", unused).replace(b"<node>", b"<node><skew>0 1 0 0 0 2 0</skew>")
+    whole, warned = load(harmless.replace(b"</node>", b"</node><node>" + skew + lookat + b"</node>"))
+    np.testing.assert_array_equal(whole.vertices, solid.vertices)
+    assert warned == ()
+    for missing in (b'<instance_geometry url="#gone"/>', b'<instance_controller url="#gone"/>'):
+        whole, warned = load(box.replace(b"</node>", missing + b"</node>"))
+        np.testing.assert_array_equal(whole.vertices, solid.vertices)
+        assert warned[-1] == "'#gone', which a node of box.dae places, is missing"
 
     spread = box.replace(b'count="8" stride="3">', b'count="8" stride="4" offset="2"><param type="float"/>', 1)
     numbers = re.search(rb'<float_array id="p-a"[^>]*>([^<]*)', spread)
@@ -276,8 +287,9 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
     broken = box.replace(
         b"<polygons", b'<polylist count="1"><input semantic="VERTEX" source="#none"/></polylist><polygons'
     )
-    with pytest.raises(MeshError, match=r"damaged or cut off .*#none' is missing"):
-        load(broken)
+    whole, (warned_of,) = load(broken)
+    np.testing.assert_array_equal(whole.vertices, solid.vertices)
+    assert "were left out: they are damaged ('#none' is missing)" in warned_of
 
     skin = b"""<library_controllers><controller id="c"><skin source="#g"><bind_shape_matrix>2 0 0 0 0 2 0 0 0 0 2 0
         0 0 0 1</bind_shape_matrix></skin></controller></library_controllers><library_visual_scenes>"""

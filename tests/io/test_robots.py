@@ -138,7 +138,9 @@ def test_packages_keep_their_name_in_the_new_references(tmp_path: Path) -> None:
     package = tmp_path / "ws" / "ear_description"
     (package / "meshes").mkdir(parents=True)
     (package / "urdf").mkdir()
-    (package / "package.xml").write_text("<package><name>ear</name></package>")
+    names = '<!-- <name>old</name> --><author><name>A. N. Other</name></author><name lang="en"> ear </name>'
+    described = f'<?xml version="1.0" encoding="UTF-16"?><package format="3">{names}</package>'
+    (package / "package.xml").write_text(described, encoding="utf-16")
     table().export(package / "meshes" / "table.stl")
     source = package / "urdf" / "ear.urdf"
     source.write_text(EAR.replace("meshes/table", "package://ear/meshes/table"))

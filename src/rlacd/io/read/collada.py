@@ -25,8 +25,6 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
 
-_REFUSED = {"ph": "polygons with holes, which are not read: triangulate them", "skew": "skewed parts: apply transforms"}
-
 _UNREAD = {
     "lines": "lines of {} were left out",
     "linestrips": "lines of {} were left out",
@@ -62,9 +60,7 @@ class _Document:
             element.get("id"): element for element in self.root.iter("{*}*") if element.get("id")
         }
         tags = {etree.QName(element).localname for element in self.root.iter("{*}*")}
-        for tag in _REFUSED.keys() & tags:
-            raise MeshFileError(f"{path} has {_REFUSED[tag]}, and export it again")
-        self.warnings = list(dict.fromkeys(said.format(path.name) for tag, said in _UNREAD.items() if tag in tags))
+        self.warnings = [said.format(path.name) for tag, said in _UNREAD.items() if tag in tags]
         self.placed: dict[str, _Placed] = {}
         self._keys: Counter[str | None] = Counter()
         self._geometries: dict[str, list[_Primitive]] = {}
@@ -122,8 +118,11 @@ class _Document:
         return controller, matrix
 
     def _add(self, node: Any, instance: Any, geometry: Any, transform: FloatArray) -> None:
-        if geometry is None:
-            raise LookupError(f"{instance.get('url')!r:.80}, which a node places, is missing")
+        missing = geometry is None or etree.QName(geometry).localname != "geometry"
+        if missing or np.isnan(transform).any():
+            why = "is missing" if missing else "is left out: a <skew> or <lookat> there is not read; apply transforms"
+            self.warnings.append(f"{instance.get('url')!r:.80}, which a node of {self._path.name} places, {why}")
+            return
         own = geometry.get("id", "")
         if own not in self._geometries:
             self._geometries[own] = self._read(geometry)
@@ -133,10 +132,18 @@ class _Document:
         self.placed[key] = _Placed(SourceNode(name, key, transform), self._geometries[own], meant)
 
     def _read(self, geometry: Any) -> list[_Primitive]:
-        primitives = (
-            mesh.iterchildren(*(f"{{*}}{tag}" for tag in _RINGS)) for mesh in geometry.iterchildren("{*}mesh")
-        )
-        return [self._primitive(primitive) for some in primitives for primitive in some]
+        if geometry.find(".//{*}ph") is not None:
+            raise MeshFileError(f"{self._path} has polygons with holes, which are not read: triangulate them")
+        found, name = [], geometry.get("name") or geometry.get("id")
+        for mesh in geometry.iterchildren("{*}mesh"):
+            for primitive in mesh.iterchildren(*(f"{{*}}{tag}" for tag in _RINGS)):
+                try:
+                    found.append(self._primitive(primitive))
+                except (ValueError, LookupError, TypeError, OverflowError) as error:
+                    self.warnings.append(
+                        f"faces of {name!r:.80} of {self._path.name} were left out: they are damaged ({error!s:.100})"
+                    )
+        return found
 
     def _primitive(self, primitive: Any) -> _Primitive:
         arrays: dict[str, tuple[FloatArray, int]] = {}
@@ -268,6 +275,7 @@ _MOVES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "translate": lambda values: np.asarray(trimesh.transformations.translation_matrix(values)),
     "rotate": _rotation,
     "scale": lambda values: np.diag([*values.reshape(3), 1.0]),
+    "skew": lambda values: np.full((4, 4), np.nan) if values[0] else np.eye(4),
     "lookat": lambda _: np.full((4, 4), np.nan),  # of cameras and lights; a mesh there is left out, with a warning
 }
 
@@ -293,7 +301,9 @@ def read_collada(path: Path, content: bytes) -> Contents:
             count += len(used)
         if count:
             geometry.append((one.node, Triangles(np.concatenate(vertices), np.concatenate(faces))))
-    return Contents(geometry, document.warnings, up, metres, Asset(content, path, "dae"))
+    if not geometry and document.warnings:
+        raise MeshFileError(f"{path} holds nothing that is read: {document.warnings[-1]}; export it again")
+    return Contents(geometry, list(dict.fromkeys(document.warnings)), up, metres, Asset(content, path, "dae"))
 
 
 def _unpacked(path: Path, content: bytes) -> bytes:

@@ -121,10 +121,11 @@ class Arrays:
     ) -> npt.NDArray[Any]:
         """Rows in a buffer view; without a stride they lie close together."""
         row = shape[1] * dtype.itemsize
-        if stride is not None and natural(stride, "byteStride") < row:
-            raise ValueError(f"a stride of {stride}, below the {row} of a row")
-        strides = (row if stride is None else stride, dtype.itemsize)
-        return np.ndarray(shape, dtype, self.view(of["bufferView"]), of.get("byteOffset", 0), strides)
+        stride = row if stride is None else natural(stride, "byteStride")
+        view, start = self.view(of["bufferView"]), natural(of.get("byteOffset", 0), "byteOffset")
+        if stride < row or (shape[0] and start + (shape[0] - 1) * stride + row > len(view)):
+            raise ValueError(f"it declares {shape[0]} rows but has no room for them")
+        return np.ndarray(shape, dtype, view, start, (stride, dtype.itemsize))
 
     def _bytes_beside(self) -> int:
         """Count the bytes of the files that the buffers name."""

@@ -54,7 +54,11 @@ class _Element:
     """An element of a header: its number; the name and type of each property, and for a list that of its length."""
 
     count: int
-    properties: list[tuple[str, Kind, Kind | None]] = field(default_factory=list)
+    properties: dict[str, tuple[Kind, Kind | None]] = field(default_factory=dict)
+
+    def add(self, name: str, kind: Kind, length: Kind | None) -> None:
+        """Add a property; the first of a name has it alone."""
+        self.properties[f"{name} {len(self.properties)}" if name in self.properties else name] = kind, length
 
 
 def _rows(body: bytes, at: int, element: _Element) -> tuple[IntArray, dict[str, Any]]:
@@ -64,7 +68,7 @@ def _rows(body: bytes, at: int, element: _Element) -> tuple[IntArray, dict[str, 
     """
     _, lists = _walked(body, at, element, min(element.count, 1))
     fields: list[Any] = []
-    for name, kind, length in element.properties:
+    for name, (kind, length) in element.properties.items():
         fields += (
             [(name, kind)] if length is None else [(_LENGTH + name, length), (name, kind, sum(map(len, lists[name])))]
         )
@@ -76,7 +80,7 @@ def _rows(body: bytes, at: int, element: _Element) -> tuple[IntArray, dict[str, 
         if all((counts[name] == len(items)).all() for name, (items,) in lists.items()):
             return begins, {
                 name: (counts[name].astype(np.int64), whole(rows[name]).ravel()) if name in lists else rows[name]
-                for name, *_ in element.properties
+                for name in element.properties
             }
     begins, lists = _walked(body, at, element, element.count)
     return begins, {
@@ -90,10 +94,10 @@ def _walked(body: bytes, at: int, element: _Element, rows: int) -> tuple[IntArra
     """Where each of some rows begins and the last one ends, and the lists of each name."""
     begins = [at]
     lists: dict[str, list[npt.NDArray[Any]]] = {
-        name: [] for name, _, length in element.properties if length is not None
+        name: [] for name, (_, length) in element.properties.items() if length is not None
     }
     for _ in range(rows):
-        for name, kind, length in element.properties:
+        for name, (kind, length) in element.properties.items():
             if length is None:
                 at += kind.itemsize
                 continue
@@ -181,16 +185,19 @@ def _elements(header: bytes, is_text: bool) -> dict[str, _Element]:
                     raise ValueError(f"its header declares {name!r:.40} twice")
                 found[name] = last = _Element(count_in(count.encode()))
             case ["property", "list", length, items, name]:
-                last.properties.append((name, kind(items), kind(length)))
+                last.add(name, kind(items), kind(length))
             case ["property", items, name]:
-                last.properties.append((name, kind(items), None))
+                last.add(name, kind(items), None)
             case ["element" | "property", *_]:
                 raise ValueError(f"{line!r:.40} in its header")
     return found
 
 
 def _triangles(values: dict[str, Any], are_strips: bool, points: FloatArray) -> IntArray:
-    counts, corners = next(values[name] for name in _CORNERS if name in values)
+    lists = [values[name] for name in _CORNERS if isinstance(values.get(name), tuple)]
+    if not lists:
+        raise ValueError("its faces have no list vertex_indices")
+    counts, corners = lists[0]
     if are_strips:  # -1 ends a strip as well
         strips = [
             strip_triangles(part[part >= 0])

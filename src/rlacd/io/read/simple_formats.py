@@ -107,7 +107,9 @@ def read_off(path: Path, content: bytes) -> Contents:
     lines = [line for line in (raw.split(b"#", 1)[0].strip() for raw in content.splitlines()) if line]
     if lines and (keyword := OFF_KEYWORD.match(lines[0])) is not None:
         if set(keyword[1] or b"") & set(b"n4"):
-            raise MeshFileError(f"{path} is a mesh in other than 3 dimensions: project it first")
+            raise MeshFileError(
+                f"{path} is nOFF or 4OFF, for any number of dimensions, which is not read: save it as OFF"
+            )
         rest = lines[0][keyword.end() :].strip()
         lines[:1] = [rest] if rest else []
     header = lines[0].split() if lines else []

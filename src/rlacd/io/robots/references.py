@@ -8,13 +8,13 @@ and in the folders the user allows. Links are followed: ROS workspaces consist o
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.io.read.open_file import read_file
+from rlacd.io.read.xml import parse_xml
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION
 
 PACKAGE_SCHEMES = ("package", "model")
@@ -122,15 +122,13 @@ class References:
             yield path if path.name == name else path / name
 
 
-_NAME = re.compile(rb"<name>\s*([^<]+?)\s*</name>")
-
-
 def _package_name(folder: Path) -> str | None:
+    place = folder / "package.xml"
     try:
-        found = _NAME.search(read_file(folder / "package.xml", LARGEST_DESCRIPTION))
-    except OSError:
+        package = parse_xml(place, read_file(place, LARGEST_DESCRIPTION))
+    except Exception:  # parsers may raise anything; a file that cannot be read names no package
         return None
-    return found[1].decode(errors="replace") if found else None
+    return str(package.xpath("string(/package/name)")).strip()
 
 
 def _paths(variable: str) -> list[Path]:

@@ -242,13 +242,14 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     hulls = sum(len(mesh.files) for mesh in meshes.values())
     reports = [mesh.result.report for mesh in meshes.values()]
     scales = [report["scale"] for report in reports]
-    stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout", "criterion"))
+    stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout"))
+    stated |= options.get("criterion") not in (None, "concavity")
     if stated or max(scales) < 2 * min(scales) or hulls < MANY_HULLS * len(meshes):
         return []
     length = reports[0]["options"]["threshold"] / min(scales)
     return [
         f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; --threshold-abs "
-        f"{float(f'{length:.1g}'):g}, that of the largest, gives fewer."
+        f"{float(f'{1.05 * length:.2g}'):g}, about that of the largest, may give fewer."  # 5 %: never rounded below it
     ]
 
 
