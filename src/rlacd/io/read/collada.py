@@ -99,7 +99,7 @@ class _Document:
                     self._place(child, here, depth + 1)
                 case "instance_node" if target is not None:
                     self._place(target, here, depth + 1)
-                case "instance_geometry":
+                case "instance_geometry" | "instance_node":
                     self._add(node, child, target, here)
                 case "instance_controller":
                     shape, bound = self._bound(target)
