@@ -87,7 +87,7 @@ LIMITS = {
     ],
     "docs/viewer.md": [
         f"up to {server.LARGEST_MESH >> 20} MiB",
-        f"{connections.MOST_CONNECTIONS} connections",
+        f"{connections.MOST_CONNECTIONS} connections and {connections.MOST_STREAMS} open pages are served",
         f"localhost:{server.USUAL_PORT}",
     ],
     "docs/reference/report.md": [

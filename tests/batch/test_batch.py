@@ -151,14 +151,16 @@ def test_robots_are_worked_on_like_meshes_and_other_xml_is_passed_over(tmp_path:
     box(assets / "meshes" / "l.obj")
     for name, text in (("r.urdf", URDF), ("r.xml", MJCF), ("package.xml", "<package/>"), ("bad.urdf", "no robot")):
         box(assets / name, text.encode())
+    box(assets / "wide.xml", MJCF.encode("utf-16"))
     run = batch(assets, "-o", out, "--jobs", 1, "--quality", "fast")
     assert run.exit_code == 5, run.output
     assert "1 file (1 .xml)" in run.stderr
     told = rows(out)
     assert {name: row["status"] for name, row in told.items()} == {
         **dict.fromkeys(["r.urdf", "r.xml", "meshes/l.obj"], "done"),
-        "bad.urdf": "failed",
+        **dict.fromkeys(["bad.urdf", "wide.xml"], "failed"),
     }
+    assert "save it as UTF-8" in told["wide.xml"]["error"]
     assert set(told["r.urdf"]["outputs"]) == {"r.urdf", "r_urdf/r_l_000.obj", "r_urdf/r_hulls.json"}
     assert b"r_urdf/r_l_000.obj" in (out / "r.urdf").read_bytes()
     again = batch(assets, "-o", out, "--glob", "*.urdf", "--quality", "fast")
@@ -239,7 +241,7 @@ def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> Non
         (["{in}", "-o", "nowhere://x"], 2, "nowhere"),
         (["{in}", "-o", "{in}/out", "--policy", "nowhere.npz"], 2, "nowhere.npz"),
         (["{in}", "-o", "{in}/out", "--format", "mjcf", "--folders"], 2, "mjcf"),
-        (["{in}", "-o", "{in}/out", "--one-mesh"], 2, "for .urdf files only"),
+        (["{in}", "-o", "{in}/out", "--one-mesh"], 2, "for .urdf files only: leave it out"),
     ],
 )
 def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[str], code: int, says: str) -> None:

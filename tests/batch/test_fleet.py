@@ -172,6 +172,7 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
         key(policy=str(policies[0])),
     ]
     assert len({*same, *others}) == 1 + len(others)
+    assert key(file_format=".OBJ", folders=True) == key(file_format="obj", folders=True)
     assert key(policy=str(policies[0])) == key(policy=str(policies[1])), "where the network lies is all the same"
 
 

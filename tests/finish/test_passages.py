@@ -101,6 +101,7 @@ def test_each_hole_that_narrows_is_listed_with_its_place_and_what_is_left_of_it(
         assert fits.max() - 0.08 * radius <= passage["left_abs"] <= fits.max() + 0.08 * radius
     (warning,) = (said for said in result.report["warnings"] if "passages" in said)
     assert f"{sum(share < 2 / 3 for share in shares)} passages narrow by over a third" in warning
+    assert warning.endswith("--keep-open with a length, or a smaller threshold, keeps more open.")
 
 
 @pytest.mark.promise("passages")

@@ -236,6 +236,7 @@ def test_a_report_under_way_holds_up_no_decomposition(viewer: ViewServer, monkey
         ({"threshold": -1}, "threshold is -1"),
         ({"threshold": "tight"}, "threshold is 'tight'"),
         ({"criterion": "beauty"}, "distance, volume or navigable"),
+        ({"criterion": []}, "distance, volume or navigable"),
         ({"criterion": "navigable", "radius": 0}, "radius"),
         ({"quality": "perfect"}, "quality"),
         ({"max_hulls": 1.5}, "max_hulls"),
@@ -339,6 +340,7 @@ def test_files_come_from_the_own_page_only(viewer: ViewServer) -> None:
         ({"primitives": ["box", "sphere"], "overlap": 0.0}, ["--primitives box,sphere"]),
         ({"criterion": "volume", "volume_tolerance": 0.02}, ["--criterion volume", "--tolerance 0.02"]),
         ({"open": "solid"}, ["--open solid"]),
+        ({"criterion": None, "threshold": None, "quality": None}, []),
     ],
 )
 def test_the_options_are_a_command(viewer: ViewServer, mesh: Path, wanted: dict[str, Any], says: list[str]) -> None:

@@ -176,7 +176,8 @@ _COMMENT, _TAG = re.compile(rb"<!--.*?-->", re.DOTALL), re.compile(rb"<([A-Za-z_
 def _root(path: Path) -> str:
     """The name of an XML file's root element; empty if none begins within its first 64 kB."""
     with contextlib.suppress(OSError), path.open("rb") as file:
-        found = _TAG.search(_COMMENT.sub(b"", file.read(2**16)))
+        text = file.read(2**16).replace(b"\0", b"")  # also of UTF-16, which reading the robot refuses
+        found = _TAG.search(_COMMENT.sub(b"", text))
         return found[1].decode() if found else ""
     return ""
 

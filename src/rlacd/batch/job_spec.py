@@ -77,13 +77,13 @@ class JobSpec:
             )
         make_policy(checked.first_policy)
         asked = OutputOptions(**written)
-        if folders and (asked.file_format or FOLDER_FORMAT) not in FORMATS:
-            raise OptionError(
-                f"{asked.file_format} cannot be written as a folder per mesh; use one of {', '.join(FORMATS)}."
-            )
         ending, file_format = file_kind(asked.file_format, checked.preset)
         if folders:
-            ending, file_format = "", asked.file_format or FOLDER_FORMAT
+            ending, file_format = "", FOLDER_FORMAT if asked.file_format is None else asked.file_format
+            if file_format not in FORMATS:
+                raise OptionError(
+                    f"{file_format} cannot be written as a folder per mesh; use one of {', '.join(FORMATS)}."
+                )
         asked = replace(asked, file_format=file_format)
         with TemporaryDirectory() as folder:
             hull_target(f"{folder}/mesh{ending or '/'}", asked)

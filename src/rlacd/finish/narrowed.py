@@ -145,7 +145,7 @@ def too_narrow(found: Sequence[dict[str, Any]], reached: Reached, is_stopped: bo
         _narrows(lost, by, cure)
         for lost, by, cure in (
             (asked, "more than --keep-open allows", reason),
-            (others, share, "--keep-open with a length keeps more open"),
+            (others, share, "--keep-open with a length, or a smaller threshold, keeps more open"),
         )
         if lost
     ]

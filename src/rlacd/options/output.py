@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rlacd.options.fields import check_fields, custom, flag, number, one_of, option, path_like, stated, text
+from rlacd.options.fields import check_fields, custom, flag, number, one_of, option, path_like, stated
 
 Axis = Literal["x", "y", "z"]
 
@@ -21,7 +21,7 @@ def _folders(given: Any) -> list[str]:
 
 _DENSITY = number(above=0, rule="a positive mass per cubic unit, such as 1000 for water")
 _MASS = number(above=0, rule="a positive mass")
-_FORMAT = text("the name of a format, such as obj")
+_FORMAT = custom("the name of a format, such as obj", lambda given: given.lower().lstrip("."))
 _PACKAGES = custom("a list of strings, NAME=FOLDER or FOLDER", _folders)
 _AXIS = one_of(Axis, rule="x, y or z")
 

@@ -19,6 +19,9 @@ from typing import Any
 MOST_CONNECTIONS = 48
 """Concurrent connections; a browser opens up to six."""
 
+MOST_STREAMS = 16
+"""Concurrent event streams, one per open page; the other connections are free for pages and commands."""
+
 REQUEST_SECONDS = 10.0
 """Seconds to receive headers and body, from the first byte expected; also how long an idle connection is kept."""
 
@@ -43,6 +46,7 @@ class BoundedServer(ThreadingHTTPServer):
     def __init__(self, address: tuple[str, int], handler: type[BoundedHandler]) -> None:
         self._deadlines: dict[socket.socket, float] = {}
         self._changed = threading.Condition()
+        self.streams = threading.BoundedSemaphore(MOST_STREAMS)
         super().__init__(address, handler)
 
     @property
@@ -108,6 +112,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
 
     server: BoundedServer
     protocol_version = "HTTP/1.1"
+    error_content_type, error_message_format = "application/json", '{"error": "%(explain)s."}'
     timeout = 20.0  # seconds for a single send or receive
 
     def handle_one_request(self) -> None:

@@ -42,14 +42,14 @@ def read_controls(given: dict[str, Any]) -> dict[str, Any]:
     for name in given:
         if name not in CONTROLS:
             raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(CONTROLS))}.")
-    controls = {**CONTROLS, **given}
+    controls = {name: usual if given.get(name) is None else given[name] for name, usual in CONTROLS.items()}
     Options(**options_of(controls))
     return controls
 
 
 def options_of(controls: dict[str, Any]) -> dict[str, Any]:
     """Get the options of `rlacd.decompose`."""
-    others = _NUMBERS - {*CRITERIA.get(controls["criterion"], ())}
+    others = _NUMBERS - {*CRITERIA.get(str(controls["criterion"]), ())}
     return with_criterion({name: value for name, value in controls.items() if name not in others})
 
 

@@ -209,7 +209,8 @@ class _Handler(BoundedHandler):
             if place.path == "/":
                 self._send(self.server.page, "text/html", {"Content-Security-Policy": self.server.policy})
             elif place.path == "/events":
-                self._send_events()
+                with _one_of(self.server.streams):
+                    self._send_events()
             elif place.path == "/scene":
                 with self.server.heavy:
                     content = self.server.scene()
@@ -248,12 +249,8 @@ class _Handler(BoundedHandler):
         if self.headers.get_content_type() != "application/octet-stream":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
         controls = read_controls(_object(query.get("options", ["{}"])[0]))
-        if not self.server.uploads.acquire(blocking=False):
-            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
-        try:
+        with _one_of(self.server.uploads):
             content = self._read(LARGEST_MESH, ANSWER_SECONDS)
-        finally:
-            self.server.uploads.release()
         with self.server.heavy:
             self.server.open_mesh(query.get("name", [""])[0], content, controls)
 
@@ -362,6 +359,17 @@ class _Refused(Exception):
     def __init__(self, status: HTTPStatus, sentence: str) -> None:
         super().__init__(sentence)
         self.status = status
+
+
+@contextlib.contextmanager
+def _one_of(places: threading.BoundedSemaphore) -> Iterator[None]:
+    """Hold one of a limited number of places; refuse the request if none is free."""
+    if not places.acquire(blocking=False):
+        raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
+    try:
+        yield
+    finally:
+        places.release()
 
 
 def _split(address: str) -> urllib.parse.SplitResult:

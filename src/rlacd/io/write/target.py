@@ -79,7 +79,7 @@ def hull_target(path: str | os.PathLike[str], asked: OutputOptions | None = None
     ):
         if getattr(asked, name) and not fits:
             flag = name.replace("_", "-")
-            raise OptionError(f"{name} (--{flag}) works for {only} files only, not for {target.path}: leave it out.")
+            raise OptionError(f"{name} (--{flag}) works for {only} files only: leave it out, or write a {only} file.")
     return target
 
 
@@ -93,22 +93,20 @@ def file_kind(file_format: str | None, preset: str | None) -> tuple[str, str | N
 
 def ending_of(file_format: str) -> str:
     """The ending of a file of some format."""
-    name = file_format.lower().lstrip(".")
-    return MODELS[name][0] if name in MODELS else name
+    return MODELS[file_format][0] if file_format in MODELS else file_format
 
 
-def _target(text: str, file_format: str | None) -> Target:
+def _target(text: str, wanted: str | None) -> Target:
     if not text:
         raise OptionError("the output has no name; give a file such as hulls.glb, or a folder such as hulls/.")
     place = Path(text)
     ending = place.suffix.lower().lstrip(".")
-    wanted = None if file_format is None else file_format.lower().lstrip(".")
     if wanted is None and ending in MODEL_OF and not text.endswith(SEPARATORS):
         wanted = ending
     if (wanted := MODEL_OF.get(str(wanted), wanted)) in MODELS:
         return _model_target(text, str(wanted))
     if wanted not in (None, *FORMATS):
-        raise OptionError(f"unknown format {file_format!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
+        raise OptionError(f"unknown format {wanted!r}; use one of {', '.join((*FORMATS, *MODELS))}.")
 
     with output_errors(place):
         is_folder = text.endswith(SEPARATORS) or (place.is_dir() and ending not in FORMATS) or (wanted and not ending)
