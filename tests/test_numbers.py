@@ -163,7 +163,7 @@ RESULTS: list[tuple[str, str, str, str, Callable[[list[dict[str, Any]]], str]]] 
     ("docs/benchmarks.md", r"threshold 0.043 \| ([\d.]+) \|", "vhacd_set", '{"threshold": 0.043}', hulls_a_mesh),
     (
         "docs/benchmarks.md",
-        r"`fast` makes ([\d,]+) hulls of the 25 meshes",
+        r"`fast` makes\s([\d,]+) hulls of the 25 meshes, NavACD",
         "quick",
         '{"quality": "fast", "space": [0.05, 0.01]}',
         hulls,
