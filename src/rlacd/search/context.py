@@ -21,7 +21,8 @@ CONCAVE_EDGES = 2
 """Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
 
 FEW_PARTS = 20
-"""With more parts than this, searching around the first pass gains more per unit of work than another pass."""
+"""With more parts than this, searching around the first pass gains more per unit of work than another pass, and trials
+begin without waiting for the least number of parts."""
 
 
 def by_score(name: str) -> Ranking:

@@ -42,8 +42,8 @@ SMALLEST_FIRST = 0.5
 """Share of the parts, the smallest, that are redistributed first: nothing saves more parts per unit of work."""
 
 PARTS_PER_RECUT = 4
-"""Between two attempts to redistribute all parts, a cluster is recut for so many parts: a recut takes the work of three
-attempts to redistribute a part and saves a tenth as many parts, but changes what there is to redistribute."""
+"""Between two attempts to redistribute all parts, one cluster is recut for every so many parts: a recut takes the work
+of four attempts to redistribute a part and saves a fifth as many parts, but changes what there is to redistribute."""
 
 PATIENCE = 24
 """By default the search is exhausted after this many trials per part without a gain, ..."""
@@ -118,7 +118,7 @@ class Neighbourhood:
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     def improve(self, most: float = math.inf) -> SearchOutcome:
-        """Search until nothing is left to try, the run is over, `most` recuts are made or no fewer parts can do."""
+        """Search until patience or the run is over, `most` recuts are made or no fewer parts can do."""
         if most > 0:
             self._make(self._trials(most))
         return SearchOutcome(self._best, self._steps, self._accepted, self._gave_up or self._is_least)
