@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd.criteria.limited import least_kept
@@ -66,15 +67,23 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> 
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
 
     balls = passage_balls(reached.solid.mesh, surface, (NARROWEST, most), STARTS, threads, lose)
-    balls = balls.some(np.argsort(union.distance(balls.centres, threads) / balls.radii, kind="stable")[:STARTS])
-    passage, found = _passages(balls, surface, threads), []
+    covered = union.distance(balls.centres, threads) / balls.radii
+    kept = np.argsort(covered, kind="stable")[:STARTS]
+    balls, covered = balls.some(kept), covered[kept]
+    passage = _passages(balls, surface, threads)
     first = np.sort(np.unique(passage, return_index=True)[1])[:MOST_LISTED]
-    long = [own for own in (balls.some(passage == passage[i]) for i in first) if _is_long(own)]
-    for at, radius, left in run.map(lambda own: _narrowest(own, union), long):
-        if left < (1 - LEAST_LOSS) * radius:
-            place = frame.to_input(at).tolist()
-            found.append({"at_abs": place, "radius_abs": radius / frame.scale, "left_abs": left / frame.scale})
-    return sorted(found, key=lambda one: one["left_abs"] / one["radius_abs"])
+    every = [_looked_at(balls, np.flatnonzero(passage == passage[i]), covered) for i in first]
+    some = np.concatenate([np.empty(0, dtype=np.intp), *every])
+    passage, balls = passage[some], balls.some(some)
+    left = _left(balls, union, threads)
+    order = np.argsort(left / balls.radii, kind="stable")
+    worst = order[np.sort(np.unique(passage[order], return_index=True)[1])]  # of each passage
+    worst = worst[left[worst] < (1 - LEAST_LOSS) * balls.radii[worst]]
+    places, lengths = frame.to_input(balls.centres[worst]), np.stack([balls.radii, left])[:, worst] / frame.scale
+    return [
+        {"at_abs": at, "radius_abs": radius, "left_abs": rest}
+        for at, radius, rest in zip(places.tolist(), *lengths.tolist(), strict=True)
+    ]
 
 
 def _passages(balls: Balls, surface: _native.Surface, threads: int) -> IntArray:
@@ -91,41 +100,37 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> IntArray:
     return _native.components(len(balls), first[is_free], second[is_free])[1].astype(np.int32)
 
 
-def _is_long(balls: Balls) -> bool:
-    """Whether a passage is more than a nick (see `LEAST_EXTENT`)."""
-    ends = np.concatenate([balls.centres - balls.radii[:, None], balls.centres + balls.radii[:, None]])
-    return bool(np.ptp(ends, axis=0).max() >= LEAST_EXTENT)
-
-
-def _narrowest(balls: Balls, union: _native.HullUnion) -> tuple[FloatArray, float, float]:
-    """Centre and radius of the ball of a passage of which least is left, and how much.
+def _looked_at(balls: Balls, own: NDArray[np.intp], covered: FloatArray) -> NDArray[np.intp]:
+    """Those of a passage's balls of which least may be left; none of a nick (see `LEAST_EXTENT`).
 
     Of balls whose centres are about as much covered, some along the passage are looked at: where it opens, part of a
     ball is outside of it.
     """
-    covered = union.distance(balls.centres, 1) / balls.radii
-    some = np.flatnonzero(covered <= covered.min() + LEAST_LOSS)
-    axis = int(np.ptp(balls.centres, axis=0).argmax())
-    along = some[np.argsort(balls.centres[some, axis], kind="stable")]
-    looked_at = along[np.unique(np.linspace(0, len(along) - 1, LOOKED_AT).astype(int))].tolist()
-    left = [_left(union, balls.centres[i], balls.radii[i]) for i in looked_at]
-    worst = int(np.argmin(np.array(left) / balls.radii[looked_at]))
-    i = looked_at[worst]
-    return balls.centres[i], float(balls.radii[i]), left[worst]
+    centres, radii = balls.centres[own], balls.radii[own, None]
+    if np.ptp(np.concatenate([centres - radii, centres + radii]), axis=0).max() < LEAST_EXTENT:
+        return own[:0]
+    some = np.flatnonzero(covered[own] <= covered[own].min() + LEAST_LOSS)
+    along = own[some[np.argsort(centres[some, np.ptp(centres, axis=0).argmax()], kind="stable")]]
+    looked_at: NDArray[np.intp] = along[np.unique(np.linspace(0, len(along) - 1, LOOKED_AT).astype(int))]
+    return looked_at
 
 
-def _left(union: _native.HullUnion, centre: FloatArray, radius: float) -> float:
-    """Radius of the largest ball that fits inside a ball and outside the hulls, to within `ACCURACY`.
+def _left(balls: Balls, union: _native.HullUnion, threads: int) -> FloatArray:
+    """Radius [B] of the largest ball that fits inside each ball and outside the hulls, to within `ACCURACY`.
 
     Its centre is that of the ball to within half the radius: beside a plate thinner than the ball, much of it is free.
     """
-    at, left = centre, 0.0
+    centres, radii = balls.centres[:, None], balls.radii[:, None]
+    at, left, each = balls.centres, np.zeros(len(balls)), np.arange(len(balls))
     for step, around in _SEARCH:
-        there = at + step * radius * around
-        away = np.sqrt(dots(there - centre, there - centre))
-        fits = np.where(away <= radius / 2, np.minimum(union.distance(there, 1), radius - away), 0.0)
-        if fits.max() > left:
-            at, left = there[fits.argmax()], float(fits.max())
+        there = at[:, None] + step * radii[..., None] * around
+        away = np.sqrt(dots(there - centres, there - centres))
+        free = union.distance(there.reshape(-1, 3), threads).reshape(away.shape)
+        fits = np.where(away <= radii / 2, np.minimum(free, radii - away), 0.0)
+        best = fits.argmax(axis=1)
+        better = fits[each, best] > left
+        at = np.where(better[:, None], there[each, best], at)
+        left = np.where(better, fits[each, best], left)
     return left
 
 
