@@ -15,15 +15,15 @@ import rlacd
 from benchmarks.cli import PATH
 from benchmarks.tables import Table
 from fuzz.flaws import FAMILIES
-from rlacd import _native
 from rlacd.cli.exit_codes import exit_codes
 from rlacd.io.read.load import load_mesh
+from rlacd.repair.distance import spread_points
 from rlacd.repair.repair import repair
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 
-SAMPLES = 50_000
-"""Points of the undamaged surface whose distances from the hulls are measured."""
+SPACING = 0.02
+"""Between the points of the undamaged surface whose distances from the hulls are measured."""
 
 UNDER = 0.005
 """What of the undamaged surface is farther from the hulls than this has to be named in a warning."""
@@ -36,7 +36,7 @@ def measure(mesh: Any, family: str, share: float) -> tuple[int, float, bool]:
     result = rlacd.decompose(trimesh.Trimesh(*damaged, process=False), quality="fast", threads=1)
     solid = repair(mesh)
     frame = solid.frame
-    points, _ = _native.sample_surface(*solid.surface, SAMPLES, 0)
+    points, _ = spread_points(*solid.surface, SPACING)
     hulls = [hull for each in result if (hull := Hull.of(frame.to_frame(each.vertices)))]
     missed = hull_union(hulls, 1).distance(points, 1)
     under, lost = float(missed.max()), frame.to_input(points[missed.argmax()])

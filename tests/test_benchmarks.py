@@ -187,7 +187,7 @@ class TestRunner:
 
     def test_a_crash_is_recorded(self, meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         crasher = tmp_path / "crasher"
-        crasher.write_text("#!/bin/sh\nread line\necho last words >&2\nkill -SEGV $$\n")
+        crasher.write_text("#!/bin/sh\necho last words >&2\nkill -SEGV $$\n")
         crasher.chmod(0o755)
         monkeypatch.setattr(sys, "executable", str(crasher))
         rows = bench_of(meshes, tmp_path / "run").run("fast")

@@ -14,6 +14,7 @@ import argparse
 import csv
 import json
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,14 +27,15 @@ from rlacd.io.read.load import load_mesh
 from rlacd.merge import drop_slivers, merge_parts
 from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
+from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy, make_policy
-from rlacd.policies.greedy import EDGES_PER_COMPONENT
-from rlacd.policies.network import KIND, SHORTLIST, QPolicy, load_network
+from rlacd.policies.greedy import EDGES_PER_COMPONENT, least_hulls
+from rlacd.policies.network import KIND, SHORTLIST, Network, best_planes, load_network
 from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.repair.repair import repair
 from rlacd.run import Run
-from rlacd.solid.arrays import Float32Array
-from rlacd.solid.component import Component
+from rlacd.solid.arrays import BoolArray
+from rlacd.solid.component import Component, Plane
 from rlacd.solid.solid import Solid
 
 MOST_PARTS = 500
@@ -57,13 +59,27 @@ def policy_of(name: str, length: float | None) -> Policy:
     if not given.keys() <= {"ap", "ce", "no-spatial", "no-principal"}:
         raise OptionError(f"{name} is not known; there are planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz.")
     network = load_network(path, KIND, FEATURES, 1)
-    left_out = np.repeat(["no-spatial" in given, "no-principal" in given], 3 * OFFSETS_PER_AXIS)
+    exists = np.repeat(["no-spatial" not in given, "no-principal" not in given], 3 * OFFSETS_PER_AXIS)
+    counts = int(given.get("ap", SHORTLIST)), int(given.get("ce", EDGES_PER_COMPONENT))
+    return Deployment(network, length or network.threshold, exists, *counts)
 
-    def values(component: Component) -> Float32Array:
-        found = network(sweep_features(component, length or network.threshold))[:, 0]
-        return np.where(left_out, np.float32(-np.inf), found)
 
-    return QPolicy(values, int(given.get("ap", SHORTLIST)), int(given.get("ce", EDGES_PER_COMPONENT)))
+@dataclass(frozen=True)
+class Deployment:
+    """The paper's rule, as `rlacd.policies.network.QPolicy`, of the planes that exist; ties go to the sweep's first."""
+
+    network: Network
+    length: float
+    exists: BoolArray
+    planes: int
+    edges: int
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose a plane."""
+        candidates = paper_planes(component)
+        values = self.network(sweep_features(component, self.length))[:, 0]
+        best = best_planes(values, self.exists & valid_planes(component, candidates), self.planes)
+        return least_hulls(component, candidates, np.sort(best), self.edges, threads)
 
 
 def measure(
