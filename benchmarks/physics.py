@@ -102,7 +102,7 @@ def _simulated(result: Result, piles: int) -> Row:
         "vertices": statistics.fmean(len(hull.vertices) for hull in result.hulls),
         "bytes": model_size(result),
         "over": result.report.get("hausdorff", {}).get("over"),  # unknown for other tools
-        "volume": sum(hull.volume for hull in result.hulls),
+        "volume": float(sum(hull.volume for hull in result.hulls)),
         **asdict(drops_in_mujoco(result)),
         "rate": statistics.geometric_mean(rates),
         "contacts": statistics.fmean(contacts),

@@ -44,7 +44,7 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
     "filling": (
         ClippedPart,
         "__init__",
-        lambda part, solid, a, b, hull: (a.size + b.size, len(hull.faces)),
+        lambda part, solid, parts, hull: (sum(one.size for one in parts), len(hull.faces)),
         work.filling,
     ),
     "reuniting": (recut, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),

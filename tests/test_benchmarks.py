@@ -334,6 +334,13 @@ class TestCommands:
         assert "| wall s, 2 threads: median, mean, most, sum |" in page
 
     @pytest.mark.slow
+    def test_prices_are_held_against_times(self, meshes: Path) -> None:
+        """In a process of its own, since kernels are replaced by ones that are timed."""
+        command = [sys.executable, "-m", "benchmarks", "prices", str(meshes)]
+        told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
+        assert all(f"| {kernel} |" in told for kernel in ("choosing", "cutting", "judging", "filling"))
+
+    @pytest.mark.slow
     def test_hard_shapes_are_written_and_compared(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(hard, "SHAPES", {"gyroid": lambda: hard.gyroid(0.2, 3.0)})
         page = run(hard.app, "-o", tmp_path, "--methods", "fast")
