@@ -132,9 +132,8 @@ def _certainty(rows: Sequence[Row]) -> str:
     """Whether the threshold was kept."""
     if rows[0]["exceeding"] is None:
         return "none to keep"
-    how = "by samples" if rows[0]["method"] == "coacd" else "certified"
-    over = any(row["exceeding"] for row in rows)
-    return f"{how}; up to {max(row['concavity'] for row in rows):.2f}" if over else how
+    over = [f"up to {max(row['concavity'] for row in rows):.2f}"] if any(row["exceeding"] for row in rows) else []
+    return "; ".join(["by samples", *over] if rows[0]["method"] == "coacd" else over or ["certified"])
 
 
 def comparison(groups: Mapping[str, Sequence[Row]]) -> Table:

@@ -36,7 +36,8 @@ def measure(mesh: Any, family: str, share: float) -> tuple[int, float, bool]:
     result = rlacd.decompose(trimesh.Trimesh(*damaged, process=False), quality="fast", threads=1)
     solid = repair(mesh)
     frame = solid.frame
-    points, _ = spread_points(*solid.surface, SPACING)
+    surface: tuple[Any, Any] = solid.surface
+    points, _ = spread_points(*surface, SPACING)
     hulls = [hull for each in result if (hull := Hull.of(frame.to_frame(each.vertices)))]
     missed = hull_union(hulls, 1).distance(points, 1)
     under, lost = float(missed.max()), frame.to_input(points[missed.argmax()])
