@@ -14,13 +14,11 @@ COMMANDS = {
     "late": "how late a decomposition ends after a timeout or Ctrl-C",
     "replay": "what a traced decomposition would take on other numbers of cores",
     "batch": "the overhead of a batch beside its meshes",
-    "physics": "the hulls in simulators: piles, balls dropped into holes, grasps, pegs; primitives",
-    "paper": "the paper's tables without a training: equal accuracy, V-HACD, kinds and numbers of planes",
-    "training": "the paper's tables that train: rewards, discounts",
+    "physics": "the hulls in a simulator: piles, balls dropped into holes; primitives",
+    "training": "the paper's experiments that train: rewards, discounts",
     "prices": "the prices of rlacd.work against measured times",
-    "tables": "copies the tables of pages into a document that names them",
 }
-"""Name to purpose; each is a module of that name with a typer ``app``."""
+"""Name to purpose; each is a module of that name with a click command ``app``."""
 
 HELP = f"""Usage: python -m benchmarks COMMAND --help
 

@@ -4,34 +4,33 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated
 
-import typer
+import click
 
 from benchmarks.cli import check_methods, experiment, words
 from benchmarks.methods import make_method
 from benchmarks.runner import Bench
 from benchmarks.store import Row
-from benchmarks.tables import Page, Table, common_meshes, failures, managed, mean, ratio_of
-
-app = typer.Typer(add_completion=False)
+from benchmarks.tables import Page, Table, failures, managed, mean, ratio_of
 
 METHODS = "coacd,vhacd,fast,default"
 
+PACKAGES = {"coacd": "coacd", "vhacd": "vhacdx"}
+"""Other tools' packages."""
 
-@experiment(app, "compare", check_methods)
-def compare(
-    bench: Bench,
-    methods: Annotated[str, typer.Option(help="Separated by commas; the first is the reference.")] = METHODS,
-    threshold: Annotated[
-        float | None, typer.Option("--threshold", "-t", help="Of all that have one; default: each tool's own.")
-    ] = None,
-) -> Page:
+
+@experiment(check_methods)
+@click.option("--methods", default=METHODS, show_default=True, help="With commas between; the first is the reference.")
+@click.option("--threshold", "-t", type=float, help="Of all that have one; default: each tool's own.")
+def app(bench: Bench, methods: str, threshold: float | None) -> Page:
     """Compare methods: number of hulls, how tight they are, time.
+
+    The first table is that of README and docs/benchmarks.md. Methods are:
 
     \b
     default                rlacd.decompose(mesh)
@@ -39,36 +38,39 @@ def compare(
     fast:space[=RADIUS]    with navigable space (tolerance 0.1, half of it as radius; longest side 2)
     coacd, vhacd           other tools with their default options
     disjoint               rlacd's cuts, united only where hulls stay disjoint
-    planes[:ap=N][:ce=N][:no-spatial][:no-principal][:excess|:random|:FILE.npz]
-                           the paper's deployment
     """
     settings = {}
     for name in words(methods):
         method = make_method(name)
         given = threshold if method.setting == "threshold" else None
         settings[name] = (name, method.default if given is None else given)
-    groups = bench.run_together(settings)
-    page = Page("Side by side", [about(bench)])
-    page.add(comparison(groups), "## Mesh by mesh", mesh_by_mesh(groups))
-    page.add("## Failures", failures(row for rows in groups.values() for row in rows))
+    return side_by_side(bench, "Side by side", bench.run_together(settings))
+
+
+def side_by_side(bench: Bench, title: str, groups: Mapping[str, Sequence[Row]]) -> Page:
+    """The page of a comparison."""
+    page = Page(title, [published(groups), about(bench, groups), comparison(groups), mesh_by_mesh(groups)])
+    page.blocks.append(failures(row for rows in groups.values() for row in rows))
     return page
 
 
-def about(bench: Bench) -> str:
+def about(bench: Bench, groups: Mapping[str, Sequence[Row]]) -> str:
     """Describe the data and the measurements."""
-    versions = sorted({f"{_package(r['method'])} {r['version']}" for r in bench.store.rows() if "version" in r})
+    rows = [row for some in groups.values() for row in some]
+    versions = sorted({f"{PACKAGES.get(r['method'], 'rlacd')} {r['version']}" for r in rows if "version" in r})
     return (
         f"{len(bench.names)} meshes; {', '.join(versions)}; one thread each, {bench.limits.jobs} at a time, at most "
-        f"{bench.limits.seconds:g} s each; {machine()}, Python {platform.python_version()}. Lengths where the longest "
-        "side of the input is 2. Distance is the two-sided Hausdorff distance between the input's surface and that of "
-        "the hulls' union. Concavity is decided by bounds on the repaired input inside each hull. Seconds are from "
-        f"arrays in memory to hulls in memory.{_walls(bench)}"
+        f"{bench.limits.process.seconds:g} s each, {sum(row['seconds'] for row in rows) / 60:.1f} minutes in all with "
+        f"measuring; {machine()}, Python {platform.python_version()}. Lengths where the longest side of the input is "
+        "2. Distance is the two-sided Hausdorff distance between the input's surface and that of the hulls' union. "
+        "Concavity is decided by bounds on the repaired input inside each hull. Seconds are from arrays in memory to "
+        f"hulls in memory.{_walls(rows)}"
     )
 
 
-def _walls(bench: Bench) -> str:
+def _walls(rows: Sequence[Row]) -> str:
     """What wall times mean, where they were taken: with how many threads, on how busy a machine."""
-    loads = [row["load"] for row in bench.store.rows() if row.get("load") is not None]
+    loads = [row["load"] for row in rows if row.get("load") is not None]
     if not loads:
         return ""
     return (
@@ -80,88 +82,108 @@ def _walls(bench: Bench) -> str:
 @lru_cache(maxsize=1)
 def machine() -> str:
     """Name of the processor."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
+    about = Path("/proc/cpuinfo")
+    named = re.search(r"model name\s*: (.+)", about.read_text(encoding="utf-8")) if about.is_file() else None
+    return named[1] if named else platform.processor() or platform.machine()
 
 
-def _package(method: str) -> str:
-    return {"coacd": "coacd", "vhacd": "vhacdx"}.get(method, "rlacd")
+def published(groups: Mapping[str, Sequence[Row]]) -> Table:
+    """The table of README, with the best of what is counted in bold."""
+    good = [rows for rows in managed(groups).values() if rows]
+    if not good:
+        return Table(["no mesh that all managed", *groups], [])
+    first = _title(good[0][0], versioned=False)
+    numbers: dict[str, tuple[Callable[[Sequence[Row]], float], str, Callable[[list[float]], float] | None]] = {
+        "hulls": (lambda rows: sum(row["parts"] for row in rows), ",.0f", min),
+        "triangles per mesh": (lambda rows: mean(rows, "faces"), ",.0f", min),
+        "farthest from the input: mean, worst mesh": (lambda rows: mean(rows, "hausdorff"), ".3f", min),
+        "input's surface left uncovered": (lambda rows: mean(rows, "uncovered"), ".1%", None),
+        "invalid hulls": (lambda rows: sum(row["invalid"] for row in rows), ".0f", None),
+        f"times as fast as {first} (CPU, median)": (lambda rows: _times_as_fast(rows, good[0]), ".3g", max),
+    }
+    lines = []
+    for name, (number, form, best) in numbers.items():
+        values = [number(rows) for rows in good]
+        cells = [f"{value:{form if value < 10 else ',.0f'}}".replace("%", " %") for value in values]
+        if best:
+            cells = [f"**{c}**" if v == best(values) else c for c, v in zip(cells, values, strict=True)]
+        if "worst" in name:
+            cells = [f"{c}, {max(r['hausdorff'] for r in rows):.3f}" for c, rows in zip(cells, good, strict=True)]
+        lines.append([name, *cells])
+    thresholds = {row["setting"] for rows in good for row in rows if row["exceeding"] is not None}
+    told = f", threshold {min(thresholds):g}" if len(thresholds) == 1 else ""
+    lines.append(["the threshold", *map(_certainty, good)])
+    return Table([f"{len(good[0])} meshes{told}", *(_title(rows[0]) for rows in good)], lines)
+
+
+def _title(row: Row, versioned: bool = True) -> str:
+    tool = f"CoACD {row['version']}" if versioned else "CoACD"
+    titles = {"coacd": tool, "vhacd": "V-HACD 4", "default": "rlacd (default)"}
+    return titles.get(row["method"], f"rlacd `{row['method']}`")
+
+
+def _times_as_fast(rows: Sequence[Row], reference: Sequence[Row]) -> float:
+    pairs = zip(reference, rows, strict=True)  # in the order of the meshes, both
+    ratios: list[float] = [before["cpu"] / max(row["cpu"], 1e-9) for before, row in pairs]
+    return statistics.median(ratios)
+
+
+def _certainty(rows: Sequence[Row]) -> str:
+    """Whether the threshold was kept."""
+    if rows[0]["exceeding"] is None:
+        return "none to keep"
+    over = [f"up to {max(row['concavity'] for row in rows):.2f}"] if any(row["exceeding"] for row in rows) else []
+    return "; ".join(["by samples", *over] if rows[0]["method"] == "coacd" else over or ["certified"])
 
 
 def comparison(groups: Mapping[str, Sequence[Row]]) -> Table:
     """A column for each method, over the meshes that all managed; ratios are to the first."""
     good = managed(groups)
     reference = next(iter(good.values()), [])
-    failed = [f"{sum('error' in row for row in rows)} of {len(rows)}" for rows in groups.values()]
+    failed = ["failed", *(f"{sum('error' in row for row in rows)} of {len(rows)}" for rows in groups.values())]
     if not reference:
-        return Table(["no mesh that all managed", *groups], [["failed", *failed]])
+        return Table(["no mesh that all managed", *groups], [failed])
     cells = [_column(rows, reference) for rows in good.values()]
     lines = [[name, *(column[name] for column in cells)] for name in cells[0]]
     note = "Ratios are geometric means over the meshes that every method managed, with 95 % intervals."
-    return Table([f"{len(reference)} meshes", *groups], [*lines, ["failed", *failed]], note)
+    return Table([f"{len(reference)} meshes", *groups], [*lines, failed], note)
 
 
 def _column(rows: Sequence[Row], reference: Sequence[Row]) -> dict[str, str]:
     def worst(key: str) -> str:
-        return f"{mean(rows, key):.3f}, {max(row[key] for row in rows):.3f}"
+        return f"{mean(rows, key):.3f}, {max(row[key] for row in rows):.4f}"
 
-    is_first = rows is reference
-    pairs = zip(reference, rows, strict=True)  # in the order of the meshes, both
-    faster = statistics.median(before["cpu"] / max(row["cpu"], 1e-9) for before, row in pairs)
+    def spread(values: Sequence[float]) -> str:
+        return f"{statistics.median(values):.2f}, {statistics.fmean(values):.2f}, {max(values):.4g}, {sum(values):.4g}"
+
+    cpu = [row["cpu"] for row in rows]
+    slower = [seconds / max(before["cpu"], 1e-9) for seconds, before in zip(cpu, reference, strict=True)]
     parts = sum(row["parts"] for row in rows)
     exceeding = [row["exceeding"] for row in rows if row["exceeding"] is not None]
+    walls = [row["wall_threads"] for row in rows if "wall_threads" in row]
     return {
         "hulls": f"{parts:,}",
-        "hulls, ratio": "1" if is_first else ratio_of(rows, reference),
-        "triangles per mesh; per hull": f"{mean(rows, 'faces'):,.0f}; {sum(row['faces'] for row in rows) / parts:.0f}",
-        "distance: mean, worst": worst("hausdorff"),
+        "hulls, ratio": ratio_of(rows, reference),
+        "triangles per hull": f"{sum(row['faces'] for row in rows) / parts:.0f}",
         "beyond the input: mean, worst": worst("over"),
         "input outside: mean, worst": worst("under"),
-        "input's surface uncovered": f"{100 * mean(rows, 'uncovered'):.1f} %",
         "concavity: mean, worst": worst("concavity"),
         "parts over the threshold": str(sum(exceeding)) if exceeding else "–",
         "hulls' volume / solid, median": f"{statistics.median(row['volume'] for row in rows):.2f}",
         "volume in several hulls": f"{100 * mean(rows, 'overlap'):.1f} %",
         "invalid, empty hulls": f"{sum(row['invalid'] for row in rows)}, {sum(row['empty'] for row in rows)}",
-        "CPU s: median, sum": (
-            f"{statistics.median(row['cpu'] for row in rows):.2f}, {sum(row['cpu'] for row in rows):.1f}"
-        ),
-        **_wall(rows),
-        "times as fast, median": "1" if is_first else f"{faster:.3g}",
+        "CPU s: median, mean, most, sum": spread(cpu),
+        "CPU s / the first's: median, most": f"{statistics.median(slower):.3g}, {max(slower):.3g}",
+        **({f"wall s, {rows[0]['threads']} threads: median, mean, most, sum": spread(walls)} if walls else {}),
         "peak MB": f"{max(row['peak_mb'] for row in rows):.0f}",
     }
 
 
-def _wall(rows: Sequence[Row]) -> dict[str, str]:
-    """Wall seconds with threads, where they were taken."""
-    times = [row["wall_threads"] for row in rows if "wall_threads" in row]
-    if len(times) < len(rows):
-        return {}
-    return {f"wall s, {rows[0]['threads']} threads: median, sum": f"{statistics.median(times):.2f}, {sum(times):.1f}"}
-
-
 def mesh_by_mesh(groups: Mapping[str, Sequence[Row]]) -> Table:
     """Hulls, distance and CPU seconds of each method on each mesh."""
-    by_mesh = {label: {row["mesh"]: row for row in rows} for label, rows in groups.items()}
-    lines = [
-        [row["mesh"], *(_cell(rows.get(row["mesh"])) for rows in by_mesh.values())]
-        for row in next(iter(groups.values()))
-    ]
+    lines = [[rows[0]["mesh"], *map(_cell, rows)] for rows in zip(*groups.values(), strict=True)]
     return Table(["mesh", *groups], lines, "Hulls / distance / CPU seconds.")
 
 
-def _cell(row: Row | None) -> str:
-    if row is None or "error" in row:
-        return "failed"
-    return f"{row['parts']} / {row['hausdorff']:.3f} / {row['cpu']:.2f}"
-
-
-def mean_of_shared(groups: Sequence[Sequence[Row]], key: str) -> list[float]:
-    """Mean of a column for each group, over the meshes that all managed."""
-    shared = common_meshes(groups)
-    return [mean((row for row in rows if row["mesh"] in shared), key) for rows in groups]
+def _cell(row: Row) -> str:
+    return "failed" if "error" in row else f"{row['parts']} / {row['hausdorff']:.3f} / {row['cpu']:.2f}"

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
 
+import click
 import numpy as np
-import typer
 
 from benchmarks.cli import check_methods, experiment
 from benchmarks.compare import about
@@ -14,11 +13,10 @@ from benchmarks.runner import Bench
 from benchmarks.store import Row
 from benchmarks.tables import Page, Table, failures
 
-app = typer.Typer(add_completion=False)
-
 WORST = 10
-TASKS = 100
-"""Meshes a process: starting one takes as long as most meshes."""
+
+REACH = 0.055
+"""Hulls that reach farther than this beyond the input are counted: a tenth more than the usual threshold."""
 
 COLUMNS = {
     "CPU s": "cpu",
@@ -30,21 +28,17 @@ COLUMNS = {
 }
 
 
-@experiment(app, "corpus", lambda method, **_: check_methods(method), TASKS)
-def corpus(
-    bench: Bench,
-    method: Annotated[str, typer.Option(help="As for compare, such as fast:max_vertices=32.")] = "fast",
-    setting: Annotated[float | None, typer.Option(help="Its threshold or tolerance; default: its own.")] = None,
-) -> Page:
+@experiment(lambda method, **_: check_methods(method), fresh=False)
+@click.option("--method", default="fast", show_default=True, help="As for compare, such as fast:max_vertices=32.")
+@click.option("--setting", type=float, help="Its threshold or tolerance; default: its own.")
+def app(bench: Bench, method: str, setting: float | None) -> Page:
     """Decompose every mesh of a folder, and report failures and what is worst.
 
     \b
     python -m benchmarks corpus ../shared/meshes/test --out RUN
     """
     rows = bench.run(method, setting)
-    page = Page(f"Corpus, {method}", [about(bench)])
-    page.add(*summary(rows), "## Failures", failures(rows))
-    return page
+    return Page(f"Corpus, {method}", [about(bench, {method: rows}), *summary(rows), failures(rows)])
 
 
 def summary(rows: Sequence[Row]) -> list[object]:
@@ -57,6 +51,7 @@ def summary(rows: Sequence[Row]) -> list[object]:
         "empty hulls": sum(row["empty"] for row in good),
         "parts over the threshold": sum(row["exceeding"] or 0 for row in good),
         "CPU s, all": f"{sum(row['cpu'] for row in good):.0f}",
+        f"reach over {REACH}": sum(row["over"] > REACH for row in good),
     }
     blocks: list[object] = [Table(["meshes", str(len(rows))], list(promises.items()))]
     if good:

@@ -61,11 +61,8 @@ class _Uniting:
             for old in pair:
                 del self._hulls[old], self._bodies[old]
             # A hull that has grown may be in the way of pairs that were free.
-            self._joint = {
-                other: joint
-                for other, joint in self._joint.items()
-                if not set(pair) & set(other) and not self._enters(joint, new)
-            }
+            left = {other: joint for other, joint in self._joint.items() if not set(pair) & set(other)}
+            self._joint = {other: joint for other, joint in left.items() if not self._enters(joint, new)}
             for number in list(self._hulls)[:-1]:
                 self._ask((number, new))
         return list(self._hulls.values())
@@ -78,8 +75,8 @@ class _Uniting:
         lows, highs = (np.array([pick(hull.vertices, axis=0) for hull in hulls]) for pick in (np.min, np.max))
         if (lows.max(axis=0) > highs.min(axis=0) + self._goal.threshold).any():
             return
-        hull = Hull.of(np.concatenate([hull.vertices for hull in hulls]))
-        if hull is None or self._goal.screen.forbids(self._root.filling, hull):
+        hull = Hull.around(*hulls)
+        if self._goal.screen.forbids(self._root.filling, hull):
             return
         if any(self._enters(hull, number) for number in self._hulls if number not in pair):
             return
@@ -87,13 +84,8 @@ class _Uniting:
             self._joint[pair] = hull
 
     def _enters(self, hull: Hull, number: int) -> bool:
-        other = self._hulls[number]
-        if (hull.vertices.min(axis=0) >= other.vertices.max(axis=0)).any():
-            return False
-        if (hull.vertices.max(axis=0) <= other.vertices.min(axis=0)).any():
-            return False
         shared: float = (_body(hull) ^ self._bodies[number]).volume()
-        return shared > ENTERED * min(hull.volume, other.volume)
+        return shared > ENTERED * min(hull.volume, self._hulls[number].volume)
 
 
 def _body(hull: Hull) -> Manifold:

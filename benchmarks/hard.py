@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated
+from pathlib import Path
 
+import click
 import numpy as np
 import trimesh
-import typer
 from manifold3d import Manifold
 from tests import shapes_large as large
 
-from benchmarks.cli import Out, check_methods, words, write
-from benchmarks.compare import about, comparison, mesh_by_mesh
-from benchmarks.runner import Bench, Limits
-from benchmarks.store import Store
-from benchmarks.tables import Page, failures
+from benchmarks.cli import OUT, check_methods, words, write
+from benchmarks.compare import side_by_side
+from benchmarks.runner import Bench
 from rlacd.cli.exit_codes import exit_codes
-
-app = typer.Typer(add_completion=False)
 
 
 def gyroid(edge: float = 0.077, waves: float = 6.5) -> large.Mesh:
@@ -45,12 +41,10 @@ SHAPES: dict[str, Callable[[], large.Mesh]] = {
 }
 
 
-@app.command()
-def hard(
-    out: Out,
-    methods: Annotated[str, typer.Option(help="As for compare.")] = "fast,default",
-    limit: Annotated[float, typer.Option(help="Seconds a method may take for one shape.")] = 600.0,
-) -> None:
+@click.command()
+@OUT
+@click.option("--methods", default="fast,default", show_default=True, help="As for compare.")
+def app(out: Path, methods: str) -> None:
     """Write the shapes to OUT/shapes and compare methods on them.
 
     \b
@@ -58,14 +52,8 @@ def hard(
     """
     with exit_codes():
         check_methods(methods)
-        store = Store(out)
-        (out / "shapes").mkdir(exist_ok=True)
+        (out / "shapes").mkdir(parents=True, exist_ok=True)
         for name, make in SHAPES.items():
             trimesh.Trimesh(*make(), process=False).export(out / "shapes" / f"{name}.ply")
-        names = [f"{name}.ply" for name in SHAPES]
-        bench = Bench(out / "shapes", names, store, Limits(limit), typer.echo)
-        groups = {method: bench.run(method) for method in words(methods)}
-        page = Page("Hard shapes", [about(bench), mesh_by_mesh(groups), comparison(groups)])
-        page.add("## Failures", failures(row for rows in groups.values() for row in rows))
-        write(page, out, "hard")
-        store.close()
+        bench = Bench(out / "shapes", [f"{name}.ply" for name in SHAPES], out, say=click.echo)
+        write(side_by_side(bench, "Hard shapes", {name: bench.run(name) for name in words(methods)}), out, "hard")

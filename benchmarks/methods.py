@@ -10,7 +10,6 @@ name                            tool                                          se
 ``coacd``                       CoACD                                         concavity threshold (its own)
 ``vhacd``                       V-HACD 4                                      most hulls (its own)
 ``disjoint``                    `benchmarks.disjoint`                         concavity threshold (rlacd's)
-``planes[:...]``                the paper's deployment; see `deployed`        concavity threshold (rlacd's)
 ==============================  ============================================  =====================================
 
 Lengths are in the frame where the longest side is 2. The default radius is half the tolerance.
@@ -78,7 +77,6 @@ def make_method(name: str) -> Method:
     MissingExtraError
         The method's tool is not installed.
     """
-    base, *words = name.split(":")
     if name == "coacd":
         return Method(name, version_of("coacd"), "threshold", 0.05, _coacd)
     if name == "vhacd":
@@ -87,15 +85,6 @@ def make_method(name: str) -> Method:
         from benchmarks.disjoint import decompose_disjoint
 
         return Method(name, version_of("rlacd"), "threshold", Options.threshold, decompose_disjoint)
-    if base == "planes":
-        from benchmarks.deployed import Deployment, decompose_as_deployed
-
-        deployment = Deployment.parse(words)
-
-        def run(v: FloatArray, f: IntArray, threshold: float, threads: int) -> list[RawHull]:
-            return decompose_as_deployed(deployment, v, f, threshold, threads)
-
-        return Method(name, version_of("rlacd"), "threshold", Options.threshold, run)
     setting, default = ("tolerance", 0.1) if _space(name) else ("threshold", Options.threshold)
     return Method(name, version_of("rlacd"), setting, default, _rlacd(name))
 
@@ -114,7 +103,7 @@ def rlacd_options(name: str) -> dict[str, Any]:
     if base not in QUALITIES:
         raise OptionError(
             f"there is no method {name!r}; it has to be default, fast or best, if need be followed by :OPTION=VALUE or "
-            "by :space[=RADIUS]; or coacd, vhacd, disjoint, planes[:...]."
+            "by :space[=RADIUS]; or coacd, vhacd, disjoint."
         )
     options = dict(QUALITIES[base])
     for word in words:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import statistics
+import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from typing import Annotated, Any
+from dataclasses import asdict
 
+import click
 import trimesh
-import typer
 
 from benchmarks.cli import experiment, words
 from benchmarks.compare import machine
-from benchmarks.handle import Handling, handle_in_mujoco
 from benchmarks.methods import make_method, rlacd_options
 from benchmarks.runner import Bench
 from benchmarks.simulate import (
@@ -22,220 +20,141 @@ from benchmarks.simulate import (
     SECONDS,
     SIZE,
     STEP,
-    Drops,
-    Pile,
     drops_in_mujoco,
-    get_bullet,
     get_mujoco,
     model_size,
-    pile_in_bullet,
     pile_in_mujoco,
     scaled_source,
 )
-from benchmarks.store import Task, load_hulls
-from benchmarks.tables import Page, Ratio, Table
+from benchmarks.store import Row, Task, load_hulls
+from benchmarks.tables import Page, Table, managed, mean, ratio_of
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import RlacdError
 from rlacd.result import Result
-
-app = typer.Typer(add_completion=False)
 
 OTHERS = ("coacd", "vhacd")
 """Other tools, at their authors' settings."""
 
 ONE_HULL = "fast:max_hulls=1"
 
-METHODS = (
-    f"coacd,vhacd,{ONE_HULL},default,fast,fast:detail=full,fast:max_vertices=64,fast:max_vertices=32,"
-    "fast:max_vertices=16,fast:primitives=true,fast:overlap=0.01"
-)
+METHODS = f"{ONE_HULL},fast,default,fast:max_vertices=16,fast:primitives=true,coacd,vhacd"
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """One object, decomposed in one way.
-
-    Attributes
-    ----------
-    mesh, way : str
-    parts, primitives : int
-        Hulls, and how many of them stand for a primitive.
-    vertices : float
-        Mean per hull.
-    size : int
-        Bytes of the MJCF file and its collision meshes.
-    over : float or None
-        How far the hulls reach beyond the input, where the longest side is 2; None for other tools.
-    drops : Drops
-    handling : Handling
-    mujoco : list of Pile
-    bullet : Pile or None
-    """
-
-    mesh: str
-    way: str
-    parts: int
-    primitives: int
-    vertices: float
-    size: int
-    over: float | None
-    drops: Drops
-    handling: Handling
-    mujoco: list[Pile]
-    bullet: Pile | None
-
-    @property
-    def rate(self) -> float:
-        """MuJoCo's steps per CPU second, over the piles."""
-        return statistics.geometric_mean(pile.steps_per_second for pile in self.mujoco)
-
-
-def _check(methods: str, bullet: bool, **_: object) -> None:
+def _check(methods: str, **_: object) -> None:
     get_mujoco()
-    if bullet:
-        get_bullet()
     for name in words(methods):
         make_method(name) if name in OTHERS else rlacd_options(name)
 
 
-@experiment(app, "physics", _check)
-def physics(
-    bench: Bench,
-    methods: Annotated[str, typer.Option(help="coacd, vhacd, and rlacd as for compare.")] = METHODS,
-    piles: Annotated[int, typer.Option(min=1, help="Piles of each object in MuJoCo, turned differently.")] = 1,
-    bullet: Annotated[bool, typer.Option("--bullet/--no-bullet", help="Also simulate in PyBullet.")] = True,
-) -> Page:
-    """Simulate the hulls: a pile, balls dropped into every hole, grasps and pegs; needs rlacd\\[sim].
+@experiment(_check)
+@click.option("--methods", default=METHODS, show_default=True, help="coacd, vhacd, and rlacd as for compare.")
+@click.option("--piles", default=1, type=click.IntRange(1), help="Piles of each object, turned differently.")
+def app(bench: Bench, methods: str, piles: int) -> Page:
+    """Simulate the hulls in MuJoCo: a pile, and balls dropped into every hole; needs rlacd[sim].
 
     \b
     python -m benchmarks physics MESHES --list MESHES/quick.txt --out RUN
     """
-    outcomes: list[Outcome] = []
-    failed: list[str] = []
+    groups: dict[str, list[Row]] = {way: [] for way in words(methods)}
     for mesh in bench.names:
-        for way, result in _decompositions(bench, mesh, words(methods), failed):
+        for way, result, cpu in _decompositions(bench, mesh, list(groups)):
+            row: Row = {"mesh": mesh}
             try:
-                outcomes.append(_simulated(mesh, way, result, piles, bullet))
+                row |= {"error": result} if isinstance(result, str) else {**_simulated(result, piles), "cpu": cpu}
             except (RlacdError, ValueError) as error:
-                failed.append(f"- {mesh}, {way}: {' '.join(str(error).split())[:200]}")
-                continue
-            found = asdict(outcomes[-1].drops) | asdict(outcomes[-1].handling)
-            bench.say(f"{mesh}  {way}: {len(result)} parts, {outcomes[-1].rate:.0f} steps/s, {found}")
+                row["error"] = " ".join(str(error).split())[:200]
+            groups[way].append(row)
+            bench.say(f"{way}: {row}")
     about = (
         f"{len(bench.names)} objects, scaled to {SIZE:g} m, of density 1000, each decomposed in every way; {COPIES} "
-        f"copies fall into a bin for {SECONDS:g} s (MuJoCo: {piles} piles, steps of {1000 * STEP:g} ms; PyBullet: of "
-        f"1/240 s). {machine()}, one thread; CPU time."
+        f"copies fall into a bin for {SECONDS:g} s ({piles} piles, steps of {1000 * STEP:g} ms). {machine()}, one "
+        "thread; CPU time."
     )
-    page = Page("Physics", [about])
-    if outcomes:
-        page.add(_summary(outcomes), "## Object by object", _details(outcomes))
-    page.add("## Failures", "\n".join(failed) or "none")
-    return page
+    failed = [f"- {r['mesh']}, {way}: {r['error']}" for way, rows in groups.items() for r in rows if "error" in r]
+    return Page("Physics", [about, _summary(groups), _details(groups), "## Failures", "\n".join(failed) or "none"])
 
 
-def _decompositions(bench: Bench, mesh: str, ways: Sequence[str], failed: list[str]) -> Iterator[tuple[str, Result]]:
+def _decompositions(bench: Bench, mesh: str, ways: Sequence[str]) -> Iterator[tuple[str, Result | str, float]]:
+    """Hulls, or why there are none, and the CPU seconds that they took."""
     scaled, factor, centre = scaled_source(bench.meshes / mesh)
     mass = decompose(scaled, threads=1, **rlacd_options(ONE_HULL)).report["mass"]
     for way in ways:
         if way not in OTHERS:
-            yield way, decompose(scaled, threads=1, **rlacd_options(way))
+            began = time.process_time()
+            yield way, decompose(scaled, threads=1, **rlacd_options(way)), time.process_time() - began
             continue
         task = Task(mesh, way, make_method(way).default)
         (row,) = bench.run_tasks([task])
         if "error" in row:
-            failed.append(f"- {mesh}, {way}: {row['error']}")
+            yield way, row["error"], 0.0
             continue
-        hulls, _ = load_hulls(bench.store.hulls_of(task))
+        hulls, _ = load_hulls(bench.hulls_of(task))
         shapes = [trimesh.Trimesh((v - centre) * factor, f, process=False) for v, f in hulls]
-        yield way, Result(shapes, {"name": "mesh", "mass": mass}, trimesh.Trimesh(*scaled, process=False))
+        source = trimesh.Trimesh(*scaled, process=False)
+        yield way, Result(shapes, {"name": "mesh", "mass": mass}, source), row["cpu"]
 
 
-def _simulated(mesh: str, way: str, result: Result, piles: int, bullet: bool) -> Outcome:
-    return Outcome(
-        mesh,
-        way,
-        len(result),
-        sum(each is not None for each in getattr(result, "primitives", [])),
-        statistics.fmean(len(hull.vertices) for hull in result.hulls),
-        model_size(result),
-        None if way in OTHERS else result.report["hausdorff"]["over"],
-        drops_in_mujoco(result),
-        handle_in_mujoco(result),
-        [pile_in_mujoco(result, seed) for seed in range(piles)],
-        pile_in_bullet(result) if bullet else None,
-    )
-
-
-PILE = ("steps/s", "contacts", "depth, %", "drift, W/kg", "rest, s")
-
-NOTE = (
-    "Means over {} objects that every way solved; steps/s is a geometric mean, its ratio is to the first way. kB: the "
-    "MJCF file with its collision meshes. Over: how far the hulls reach beyond the input (longest side: 2). Holes: of "
-    "the balls that pass through by the exact mesh, how many pass. Hollows: of those that come to rest inside the "
-    "convex hull, how many rest within {:g} % of the longest side of that place; both where a ball wider by as much "
-    "does the same. Grasps: of the places where two fingertips meet the exact mesh squarely, how many hold the object "
-    "with the fingertips as far apart. Pegs: of the holes that the exact mesh encloses, by how many the object hangs. "
-    "Depth: of the deepest contact, in percent of the longest side. Drift: change of energy in the last half second. "
-    "Rest: median seconds until nothing moves faster than 0.05 m/s."
-)
-
-
-def _summary(outcomes: list[Outcome]) -> Table:
-    """One column for each way, over the objects that every way solved."""
-    ways = list(dict.fromkeys(outcome.way for outcome in outcomes))
-    by_way = {way: {o.mesh: o for o in outcomes if o.way == way} for way in ways}
-    shared = sorted(set.intersection(*({*solved} for solved in by_way.values())))
-    columns = [
-        _column([by_way[way][mesh] for mesh in shared], [by_way[ways[0]][mesh] for mesh in shared]) for way in ways
-    ]
-    lines = [[name, *(column[name] for column in columns)] for name in columns[0]]
-    return Table(["", *ways], lines, NOTE.format(len(shared), 100 * NEAR))
-
-
-def _column(rows: list[Outcome], first: list[Outcome]) -> dict[str, Any]:
-    if not rows:
-        return {"parts": "–"}
-    drops, handling = [row.drops for row in rows], [row.handling for row in rows]
-    bullet = [row.bullet for row in rows if row.bullet is not None]
-    mujoco = [pile for row in rows for pile in row.mujoco]
-    over = [row.over for row in rows if row.over is not None]
+def _simulated(result: Result, piles: int) -> Row:
+    rates, contacts = zip(*(pile_in_mujoco(result, seed) for seed in range(piles)), strict=True)
     return {
-        "parts": f"{statistics.fmean(row.parts for row in rows):.1f}",
-        "of these primitives": f"{statistics.fmean(row.primitives for row in rows):.1f}",
-        "vertices a hull": f"{statistics.fmean(row.vertices for row in rows):.0f}",
-        "kB": f"{statistics.fmean(row.size for row in rows) / 1000:.0f}",
-        "over: mean, worst": f"{statistics.fmean(over):.3f}, {max(over):.3f}" if over else "–",
-        "holes": _share(sum(d.passed for d in drops), sum(d.holes for d in drops)),
-        "hollows": _share(sum(d.rested for d in drops), sum(d.hollows for d in drops)),
-        "grasps": _share(sum(h.held for h in handling), sum(h.grasps for h in handling)),
-        "pegs": _share(sum(h.hung for h in handling), sum(h.pegs for h in handling)),
-        "MuJoCo steps/s, ratio": str(Ratio.of([row.rate for row in rows], [row.rate for row in first])),
-        **{f"MuJoCo {name}": cell for name, cell in zip(PILE, _cells(mujoco), strict=True)},
-        **{f"Bullet {name}": cell for name, cell in zip(PILE, _cells(bullet) if bullet else ["–"] * 5, strict=True)},
+        "parts": len(result),
+        "primitives": sum(each is not None for each in getattr(result, "primitives", [])),
+        "vertices": statistics.fmean(len(hull.vertices) for hull in result.hulls),
+        "bytes": model_size(result),
+        "over": result.report.get("hausdorff", {}).get("over"),  # unknown for other tools
+        "volume": float(sum(hull.volume for hull in result.hulls)),
+        **asdict(drops_in_mujoco(result)),
+        "rate": statistics.geometric_mean(rates),
+        "contacts": statistics.fmean(contacts),
     }
 
 
-def _cells(piles: list[Pile]) -> list[str]:
-    rest = statistics.median(pile.rest for pile in piles)
-    return [
-        f"{statistics.geometric_mean(pile.steps_per_second for pile in piles):.0f}",
-        f"{statistics.fmean(pile.contacts for pile in piles):.0f}",
-        f"{100 * statistics.fmean(pile.penetration for pile in piles):.2f}",
-        f"{statistics.fmean(pile.drift for pile in piles):.4f}",
-        f"{rest:.1f}" if math.isfinite(rest) else f"> {SECONDS:g}",
+NOTE = (
+    "Over objects that every way solved; ratios are to the first way. Bytes: the MJCF file with its collision "
+    "meshes. Over: how far the hulls reach beyond the input (longest side: 2). Holes: of the balls that pass through "
+    "by the exact mesh, how many pass. Hollows: of those that come to rest inside the convex hull, how many rest "
+    f"within {100 * NEAR:g} % of the longest side of that place; both where a ball wider by as much does the same."
+)
+
+
+def _summary(groups: dict[str, list[Row]]) -> Table:
+    """One column for each way, over the objects that every way solved."""
+    good = managed(groups)
+    first = next(iter(good.values()))
+    if not first:
+        return Table(["", *groups], [])
+    columns = [_column(rows, first) for rows in good.values()]
+    lines = [[name, *(column[name] for column in columns)] for name in columns[0]]
+    return Table([f"{len(first)} objects", *groups], lines, NOTE)
+
+
+def _column(rows: list[Row], first: list[Row]) -> dict[str, str]:
+    over = [row["over"] for row in rows if row["over"] is not None]
+
+    def total(key: str) -> int:
+        return sum(row[key] for row in rows)
+
+    return {
+        "parts; a mesh": f"{total('parts')}; {mean(rows, 'parts'):.1f}",
+        "of these primitives": f"{total('primitives')}",
+        "vertices a hull": f"{mean(rows, 'vertices'):.0f}",
+        "bytes; a mesh": f"{total('bytes'):,}; {mean(rows, 'bytes'):,.0f}",
+        "over: mean, worst": f"{statistics.fmean(over):.4f}, {max(over):.4f}" if over else "–",
+        "volume, ratio": ratio_of(rows, first, "volume"),
+        "CPU s to decompose": f"{sum(row['cpu'] for row in rows):.1f}",
+        "holes": f"{total('passed')} of {total('holes')}",
+        "hollows": f"{total('rested')} of {total('hollows')}",
+        "steps/s": f"{statistics.geometric_mean(row['rate'] for row in rows):.0f}",
+        "steps/s, ratio": ratio_of(rows, first, "rate"),
+        "contacts": f"{mean(rows, 'contacts'):.0f}",
+    }
+
+
+def _details(groups: dict[str, list[Row]]) -> Table:
+    lines = [
+        [f"{r['mesh']}, {way}", r["parts"], f"{r['passed']} of {r['holes']}", f"{r['rested']} of {r['hollows']}"]
+        for way, rows in groups.items()
+        for r in rows
+        if "error" not in r
     ]
-
-
-def _details(outcomes: list[Outcome]) -> Table:
-    header = ["object, way", "parts", "primitives", "kB", "holes", "hollows", "grasps", "pegs", "MuJoCo steps/s"]
-    lines = []
-    for o in outcomes:
-        d, h = o.drops, o.handling
-        counts = [(d.passed, d.holes), (d.rested, d.hollows), (h.held, h.grasps), (h.hung, h.pegs)]
-        of = [f"{some} of {all_}" for some, all_ in counts]
-        lines.append([f"{o.mesh}, {o.way}", o.parts, o.primitives, f"{o.size / 1000:.1f}", *of, f"{o.rate:.0f}"])
-    return Table(header, lines)
-
-
-def _share(some: int, of: int) -> str:
-    return "–" if of == 0 else f"{100 * some / of:.0f} %"
+    return Table(["object, way", "parts", "holes", "hollows"], lines)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Any
 
+import click
 import numpy as np
-import typer
 
 import rlacd
-from benchmarks.cli import Meshes
+from benchmarks.cli import PATH
 from benchmarks.runner import find_meshes
 from benchmarks.tables import Table
 from rlacd.cli.exit_codes import exit_codes
@@ -21,8 +22,6 @@ from rlacd.run import work
 from rlacd.search import recut
 from rlacd.solid.component import ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
-
-app = typer.Typer(add_completion=False)
 
 Sizes = tuple[int, ...]
 
@@ -45,7 +44,7 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
     "filling": (
         ClippedPart,
         "__init__",
-        lambda part, solid, a, b, hull: (a.size + b.size, len(hull.faces)),
+        lambda part, solid, parts, hull: (sum(one.size for one in parts), len(hull.faces)),
         work.filling,
     ),
     "reuniting": (recut, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),
@@ -74,11 +73,10 @@ def measure_kernels() -> dict[str, list[tuple[Sizes, float]]]:
     return calls
 
 
-@app.command()
-def prices(
-    meshes: Meshes,
-    count: Annotated[int, typer.Option(help="Meshes, drawn at random, the same ones each time.")] = 14,
-) -> None:
+@click.command()
+@click.argument("meshes", type=PATH)
+@click.option("--count", default=14, show_default=True, help="Meshes, drawn at random, the same ones each time.")
+def app(meshes: Path, count: int) -> None:
     """Decompose meshes at the default level, one thread; compare each kernel's CPU seconds with what it was priced at.
 
     Fit: nonnegative least squares of a call's microseconds to the sizes that its price depends on, constant first.
@@ -104,4 +102,4 @@ def prices(
                 fit, _ = nnls(terms * weight[:, None], times * weight)
                 shown = [round(float(x), 2) for x in fit]
                 lines.append([kernel, len(own), f"{times.sum() / 1e6:.2f}", f"{priced / 1e6:.2f}", shown])
-        print(Table(["kernel", "calls", "CPU s", "priced", "fit, µs"], lines))
+        click.echo(Table(["kernel", "calls", "CPU s", "priced", "fit, µs"], lines))

@@ -12,14 +12,13 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
+import click
 import numpy as np
-import typer
 
+from benchmarks.cli import PATH
 from benchmarks.tables import Table
-
-app = typer.Typer(add_completion=False)
 
 
 class Cost(NamedTuple):
@@ -151,14 +150,15 @@ def replayed(steps: Iterable[Step], threads: int) -> float:
     return _Machine(threads).run(steps)
 
 
-@app.command()
-def replay(
-    traces: Annotated[list[Path], typer.Argument(help="Written by RLACD_TRACE=FILE, best on two threads or more.")],
-    threads: Annotated[str, typer.Option(help="Numbers of cores.")] = "1 2 4 8 16",
-) -> None:
-    """Tell what traced decompositions would take on other numbers of cores; the traced time stands beside it.
+@click.command()
+@click.argument("traces", type=PATH, nargs=-1, required=True)
+@click.option("--threads", default="1 2 4 8 16", show_default=True, help="Numbers of cores.")
+def app(traces: tuple[Path, ...], threads: str) -> None:
+    """Tell what decompositions would take on other numbers of cores; the traced time stands beside it.
 
-    \\b
+    TRACES are written by RLACD_TRACE=FILE, best on two threads or more.
+
+    \b
     RLACD_TRACE=al.json rlacd decompose al.ply --threads 2 && python -m benchmarks replay al.json --threads "2 8"
     """
     numbers = [int(number) for number in threads.split()]
@@ -172,16 +172,5 @@ def replay(
         cpu = sums[0] + sums[1] - sums[2] + sums[3]
         rows.append([path.stem, traced, cpu, sums[0], first, *(replayed(steps, number) for number in numbers)])
     rows.append(["all", *np.sum([row[1:] for row in rows], axis=0)])
-    header = [
-        "trace",
-        "traced s",
-        "CPU s",
-        "lock held, s",
-        "one thread only, s",
-        *(f"{number} cores" for number in numbers),
-    ]
-    print(Table(header, [[row[0], *(f"{value:.2f}" for value in row[1:])] for row in rows]))
-
-
-if __name__ == "__main__":
-    app()
+    header = ["trace", "traced s", "CPU s", "lock held, s", "one thread only, s", *(f"{n} cores" for n in numbers)]
+    click.echo(Table(header, [[row[0], *(f"{value:.2f}" for value in row[1:])] for row in rows]))

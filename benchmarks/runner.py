@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
-import tempfile
-import threading
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from benchmarks.methods import make_method
-from benchmarks.store import Row, Store, Task
+from benchmarks.store import Row, Task, load_row, save_row
 from rlacd.errors import MeshFileError
-from rlacd.pool.process import kill_group, start, why_it_ended
+from rlacd.pool import Pool, ProcessLimits, Request, WorkerDiedError, open_pool
 
 ENDINGS = {".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"}
-
-LAST_WORDS = 300
-"""Characters of a failed process's last line that are kept."""
 
 
 @dataclass(frozen=True)
@@ -31,56 +22,44 @@ class Limits:
 
     Attributes
     ----------
-    seconds : float
-        Wall time for running a method, and again for measuring its hulls in a second process.
-    memory : int
-        Bytes of address space, on Linux; 0 for no limit.
+    process : ProcessLimits
+        Wall time for running a method and measuring its hulls, and again for measuring alone if that ran out of it.
     jobs : int
         Number of concurrent processes.
-    tasks : int
-        Tasks that a process does before it is replaced. Peak memory is that of its largest so far.
+    fresh : bool
+        Whether each task gets a process of its own; otherwise peak memory is that of a process's largest so far.
     threads : int
         Above 1, each task is done once more with so many threads, for its wall time.
     """
 
-    seconds: float = 600.0
-    memory: int = 12 * 2**30
+    process: ProcessLimits = field(default_factory=ProcessLimits)
     jobs: int = 1
-    tasks: int = 1
+    fresh: bool = True
     threads: int = 1
 
 
+@dataclass
 class Bench:
     """A folder of meshes, a folder of results, and the limits.
 
-    Parameters
+    Attributes
     ----------
     meshes : Path
         Folder that mesh names are relative to.
-    names : sequence of str
+    names : list of str
         The meshes.
-    store : Store
+    folder : Path
+        Where results are kept.
     limits : Limits
     say : callable
         Receives lines of progress.
     """
 
-    def __init__(
-        self,
-        meshes: Path,
-        names: Sequence[str],
-        store: Store,
-        limits: Limits | None = None,
-        say: Callable[[str], None] = print,
-    ) -> None:
-        self.meshes = meshes
-        self.names = list(names)
-        self.store = store
-        self.limits = limits or Limits()
-        self.say = say
-        self._children: set[_Child] = set()
-        self._own = threading.local()
-        self._stopping = False
+    meshes: Path
+    names: Sequence[str]
+    folder: Path
+    limits: Limits = field(default_factory=Limits)
+    say: Callable[[str], None] = print
 
     def run(self, method: str, setting: float | None = None) -> list[Row]:
         """Run one method on all meshes, by default at its own setting; rows in the order of the names."""
@@ -94,115 +73,50 @@ class Bench:
 
     def run_tasks(self, tasks: Iterable[Task]) -> list[Row]:
         """Run unfinished tasks, and return the rows of all tasks in order."""
-        tasks = list(tasks)
-        waiting = [task for task in dict.fromkeys(tasks) if self.known(task) is None]
-        self._stopping = False
-        pool = ThreadPoolExecutor(self.limits.jobs)
-        try:
-            for number, row in enumerate(pool.map(self._finish, waiting), 1):
+        rows = {task: self.known(task) for task in tasks}
+        waiting = [task for task, row in rows.items() if row is None]
+        with ThreadPoolExecutor(self.limits.jobs) as threads, open_pool(self.limits.jobs) as pool:
+            running = {threads.submit(self._finish, pool, task): task for task in waiting}
+            for number, done in enumerate(as_completed(running), 1):
+                task, row = running[done], done.result()
+                save_row(self.folder, task, row)
+                rows[task] = row
                 what = row.get("error") or f"{row['parts']} parts, {row['cpu']:.1f} s, D_h {row['hausdorff']:.3f}"
-                self.say(f"{number}/{len(waiting)} {row['mesh']}  {row['method']} {row['setting']:g}  {what}")
-        finally:
-            self._stopping = True  # processes killed from here on have not failed
-            for child in list(self._children):
-                child.kill()
-            self._children.clear()
-            pool.shutdown(cancel_futures=True)
-        return [found for task in tasks if (found := self.store.get(task)) is not None]
+                self.say(f"{number}/{len(waiting)} {task.mesh}  {task.method} {task.setting:g}  {what}")
+        return [row for row in rows.values() if row is not None]
 
     def known(self, task: Task) -> Row | None:
         """The row of a finished task, unless another version of its tool made it or other threads were timed."""
-        row = self.store.get(task)
+        row = load_row(self.folder, task)
         is_timed = row is not None and self.limits.threads in (1, row.get("threads", 1))
         return row if row is not None and is_timed and not is_outdated(row) else None
 
-    def _finish(self, task: Task) -> Row:
-        threads = self.limits.threads
-        row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting, "threads": threads}
-        hulls = self.store.hulls_of(task)
-        before = self.store.get(task)
+    def hulls_of(self, task: Task) -> Path:
+        """Path of the hulls of a task, whether they exist yet or not."""
+        return task.file_in(self.folder, ".npz")
+
+    def _finish(self, pool: Pool, task: Task) -> Row:
+        row: Row = {"mesh": task.mesh, "method": task.method, "setting": task.setting, "threads": self.limits.threads}
+        begun, hulls, before = time.perf_counter(), self.hulls_of(task), load_row(self.folder, task)
+        hulls.parent.mkdir(parents=True, exist_ok=True)
         if before is not None and is_outdated(before):
             hulls.unlink(missing_ok=True)
-        with tempfile.TemporaryDirectory() as folder:
-            answer = Path(folder) / "answer.json"
-            failure = self._ask(task, hulls, answer)
-            if failure is not None and hulls.exists():  # the tool has finished; measuring gets its own limits
-                failure = self._ask(task, hulls, answer)
-                failure = failure and f"measuring: {failure}"
-            row |= {"error": failure} if failure else json.loads(answer.read_text(encoding="utf-8"))
-            if threads > 1 and "error" not in row:
-                failure = self._ask(task, hulls, answer, threads)
-                row |= {"error": failure} if failure else json.loads(answer.read_text(encoding="utf-8"))
-        if not self._stopping:
-            self.store.add(row)
-        return row
+        found = self._ask(pool, task)
+        if "error" in found and hulls.exists():  # the tool has finished; measuring gets its own limits
+            found = self._ask(pool, task)
+        if self.limits.threads > 1 and "error" not in found:
+            found |= self._ask(pool, task, self.limits.threads)
+        return {**row, **found, "seconds": time.perf_counter() - begun}
 
-    def _ask(self, task: Task, hulls: Path, answer: Path, threads: int = 1) -> str | None:
-        """Give a task to a process, which reuses hulls that exist; returns None, or a description of its failure."""
-        own: dict[int, _Child] = self._own.__dict__.setdefault("children", {})
-        child = own.get(threads)
-        if child is None or child.process.poll() is not None or child.done >= self.limits.tasks:
-            if child is not None:
-                child.kill()
-                self._children.discard(child)
-            child = own[threads] = _Child(threads)
-            self._children.add(child)
-        job = {
-            "mesh": str(self.meshes / task.mesh),
-            "method": task.method,
-            "setting": task.setting,
-            "memory": self.limits.memory,
-            "hulls": str(hulls),
-            "answer": str(answer),
-            "threads": threads,
-        }
-        return child.do(job, self.limits.seconds)
-
-
-class _Child:
-    """A process that does tasks one after the other, and exits when this one does."""
-
-    def __init__(self, threads: int) -> None:
-        root = str(Path(__file__).resolve().parents[1])
-        path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-        environment = {"OMP_NUM_THREADS": str(threads), "PYTHONPATH": path}
-        command = [sys.executable, "-m", "benchmarks.child"]
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115
-        self.process = start(command, subprocess.PIPE, subprocess.PIPE, self._said, environment)
-        self.done = 0
-
-    def do(self, job: dict[str, Any], seconds: float) -> str | None:
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        late = threading.Event()
-
-        def give_up() -> None:
-            late.set()
-            kill_group(self.process)
-
-        watch = threading.Timer(seconds, give_up)
-        watch.start()
+    def _ask(self, pool: Pool, task: Task, threads: int = 1) -> Row:
+        values = {**vars(task), "mesh": str(self.meshes / task.mesh), "hulls": str(self.hulls_of(task))}
+        fresh = self.limits.fresh or threads > 1
+        server, limits = "benchmarks.child:make_server", self.limits.process
+        request = Request(server, {**values, "threads": threads}, limits=limits, threads=threads, fresh=fresh)
         try:
-            self.process.stdin.write(json.dumps(job).encode() + b"\n")
-            self.process.stdin.flush()
-            is_done = bool(self.process.stdout.readline())
-        except BrokenPipeError:
-            is_done = False
-        finally:
-            watch.cancel()
-        self.done += 1
-        if is_done:
-            return None
-        code = self.process.wait()
-        if late.is_set():
-            return f"more than {seconds:g} s"
-        self._said.seek(0)
-        last = (self._said.read().decode(errors="replace").strip().splitlines() or [""])[-1][-LAST_WORDS:]
-        return f"{why_it_ended(code)} {last}".strip()
-
-    def kill(self) -> None:
-        kill_group(self.process)
-        self.process.wait()
+            return pool.submit(request).result().values
+        except WorkerDiedError as died:
+            return {"error": " ".join([str(died), *died.last_words.splitlines()[-1:]])}
 
 
 def is_outdated(row: Row) -> bool:

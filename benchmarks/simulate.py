@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import tempfile
 import time
 from dataclasses import dataclass
@@ -11,14 +10,13 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from lxml import etree
 
 from rlacd import _native
 from rlacd.errors import MissingExtraError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write import save
 from rlacd.result import Result
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray, IntArray
 
 SIZE = 0.2
 """Longest side of every object in metres; simulators are tuned for things that a hand can hold."""
@@ -27,9 +25,6 @@ COPIES, SECONDS, STEP = 20, 2.5, 0.002
 
 BIN = 1.6
 """Half the width of the bin that the pile falls into, in longest sides."""
-
-AT_REST = 0.05
-"""Metres per second; a pile is at rest when nothing moves faster."""
 
 GRID = 7
 """Balls are dropped on a grid of this many per side, along each of the six directions of the axes."""
@@ -42,31 +37,6 @@ NEAR = 0.025
 
 FALL_SPEED, DROP_STEP = 0.5, 0.001
 """The speed in metres per second at which balls fall, so slowly that they tunnel through nothing."""
-
-
-@dataclass(frozen=True)
-class Pile:
-    """How a pile of copies settled.
-
-    Attributes
-    ----------
-    steps_per_second : float
-        Steps per CPU second.
-    contacts : float
-        Mean number of contacts per step, over the last second.
-    penetration : float
-        Mean depth of the deepest contact, over the last second, in longest sides.
-    drift : float
-        How much energy changes per second over the last half second, in joules per kilogram.
-    rest : float
-        Seconds until nothing moves faster than `AT_REST`; infinite if that does not happen.
-    """
-
-    steps_per_second: float
-    contacts: float
-    penetration: float
-    drift: float
-    rest: float
 
 
 @dataclass(frozen=True)
@@ -107,83 +77,39 @@ def scaled_source(path: Path) -> tuple[tuple[FloatArray, IntArray], float, Float
     return ((source.vertices - centre) * factor, source.faces.astype(np.int32)), factor, centre
 
 
-def pile_in_mujoco(result: Result, seed: int = 0) -> Pile:
-    """Drop copies of a body whose longest side is `SIZE`, turned by the seed, into a bin, in MuJoCo."""
+def pile_in_mujoco(result: Result, seed: int = 0) -> tuple[float, float]:
+    """Drop copies of a body whose longest side is `SIZE`, turned by the seed, into a bin, in MuJoCo.
+
+    Returns
+    -------
+    steps_per_second : float
+        Steps per CPU second.
+    contacts : float
+        Mean number of contacts per step, over the last second.
+    """
     mujoco = get_mujoco()
+    random = np.random.default_rng(seed)
+    places = [(x, y, 1.0 + 1.2 * z) for z in range(COPIES) for x in (-0.7, 0.7) for y in (-0.7, 0.7)][:COPIES]
+    spec = mujoco.MjSpec()
+    spec.option.timestep = STEP
     with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
-        path = save(result, Path(folder) / "body.xml")
-        root = etree.parse(str(path)).getroot()
-        world = root.find("worldbody")
-        (body,) = world.findall("body")
-        world.remove(body)
-        for index, (place, turn) in enumerate(_places(seed)):
-            other = copy.deepcopy(body)
-            for named in other.iter():
-                if "name" in named.attrib:
-                    named.set("name", f"{named.get('name')}_copy{index}")
-            other.set("pos", " ".join(map(str, place)))
-            other.set("quat", " ".join(map(str, turn)))
-            world.append(other)
-        planes = [("0 0 0", "0 0 1")]
-        planes += [(f"{-s * BIN * SIZE} 0 0", f"{s} 0 0") for s in (-1, 1)]
-        planes += [(f"0 {-s * BIN * SIZE} 0", f"0 {s} 0") for s in (-1, 1)]
-        for at, normal in planes:
-            etree.SubElement(world, "geom", type="plane", size="9 9 1", pos=at, zaxis=normal)
-        path.write_bytes(etree.tostring(root))
-        model = mujoco.MjModel.from_xml_path(str(path))
-    model.opt.timestep = STEP
-    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+        body = mujoco.MjSpec.from_file(str(save(result, Path(folder) / "body.xml")))
+        for index, (place, turn) in enumerate(zip(places, random.normal(size=(COPIES, 4)), strict=True)):
+            frame = spec.worldbody.add_frame(pos=[SIZE * x for x in place], quat=turn / np.linalg.norm(turn))
+            spec.attach(body.copy(), prefix=f"{index}_", frame=frame)
+        for normal in [(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)]:
+            at = [-BIN * SIZE * x * (normal[2] == 0) for x in normal]
+            plane = mujoco.mjtGeom.mjGEOM_PLANE
+            spec.worldbody.add_geom(type=plane, size=[9, 9, 1], pos=at, zaxis=normal)
+        model = spec.compile()
     data = mujoco.MjData(model)
     steps = round(SECONDS / STEP)
-    contacts, depth, speed, energy = np.zeros((4, steps))
+    contacts = np.zeros(steps)
     began = time.process_time()
     for step in range(steps):
         mujoco.mj_step(model, data)
         contacts[step] = data.ncon
-        depth[step] = max(0.0, -data.contact.dist.min()) if data.ncon else 0.0
-        speed[step] = np.abs(data.qvel.reshape(-1, 6)[:, :3]).max()
-        energy[step] = data.energy.sum()
-    return _settled(steps / (time.process_time() - began), STEP, contacts, depth, speed, energy / model.body_mass.sum())
-
-
-def pile_in_bullet(result: Result) -> Pile:
-    """Drop copies of a body whose longest side is `SIZE` into a bin, in PyBullet."""
-    bullet = get_bullet()
-    client = bullet.connect(bullet.DIRECT)
-    at = {"physicsClientId": client}
-    try:
-        bullet.setGravity(0, 0, -9.81, **at)
-        normals = [(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)]
-        for normal in normals:
-            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=normal, **at)
-            away = np.array(normal) * (-BIN * SIZE if normal[2] == 0 else 0.0)
-            bullet.createMultiBody(0, plane, basePosition=away.tolist(), **at)
-        with tempfile.TemporaryDirectory(prefix="rlacd-") as folder:
-            path = str(save(result, Path(folder) / "body.urdf"))
-            flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
-            bodies = [
-                bullet.loadURDF(path, place.tolist(), [*turn[1:], turn[0]], flags=flags, **at)
-                for place, turn in _places()
-            ]
-        mass = bullet.getDynamicsInfo(bodies[0], -1, **at)[0]
-        steps = round(SECONDS * 240)
-        contacts, depth, speed, energy = np.zeros((4, steps))
-        spent = 0.0
-        for step in range(steps):
-            began = time.process_time()
-            bullet.stepSimulation(**at)
-            spent += time.process_time() - began
-            distances = [contact[8] for contact in bullet.getContactPoints(**at)]
-            contacts[step] = len(distances)
-            depth[step] = max(0.0, -min(distances, default=0.0))
-            moving = np.array([bullet.getBaseVelocity(body, **at)[0] for body in bodies])
-            heights = [bullet.getBasePositionAndOrientation(body, **at)[0][2] for body in bodies]
-            speed[step] = np.abs(moving).max()
-            energy[step] = (0.5 * (moving**2).sum() + 9.81 * sum(heights)) / len(bodies)
-        assert mass > 0
-        return _settled(steps / spent, 1 / 240, contacts, depth, speed, energy)
-    finally:
-        bullet.disconnect(client)
+    return steps / (time.process_time() - began), float(contacts[-round(1 / STEP) :].mean())
 
 
 def drops_in_mujoco(result: Result) -> Drops:
@@ -267,30 +193,6 @@ def exact_depths(
     return depths
 
 
-def _settled(
-    rate: float, step: float, contacts: FloatArray, depth: FloatArray, speed: FloatArray, energy: FloatArray
-) -> Pile:
-    last, half = round(1 / step), round(0.5 / step)
-    fast: BoolArray = speed > AT_REST
-    end = int(np.flatnonzero(fast)[-1]) + 1 if fast.any() else 0
-    return Pile(
-        rate,
-        float(contacts[-last:].mean()),
-        float(depth[-last:].mean()) / SIZE,
-        float(abs(energy[-1] - energy[-min(half, len(energy))]) / 0.5),
-        end * step if end < len(speed) else float("inf"),
-    )
-
-
-def _places(seed: int = 0) -> list[tuple[FloatArray, FloatArray]]:
-    """Where the copies begin: on a grid above the bin, each turned at random."""
-    random = np.random.default_rng(seed)
-    grid = [(x, y, z) for z in range(COPIES) for x in (-0.7, 0.7) for y in (-0.7, 0.7)][:COPIES]
-    turns = random.normal(size=(COPIES, 4))
-    turns /= np.linalg.norm(turns, axis=1)[:, None]
-    return [(SIZE * np.array([x, y, 1.0 + 1.2 * z]), turn) for (x, y, z), turn in zip(grid, turns, strict=True)]
-
-
 def get_mujoco() -> Any:
     """Import MuJoCo, or say how to install it."""
     try:
@@ -298,12 +200,3 @@ def get_mujoco() -> Any:
     except ImportError as error:
         raise MissingExtraError("MuJoCo is missing: run  pip install 'rlacd[sim]'  and try again.") from error
     return mujoco
-
-
-def get_bullet() -> Any:
-    """Import PyBullet, or say how to install it."""
-    try:
-        import pybullet
-    except ImportError as error:
-        raise MissingExtraError("PyBullet is missing: run  pip install 'rlacd[sim]'  and try again.") from error
-    return pybullet

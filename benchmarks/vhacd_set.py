@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import statistics
-from typing import Annotated
 
-import typer
+import click
 
 from benchmarks.cli import check_methods, experiment, words
 from benchmarks.compare import about, comparison, mesh_by_mesh
@@ -13,18 +12,11 @@ from benchmarks.methods import make_method
 from benchmarks.runner import Bench
 from benchmarks.tables import Page, Table, failures, managed, mean
 
-app = typer.Typer(add_completion=False)
-
 PUBLISHED = {"VisACD": (28.4, 0.043), "CoACD": (31.6, 0.048), "Thul": (34.4, 0.069), "V-HACD": (57.6, 0.118)}
 """Mean parts and mean concavity over 61 meshes, at CoACD's threshold 0.05, as VisACD's paper gives them."""
 
-TASKS = 20
-"""Tasks a process: starting one takes longer than most meshes."""
-
-TIGHTER = 0.043
-"""VisACD's mean concavity; as a threshold it bounds every part of every mesh."""
-
 METHODS = "fast,default,fast@0.043,default@0.043,disjoint,coacd,vhacd"
+"""0.043 is VisACD's mean concavity; as a threshold it bounds every part of every mesh."""
 
 
 def _split(word: str) -> tuple[str, float]:
@@ -32,15 +24,9 @@ def _split(word: str) -> tuple[str, float]:
     return name, float(setting) if setting else make_method(name).default
 
 
-def _check(methods: str) -> None:
-    check_methods(",".join(word.partition("@")[0] for word in words(methods)))
-
-
-@experiment(app, "vhacd-set", _check, TASKS)
-def vhacd_set(
-    bench: Bench,
-    methods: Annotated[str, typer.Option(help="As for compare; NAME@SETTING sets another threshold.")] = METHODS,
-) -> Page:
+@experiment(lambda methods: check_methods(",".join(word.partition("@")[0] for word in words(methods))), fresh=False)
+@click.option("--methods", default=METHODS, help="As for compare; NAME@SETTING sets another threshold.")
+def app(bench: Bench, methods: str) -> Page:
     """Parts and concavity on V-HACD's set, beside published figures.
 
     The concavity of a mesh is that of its worst part (CoACD's measure; longest side 2), here decided by bounds and not
@@ -52,28 +38,23 @@ def vhacd_set(
     """
     pairs = [_split(word) for word in words(methods)]
     groups = bench.run_together({f"{name} @ {setting:g}": (name, setting) for name, setting in pairs})
-    good = managed(groups)
+    good = {label: rows for label, rows in managed(groups).items() if rows}
     lines: list[list[object]] = []
     for label, rows in good.items():
-        if rows:
-            overlap = [row["overlap"] for row in rows]
-            disjoint = sum(share <= 1e-6 for share in overlap)
-            lines.append(
-                [
-                    label,
-                    f"{mean(rows, 'parts'):.1f}",
-                    f"{mean(rows, 'concavity'):.3f}",
-                    f"{max(row['concavity'] for row in rows):.3f}",
-                    f"{statistics.median(overlap):.1%}, {disjoint}",
-                    f"{mean(rows, 'cpu'):.2f}",
-                    f"{mean(rows, 'wall_threads'):.2f}" if "wall_threads" in rows[0] else "–",
-                ]
-            )
-    lines += [[f"{tool}, published (61 meshes)", *numbers, "", "", "", ""] for tool, numbers in PUBLISHED.items()]
+        overlap = [row["overlap"] for row in rows]
+        lines.append(
+            [
+                label,
+                f"{mean(rows, 'parts'):.1f}",
+                f"{mean(rows, 'concavity'):.3f}",
+                f"{max(row['concavity'] for row in rows):.3f}",
+                f"{statistics.median(overlap):.1%}, {sum(share <= 1e-6 for share in overlap)}",
+                f"{mean(rows, 'cpu'):.2f}",
+            ]
+        )
+    lines += [[f"{tool}, published (61 meshes)", *numbers, "", "", ""] for tool, numbers in PUBLISHED.items()]
     count = len(next(iter(good.values()), []))
-    wall = f"wall s, {bench.limits.threads} threads"
-    header = [f"{count} meshes", "parts", "concavity", "worst", "overlap: median, meshes without", "CPU s", wall]
-    page = Page("V-HACD's set", [about(bench), Table(header, lines)])
-    page.add("## Everything else", comparison(groups), "## Mesh by mesh", mesh_by_mesh(groups))
-    page.add("## Failures", failures(row for rows in groups.values() for row in rows))
+    header = [f"{count} meshes", "parts", "concavity", "worst", "overlap: median, meshes without", "CPU s"]
+    page = Page("V-HACD's set", [about(bench, groups), Table(header, lines), comparison(groups), mesh_by_mesh(groups)])
+    page.blocks.append(failures(row for rows in groups.values() for row in rows))
     return page

@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import inspect
-import json
-import math
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import psutil
 import pytest
 import trimesh
-from benchmarks import compare, corpus, paper, tables, tuning, vhacd_set
+from benchmarks import compare, corpus, hard, vhacd_set
 from benchmarks.__main__ import COMMANDS
-from benchmarks.deployed import Deployment, decompose_as_deployed
+from benchmarks.learned.compare import policy_of
 from benchmarks.methods import make_method, rlacd_options
 from benchmarks.runner import Bench, Limits, find_meshes
-from benchmarks.store import Store, Task
-from benchmarks.tables import PLACE, Ratio, Table, common_meshes, fill, ratio_of
-from benchmarks.training import ARMS, _options, train_arms
-from benchmarks.tuning import CLOSE, tune
-from typer.testing import CliRunner
+from benchmarks.store import Task, save_row
+from benchmarks.tables import Ratio, Table, failures, managed, ratio_of
+from benchmarks.training import ARMS, _options, discounts, train_arms
+from click.testing import CliRunner
 
 import rlacd
-from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.options import PRESETS
+from rlacd.policies import make_policy
+from rlacd.pool import ProcessLimits
+from rlacd.solid.component import Component
 from tests.shapes import box, from_manifold, trimesh_of
 
 CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
@@ -45,8 +45,8 @@ def meshes(tmp_path: Path) -> Path:
     return folder
 
 
-def bench_of(meshes: Path, folder: Path, limits: Limits | None = None) -> Bench:
-    return Bench(meshes, find_meshes(meshes), Store(folder), limits, say=lambda _: None)
+def bench_of(meshes: Path, folder: Path, **limits: Any) -> Bench:
+    return Bench(meshes, find_meshes(meshes), folder, Limits(**limits), say=lambda _: None)
 
 
 def run(app: Any, *words: object, code: int = 0) -> str:
@@ -63,14 +63,13 @@ class TestMethods:
             ("fast:policy=navacd", "threshold", 0.05),
             ("default:space", "tolerance", 0.1),
             ("vhacd", "hulls", 64),
-            ("planes:ap=20:ce=0:no-principal", "threshold", 0.05),
         ],
     )
     def test_names(self, name: str, setting: str, default: float) -> None:
         method = make_method(name)
         assert (method.name, method.setting, method.default) == (name, setting, default)
 
-    @pytest.mark.parametrize("name", ["", "gredy", "fast:polcy=x", "fast:best", "coacd:best", "planes:ap=x", "space"])
+    @pytest.mark.parametrize("name", ["", "gredy", "fast:polcy=x", "fast:best", "coacd:best", "planes", "space"])
     def test_unknown_names_are_one_sentence(self, name: str) -> None:
         with pytest.raises(OptionError, match=r"has to be|is not known"):
             make_method(name)
@@ -98,7 +97,7 @@ class TestMethods:
             make_method("coacd")
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("name", ["coacd", "vhacd", "fast", "fast:policy=random-10+edges", "fast:space", "planes"])
+    @pytest.mark.parametrize("name", ["coacd", "vhacd", "fast", "fast:policy=random-10+edges", "fast:space"])
     def test_all_find_the_parts_of_a_cross(self, name: str) -> None:
         pytest.importorskip({"coacd": "coacd", "vhacd": "vhacdx"}.get(name, "rlacd"))
         method, mesh = make_method(name), from_manifold(CROSS)
@@ -139,67 +138,60 @@ def test_other_tools_run_at_their_own_defaults(monkeypatch: pytest.MonkeyPatch) 
     assert passed == [{"threshold": threshold}, {"maxConvexHulls": hulls, "asyncACD": False}]
 
 
-class TestDeployment:
-    def test_no_planes_at_all_is_an_error(self) -> None:
-        with pytest.raises(OptionError, match="no planes are left"):
-            Deployment.parse(["no-principal", "no-spatial", "ce=0"])
-
-    def test_more_planes_ranked_is_greedy(self) -> None:
-        """With all 150 planes on the shortlist and no edges, what is left is the paper's greedy baseline."""
-        mesh = from_manifold(CROSS.rotate((10, 20, 30)))
-        deployed = decompose_as_deployed(Deployment("excess", 150, 0), mesh.vertices, mesh.faces, 0.05, 1)
-        greedy = rlacd.decompose((mesh.vertices, mesh.faces), quality="fast", policy="greedy-hull-sum", detail="full")
-        assert len(deployed) == len(greedy)
-        assert sum(len(v) for v, _ in deployed) == sum(len(hull.vertices) for hull in greedy)
-
-
-class TestStore:
-    ROW: ClassVar = {"mesh": "a.ply", "method": "fast", "setting": 0.05, "parts": 3}
-
-    def test_a_line_cut_short_by_a_kill_is_done_again(self, tmp_path: Path) -> None:
-        (tmp_path / "results.jsonl").write_text(json.dumps(self.ROW) + '\n{"mesh": "b.pl')
-        store = Store(tmp_path)
-        assert store.get(Task("a.ply", "fast", 0.05)) == self.ROW
-        assert store.get(Task("a.ply", "fast", 0.1)) is None
-        store.add({**self.ROW, "mesh": "b.ply"})
-        with pytest.raises(OutputError, match="another run"):
-            Store(tmp_path)
-        store.close()
-        assert [row["mesh"] for row in Store(tmp_path).rows()] == ["a.ply", "b.ply"]
+def test_a_deployment_leaves_out_the_planes_that_it_names() -> None:
+    network = Path(rlacd.__file__).parent / "policies" / "rl_acd.npz"
+    solid = Component(CROSS.rotate((10, 20, 30)))
+    best = make_policy("greedy-hull-sum").choose(solid)
+    everything = policy_of(f"planes:ap=150:ce=0:{network}", 0.05).choose(solid)
+    assert best is not None
+    assert everything is not None
+    assert np.allclose(everything.normal, best.normal)  # with all 150 ranked, the ranking decides nothing
+    spatial, principal = (
+        policy_of(f"planes:ce=0:no-{left_out}:{network}", 0.05).choose(solid) for left_out in ("principal", "spatial")
+    )
+    assert spatial is not None
+    assert principal is not None
+    assert np.isclose(np.abs(spatial.normal), 1).any()
+    assert not np.isclose(np.abs(principal.normal), 1).any()
+    with pytest.raises(OptionError, match="is not known"):
+        policy_of(f"planes:no-edges:{network}", 0.05)
 
 
 @pytest.mark.slow
 class TestRunner:
     def test_a_row_a_mesh_and_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         """Nor if the rows are lost: hulls that are there are only measured, and keep their seconds."""
-        bench = bench_of(meshes, tmp_path / "run", Limits(tasks=2))
+        bench = bench_of(meshes, tmp_path / "run", fresh=False)
         rows = bench.run("fast")
         assert [(row["mesh"], row["parts"]) for row in rows] == [("a/cross.stl", 2), ("box.ply", 1)]
         assert all(row["cpu"] > 0 and row["peak_mb"] > 10 and row["invalid"] == 0 for row in rows)
-        bench.store.close()
-        lines = (tmp_path / "run" / "results.jsonl").read_text()
-        again = bench_of(meshes, tmp_path / "run")
-        assert again.run("fast") == rows
-        again.store.close()
-        assert (tmp_path / "run" / "results.jsonl").read_text() == lines
-        (tmp_path / "run" / "results.jsonl").write_text("")
-        assert bench_of(meshes, tmp_path / "run").run("fast") == rows
+        files = sorted((tmp_path / "run" / "tasks").iterdir())
+        written = [file.stat().st_mtime_ns for file in files]
+        assert bench.run("fast") == rows
+        for file in files[::2]:
+            assert file.suffix == ".json"
+            file.unlink()
+        again = bench.run("fast")
+        assert [{**row, "seconds": 0} for row in again] == [{**row, "seconds": 0} for row in rows]
+        assert [file.stat().st_mtime_ns for file in files[1::2]] == written[1::2]
 
-    @pytest.mark.parametrize(("limits", "says"), [({"seconds": 0.05}, "more than 0.05 s"), ({"memory": 2**28}, "")])
+    @pytest.mark.parametrize(
+        ("limits", "says"), [({"seconds": 0.05}, "more than 0.05 s"), ({"memory": 2**25}, "more than 0.03125 GB")]
+    )
     def test_a_hang_and_a_lack_of_memory_are_recorded(
         self, meshes: Path, tmp_path: Path, limits: Any, says: str
     ) -> None:
-        rows = bench_of(meshes, tmp_path / "run", Limits(**limits)).run("fast")
+        rows = bench_of(meshes, tmp_path / "run", process=ProcessLimits(**limits)).run("fast")
         assert all(says in row["error"] for row in rows)
         assert len(rows) == 2, "the run goes on"
 
     def test_a_crash_is_recorded(self, meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         crasher = tmp_path / "crasher"
-        crasher.write_text("#!/bin/sh\nread line\necho last words >&2\nkill -SEGV $$\n")
+        crasher.write_text("#!/bin/sh\necho last words >&2\nkill -SEGV $$\n")
         crasher.chmod(0o755)
         monkeypatch.setattr(sys, "executable", str(crasher))
         rows = bench_of(meshes, tmp_path / "run").run("fast")
-        assert [row["error"] for row in rows] == ["died of SIGSEGV last words"] * 2
+        assert [row["error"] for row in rows] == ["its process died of SIGSEGV last words"] * 2
 
     @pytest.mark.nightly
     def test_stopping_a_run_ends_its_processes_and_records_nothing(self, tmp_path: Path) -> None:
@@ -211,10 +203,9 @@ class TestRunner:
             trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
         program = (
             "import signal, sys; from pathlib import Path; from benchmarks.runner import Bench, find_meshes;"
-            "from benchmarks.store import Store;"
             "signal.signal(signal.SIGINT, signal.default_int_handler);"  # ignored by what runs in a shell's background
             "m, o = map(Path, sys.argv[1:]);"
-            "Bench(m, find_meshes(m), Store(o)).run('fast', 0.002)"
+            "Bench(m, find_meshes(m), o).run('fast', 0.002)"
         )
         for number in (signal.SIGINT, signal.SIGKILL):
             out = tmp_path / f"run-{number}"
@@ -230,23 +221,23 @@ class TestRunner:
                 finally:
                     process.kill()
             assert not psutil.wait_procs(children, timeout=30)[1]
-            assert (out / "results.jsonl").read_text() == ""
+            assert not list(out.glob("tasks/*.json"))
 
     def test_a_broken_mesh_is_recorded_and_what_another_version_made_is_made_again(
         self, meshes: Path, tmp_path: Path
     ) -> None:
         (meshes / "broken.obj").write_text("this is no mesh")
-        bench = bench_of(meshes, tmp_path / "run", Limits(tasks=9))
+        bench = bench_of(meshes, tmp_path / "run", fresh=False)
         first, *_, broken = rows = bench.run("fast")
         assert "Error" in broken["error"]
-        assert "broken.obj" in tables.failures(rows)
-        bench.store.add({**first, "version": "0.0.0", "parts": 99})
-        assert tuning.known_curve(bench, "fast") == []
-        written = bench.store.hulls_of(Task(first["mesh"], "fast", 0.05)).stat().st_mtime_ns
+        assert "broken.obj" in failures(rows)
+        task = Task(first["mesh"], "fast", 0.05)
+        save_row(bench.folder, task, {**first, "version": "0.0.0", "parts": 99})
+        written = bench.hulls_of(task).stat().st_mtime_ns
         again = bench.run("fast")
         assert [row.get("parts") for row in again] == [row.get("parts") for row in rows]
         assert again[1] == rows[1], "only that one"
-        assert bench.store.hulls_of(Task(first["mesh"], "fast", 0.05)).stat().st_mtime_ns > written
+        assert bench.hulls_of(task).stat().st_mtime_ns > written
 
 
 def test_data_sets_are_read_as_distributed(tmp_path: Path) -> None:
@@ -260,43 +251,6 @@ def test_data_sets_are_read_as_distributed(tmp_path: Path) -> None:
     assert find_meshes(tmp_path) == sorted(meshes)
     (tmp_path / "list.txt").write_text("# one\nchairs/shapes/1.off\n\n")
     assert find_meshes(tmp_path, tmp_path / "list.txt") == ["chairs/shapes/1.off"]
-
-
-class TestTuning:
-    """On made-up methods, whose D_h is a known function of their number."""
-
-    def tuned(
-        self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, law: Any, target: float, method: str = "fast"
-    ) -> tuple[tuning.Point, int]:
-        bench = Bench(tmp_path, ["one", "two"], Store(tmp_path / "run"), say=lambda _: None)
-        calls = []
-
-        def run(self: Bench, name: str, setting: float) -> list[dict[str, Any]]:
-            calls.append(setting)
-            for mesh, factor in (("one", 0.5), ("two", 1.5)):
-                self.store.add({"mesh": mesh, "method": name, "setting": setting, "hausdorff": factor * law(setting)})
-            return [self.store.get(Task(mesh, name, setting)) for mesh in self.names]  # type: ignore[misc]
-
-        monkeypatch.setattr(Bench, "run", run)
-        point = tune(bench, method, target)
-        assert tune(bench, method, target).setting == point.setting
-        return point, len(calls)
-
-    @pytest.mark.parametrize("target", [0.03, 0.1, 0.15])
-    @pytest.mark.parametrize(
-        "law", [lambda t: t, lambda t: 0.02 + t, lambda t: t**0.5 / 4, lambda t: 0.9 * t + 0.01 * math.sin(60 * t)]
-    )
-    def test_the_mean_is_the_target(
-        self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, law: Any, target: float
-    ) -> None:
-        point, calls = self.tuned(monkeypatch, tmp_path, law, target)
-        assert abs(point.hausdorff - target) <= CLOSE * target
-        assert calls <= tuning.TRIES
-
-    def test_a_step_is_bisected_to_its_end(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        point, calls = self.tuned(monkeypatch, tmp_path, lambda t: 0.01 if t < 0.137 else 0.2, 0.15)
-        assert point.hausdorff == pytest.approx(0.2)  # the closer of the two there are
-        assert calls <= 2 * tuning.TRIES
 
 
 class TestTables:
@@ -313,12 +267,36 @@ class TestTables:
 
     def test_a_mesh_that_one_fails_on_counts_for_none(self) -> None:
         a, b = self.rows(2, 4, 100), self.rows(3, 5, failed="m2")
-        assert common_meshes([a, b]) == {"m0", "m1"}
+        assert [len(rows) for rows in managed({"a": a, "b": b}).values()] == [2, 2]
         text = str(compare.comparison({"a": a, "b": b}))
         assert "| 2 meshes | a | b |" in text
         assert "| hulls | 6 | 8 |" in text
         assert "| failed | 0 of 3 | 1 of 3 |" in text
-        assert "no mesh that all managed" in str(compare.comparison({"a": self.rows(2), "b": self.rows(failed="m0")}))
+        nothing = {"a": self.rows(2), "b": self.rows(failed="m0")}
+        assert all(
+            "no mesh that all managed" in str(table(nothing)) for table in (compare.comparison, compare.published)
+        )
+
+    def test_the_first_table_has_the_form_of_the_page(self) -> None:
+        """Rows whose numbers are those of the page make the page's table."""
+        page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+        shown = [[c.strip() for c in line.strip("|").split("|")] for line in page.splitlines() if line.startswith("|")]
+        groups = {}
+        for number, method in enumerate(("coacd", "vhacd", "fast", "default"), 1):
+            hulls, faces, away, left, invalid, faster, sure = (row[number].replace("*", "") for row in shown[2:9])
+            average, worst = map(float, away.split(", "))
+            row = {
+                **{"method": method, "version": "1.0.14", "setting": 0.05, "parts": int(hulls.replace(",", "")) / 25},
+                **{"faces": int(faces.replace(",", "")), "uncovered": float(left.split()[0]) / 100, "invalid": 0},
+                **{"cpu": 1 / float(faster), "exceeding": {"vhacd": None, "coacd": 1}.get(method, 0)},
+                "concavity": float(sure.split()[-1]) if "up to" in sure else 0.05,
+                "hausdorff": average - (worst - average) / 24,
+            }
+            groups[method] = [{**row, "mesh": i} for i in range(25)]
+            groups[method][0] |= {"hausdorff": worst, "invalid": int(invalid)}
+        made = [line.strip("|").split("|") for line in str(compare.published(groups)).splitlines()]
+        assert [[cell.strip() for cell in line] for line in made][2:] == shown[2:9]
+        assert [cell.strip() for cell in made[0]] == shown[0]
 
     def test_an_interval_covers_the_truth_as_often_as_it_says(self) -> None:
         """Of pairs with a true geometric mean of 0.9, in 95 of 100 draws or so."""
@@ -343,93 +321,66 @@ class TestCommands:
     @pytest.mark.slow
     def test_compare_corpus_and_the_vhacd_set(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
-        run(compare.app, meshes, "--out", out, "--methods", "fast,fast:policy=navacd", "--first", 2)
-        text = (out / "compare.md").read_text()
-        assert "| 2 meshes | fast | fast:policy=navacd |" in text
-        before = (out / "results.jsonl").read_text()
+        text = run(compare.app, meshes, "--out", out, "--methods", "fast,fast:policy=navacd", "--first", 2)
+        assert (out / "compare.md").read_text() in text
+        assert "| 2 meshes, threshold 0.05 | rlacd `fast` | rlacd `fast:policy=navacd` |" in text
+        before = sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir())
         assert "| decomposed | 2 of 2 |" in run(corpus.app, meshes, "--out", out)
-        assert (out / "results.jsonl").read_text() == before
+        assert sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir()) == before
         page = run(vhacd_set.app, meshes, "--out", out, "--methods", "fast,fast@0.04", "--threads", 2)
         assert "| fast @ 0.05 | 1.5 |" in page
         assert "| fast @ 0.04 |" in page
         assert "VisACD, published" in page
-        assert "| wall s, 2 threads: median, sum |" in page
-        timed = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
-        assert all(row["wall_threads"] > 0 for row in timed if row["threads"] == 2)
+        assert "| wall s, 2 threads: median, mean, most, sum |" in page
 
-    @pytest.mark.nightly
-    def test_the_papers_tables(self, meshes: Path, tmp_path: Path) -> None:
-        pytest.importorskip("vhacdx")
-        out = tmp_path / "run"
-        run(paper.app, "table-1", meshes, "-o", out, "--first", 1, "--methods", "fast:policy=navacd", "--at", 0.3)
-        text = (out / "table-1.md").read_text()
-        assert "Mean D_h 0.3" in text
-        assert (out / "curves.svg").exists()
-        assert "44.2" in text, "the paper's numbers stand beside ours"
-        run(paper.app, "vhacd", meshes, "-o", out)
-        rows = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
-        ours = {row["mesh"]: row["parts"] for row in rows if row["method"] == "fast"}
-        theirs = {row["mesh"]: row for row in rows if row["method"] == "vhacd"}
-        assert len(theirs) == 2
-        assert all(row["setting"] == ours[mesh] and row["parts"] <= ours[mesh] for mesh, row in theirs.items())
-        run(paper.app, "table-2", meshes, "-o", out, "--first", 1)
-        assert "without PCA planes" in (out / "table-2.md").read_text()
-        run(paper.app, "table-3", meshes, "-o", out, "--first", 1, "--planes", "1,150", "--edges", "0")
-        text = (out / "table-3.md").read_text()
-        assert all(label in text for label in ("#AP 1, #CE 4", "#AP 150, #CE 4", "#AP 10, #CE 0"))
+    @pytest.mark.slow
+    def test_prices_are_held_against_times(self, meshes: Path) -> None:
+        """In a process of its own, since kernels are replaced by ones that are timed."""
+        command = [sys.executable, "-m", "benchmarks", "prices", str(meshes)]
+        told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
+        assert all(f"| {kernel} |" in told for kernel in ("choosing", "cutting", "judging", "filling"))
+
+    @pytest.mark.slow
+    def test_hard_shapes_are_written_and_compared(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(hard, "SHAPES", {"gyroid": lambda: hard.gyroid(0.2, 3.0)})
+        page = run(hard.app, "-o", tmp_path, "--methods", "fast")
+        assert "| gyroid.ply |" in page
+        assert len(trimesh.load_mesh(tmp_path / "shapes" / "gyroid.ply").faces) > 100
 
     @pytest.mark.parametrize(
-        ("app", "words", "says"),
+        ("words", "says"),
         [
-            (compare.app, ["nowhere"], "is not a folder"),
-            (compare.app, ["meshes", "--list", "nowhere.txt"], "does not exist"),
-            (compare.app, ["meshes", "--list", "list.txt"], "no.stl"),
-            (compare.app, ["empty"], "there are no meshes"),
-            (compare.app, ["meshes", "--methods", "gredy"], "there is no method"),
-            (compare.app, ["meshes", "--methods", ","], "name at least one"),
-            (paper.app, ["table-3", "meshes", "--planes", "a,b"], "whole numbers"),
+            (["nowhere"], "is not a folder"),
+            (["meshes", "--list", "nowhere.txt"], "does not exist"),
+            (["meshes", "--list", "list.txt"], "no.stl"),
+            (["empty"], "there are no meshes"),
+            (["meshes", "--methods", "gredy"], "there is no method"),
+            (["meshes", "--methods", ","], "name at least one"),
         ],
     )
     def test_wrong_options_are_one_sentence_before_any_work(
-        self, app: Any, words: list[str], says: str, meshes: Path, monkeypatch: pytest.MonkeyPatch
+        self, words: list[str], says: str, meshes: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.chdir(meshes.parent)
         Path("empty").mkdir()
         Path("list.txt").write_text("box.ply\nno.stl\n")
-        usual = ["--methods", "fast"] if app is compare.app and "--methods" not in words else []
-        told = run(app, *words, *usual, "-o", "run", code=2)
+        usual = ["--methods", "fast"] if "--methods" not in words else []
+        told = run(compare.app, *words, *usual, "-o", "run", code=2)
         assert says in told
         assert len(told.strip().splitlines()) == 1
         assert not Path("run").exists()
 
-    def test_charts_are_asked_for_before_any_work(self, meshes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(sys.modules, "matplotlib", None)
-        told = run(paper.app, "table-1", meshes, "-o", meshes.parent / "run", "--methods", "fast", code=2)
-        assert "pip install matplotlib" in told
-        assert not (meshes.parent / "run").exists()
+    @pytest.mark.slow
+    def test_discounts_that_add_up_to_more_than_one_diverge(self, meshes: Path, tmp_path: Path) -> None:
+        page = run(discounts, meshes, "-o", tmp_path, "--depth", 3, "--steps", 3000)
+        assert "| share of the hull (eq. 9) |" in page
+        assert "| 0.99 + 0.99 |" in page
 
 
-def test_research_shows_tables_that_commands_printed_and_no_others() -> None:
-    document = (ROOT / "research" / "comparison.md").read_text()
-    assert len(PLACE.findall(document)) > 5
-    assert "|---" not in PLACE.sub("", document)
-
-
-def test_tables_are_put_in_their_place_in_documents(tmp_path: Path) -> None:
-    (tmp_path / "quick").mkdir()
-    (tmp_path / "quick" / "a.md").write_text("# A\n\n| a |\n|---|\n| 1 |\n\ntext\n\n| b |\n|---|\n| 2 |\n")
-    document = "before\n<!-- quick/a.md, table 2 -->\nold\n<!-- end -->\nafter\n"
-    expected = "before\n<!-- quick/a.md, table 2 -->\n\n| b |\n|---|\n| 2 |\n\n<!-- end -->\nafter\n"
-    assert fill(document, tmp_path) == fill(expected, tmp_path) == expected
-    with pytest.raises(SystemExit, match="has 2 tables, not 3"):
-        fill("<!-- quick/a.md, table 3 -->\n<!-- end -->\n", tmp_path)
-
-
-@pytest.mark.parametrize("experiment", ARMS)
-def test_arms_differ_in_what_they_say_only(experiment: str) -> None:
-    for preset in ("two-cores", "paper"):
-        arms = [_options(preset, 100, 1, changes) for changes in ARMS[experiment].values()]
-        assert len(set(arms)) == len(arms)
+@pytest.mark.parametrize("preset", ["two-cores", "paper"])
+def test_arms_differ_in_what_they_say_only(preset: str) -> None:
+    arms = [_options(preset, 100, 1, changes) for changes in ARMS.values()]
+    assert len(set(arms)) == len(arms)
     assert {(a.iterations, a.seed, a.warmup, a.validate_every) for a in arms} == {(100, 1, 20, 50)}
 
 
@@ -441,13 +392,15 @@ def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     for number in range(6):
         mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
         trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
+    arms = dict(list(ARMS.items())[:2])
+    monkeypatch.setattr("benchmarks.training.ARMS", arms)
     monkeypatch.setattr("rlacd.learn.options.PRESETS", {"two-cores": {**PRESETS["two-cores"], "validation": 2}})
     said: list[str] = []
-    page = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
+    given = (folder, tmp_path / "run", "two-cores", 40, 2, said.append)
+    page = train_arms(*given)
     table = next(block for block in page.blocks if isinstance(block, Table))
-    assert [line[0] for line in table.lines] == list(ARMS["curves"])
+    assert [line[0] for line in table.lines] == list(arms)
     assert all(float(str(line[1]).partition(" ± ")[0]) > 0 for line in table.lines)
-    assert len({(tmp_path / "run" / f"curves-1-seed-{s}" / "curves.jsonl").read_text() for s in (0, 1)}) == 2
+    assert len({(tmp_path / "run" / f"rewards-1-seed-{s}" / "curves.jsonl").read_text() for s in (0, 1)}) == 2
     monkeypatch.setattr("rlacd.learn.train.train", None)  # would fail if called
-    again = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
-    assert str(again) == str(page)
+    assert str(train_arms(*given)) == str(page)

@@ -1,4 +1,4 @@
-"""`python -m benchmarks physics`: balls fall where the exact mesh lets them, and piles settle."""
+"""`python -m benchmarks physics`: balls fall where the exact mesh lets them, and piles are timed."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 from benchmarks import simulate
-from benchmarks.handle import handle_in_mujoco
 from benchmarks.physics import app
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import rlacd
 from tests.scripts import ROOT, script
@@ -43,21 +42,6 @@ def test_balls_pass_the_hole_of_a_cup_and_rest_in_it_as_hulls_but_not_as_one(dec
     assert one.rested == 0
 
 
-@pytest.mark.slow
-def test_a_mug_hangs_by_its_handle_and_is_grasped_at_its_wall_as_hulls_but_not_as_one() -> None:
-    from examples.mug import mug  # needs MuJoCo
-
-    mesh = mug()
-    mesh.apply_scale(simulate.SIZE / mesh.extents.max())
-    mesh.apply_translation(-mesh.bounds.mean(axis=0))
-    handling = handle_in_mujoco(rlacd.decompose(mesh, quality="fast", threads=1))
-    assert (handling.pegs, handling.hung) == (1, 1)
-    assert handling.held >= 0.9 * handling.grasps > 0
-    one = handle_in_mujoco(rlacd.decompose(mesh, max_hulls=1, quality="fast", threads=1))
-    assert (one.pegs, one.grasps) == (handling.pegs, handling.grasps)
-    assert (one.hung, one.held) == (0, 0)
-
-
 def test_exact_depths_are_those_of_a_ball_over_a_box() -> None:
     """On a face, a ball stops one radius above it; beside an edge, it slides down the circle around the edge."""
     box = trimesh.creation.box((0.2, 0.2, 0.2))
@@ -69,16 +53,13 @@ def test_exact_depths_are_those_of_a_ball_over_a_box() -> None:
     assert found == pytest.approx([0.1 - radius, beside, 0.5], abs=5e-5)
 
 
-def test_a_pile_settles_alike_in_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pybullet", reason="the extra sim is not installed")
+def test_a_pile_comes_to_lie_in_the_bin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four boxes: each ends on at least four corners or on another."""
     monkeypatch.setattr(simulate, "COPIES", 4)
     box = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.1)), quality="fast", threads=1)
-    for pile in (simulate.pile_in_mujoco(box), simulate.pile_in_bullet(box)):
-        assert pile.steps_per_second > 0
-        assert pile.contacts >= 4
-        assert pile.penetration < 0.02
-        assert pile.rest < simulate.SECONDS
-        assert pile.drift < 0.1
+    rate, contacts = simulate.pile_in_mujoco(box)
+    assert rate > 0
+    assert 12 <= contacts <= 48
 
 
 @pytest.mark.slow
@@ -91,16 +72,17 @@ def test_the_command_writes_a_page_with_hulls_beside_primitives(
     (tmp_path / "meshes").mkdir()
     trimesh.creation.box((1, 2, 3)).export(tmp_path / "meshes" / "box.ply")
     trimesh.creation.icosphere(4).export(tmp_path / "meshes" / "ball.ply")
-    given = [str(tmp_path / "meshes"), "--out", str(tmp_path / "run"), "--no-bullet"]
+    given = [str(tmp_path / "meshes"), "--out", str(tmp_path / "run")]
     done = CliRunner().invoke(app, [*given, "--piles", "2", "--methods", "fast,fast:primitives=true"])
     assert done.exit_code == 0, done.output
     lines = (tmp_path / "run" / "physics.md").read_text().splitlines()
     cells = {line.split(" | ")[0].strip("| "): line.strip("| ").split(" | ")[1:] for line in lines if " | " in line}
-    assert cells["parts"] == ["1.0", "1.0"]
-    assert cells["of these primitives"] == ["0.0", "1.0"]
-    assert float(cells["kB"][1]) < float(cells["kB"][0])
-    assert float(cells["MuJoCo steps/s"][0]) > 0
-    assert cells["box.ply, fast:primitives=true"][:2] == ["1", "1"]
+    assert cells["parts; a mesh"] == ["2; 1.0", "2; 1.0"]
+    assert cells["of these primitives"] == ["0", "2"]
+    sizes = [int(cell.split(";")[0].replace(",", "")) for cell in cells["bytes; a mesh"]]
+    assert sizes[1] < sizes[0]
+    assert float(cells["steps/s"][0]) > 0
+    assert cells["box.ply, fast:primitives=true"][0] == "1"
     wrong = CliRunner().invoke(app, [*given, "--methods", "slow"])
     assert wrong.exit_code == 2
     assert "there is no method 'slow'" in wrong.output

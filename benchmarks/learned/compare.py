@@ -2,9 +2,10 @@
 
 For each mesh, policy and criterion: parts before merging, after merging neighbours (as NavACD does) and after all
 merging, and the CPU seconds of cutting. A criterion is a concavity threshold, or radius and tolerance of navigable
-space: ``0.05,0.01``. A policy is a name that ``decompose`` takes, or a deployment ``planes:ap=5:FILE.npz`` (see
-`benchmarks.deployed`). A run that was interrupted goes on where it stopped. In the end, means, and geometric means of
-the ratios to the first policy's numbers with 95 % intervals by resampling meshes.
+space: ``0.05,0.01``. A policy is a name that ``decompose`` takes, or the paper's deployment of a network with other
+planes, ``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``. A run that was interrupted goes on where it
+stopped. In the end, means, and geometric means of the ratios to the first policy's numbers with 95 % intervals by
+resampling meshes.
 """
 
 from __future__ import annotations
@@ -13,27 +14,32 @@ import argparse
 import csv
 import json
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.deployed import Deployed, Deployment
+from benchmarks.tables import Ratio
 from rlacd.criteria import Concavity, Criterion, Navigable
 from rlacd.cut import CutTree
-from rlacd.errors import RlacdError
+from rlacd.errors import OptionError, RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import drop_slivers, merge_parts
 from rlacd.options.navigable import NavigableSpace
+from rlacd.planes.candidates import OFFSETS_PER_AXIS
+from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy, make_policy
+from rlacd.policies.greedy import EDGES_PER_COMPONENT, least_hulls
+from rlacd.policies.network import KIND, SHORTLIST, Network, best_planes, load_network
+from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.repair.repair import repair
 from rlacd.run import Run
-from rlacd.solid.component import Component
+from rlacd.solid.arrays import BoolArray
+from rlacd.solid.component import Component, Plane
 from rlacd.solid.solid import Solid
 
 MOST_PARTS = 500
 """Meshes of which the first policy makes more parts are left out."""
-
-SAMPLES = 4000
 
 
 def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
@@ -46,9 +52,34 @@ def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
 
 def policy_of(name: str, length: float | None) -> Policy:
     """Get a policy by its name, or a deployment."""
-    if name.startswith("planes:"):
-        return Deployed(Deployment.parse(name.split(":")[1:]), length)
-    return make_policy(name, scale=length)
+    if not name.startswith("planes:"):
+        return make_policy(name, scale=length)
+    _, *words, path = name.split(":")
+    given = dict(word.partition("=")[::2] for word in words)
+    if not given.keys() <= {"ap", "ce", "no-spatial", "no-principal"}:
+        raise OptionError(f"{name} is not known; there are planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz.")
+    network = load_network(path, KIND, FEATURES, 1)
+    exists = np.repeat(["no-spatial" not in given, "no-principal" not in given], 3 * OFFSETS_PER_AXIS)
+    counts = int(given.get("ap", SHORTLIST)), int(given.get("ce", EDGES_PER_COMPONENT))
+    return Deployment(network, length or network.threshold, exists, *counts)
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """The paper's rule, as `rlacd.policies.network.QPolicy`, of the planes that exist; ties go to the sweep's first."""
+
+    network: Network
+    length: float
+    exists: BoolArray
+    planes: int
+    edges: int
+
+    def choose(self, component: Component, threads: int = 1) -> Plane | None:
+        """Choose a plane."""
+        candidates = paper_planes(component)
+        values = self.network(sweep_features(component, self.length))[:, 0]
+        best = best_planes(values, self.exists & valid_planes(component, candidates), self.planes)
+        return least_hulls(component, candidates, np.sort(best), self.edges, threads)
 
 
 def measure(
@@ -75,23 +106,19 @@ def measure(
 
 def summary(rows: list[dict[str, object]], policies: list[str], criteria: list[str]) -> None:
     """Print the ratios."""
-    rng = np.random.default_rng(0)
     for criterion in criteria:
         of = {(r["file"], r["policy"]): r for r in rows if r["criterion"] == criterion and "raw" in r}
         names = [f for f in dict.fromkeys(f for f, _ in of) if all((f, p) in of for p in policies)]
         for policy in policies if names else ():
             for key in ("raw", "navacd", "merged", "cut_s"):
                 pairs = [(of[f, policy].get(key), of[f, policies[0]].get(key)) for f in names]
-                logs = np.array([np.log(float(a) / float(b)) for a, b in pairs if a and b])  # type: ignore[arg-type]
-                if not len(logs):
-                    continue
-                drawn = logs[rng.integers(len(logs), size=(SAMPLES, len(logs)))].mean(axis=1)
-                low, high = np.exp(np.quantile(drawn, [0.025, 0.975]))
-                mean, other = (float(np.mean([x for x in column if x])) for column in zip(*pairs, strict=True))
-                print(
-                    f"{criterion:9s} {policy:22s} {key:6s} {np.exp(logs.mean()):.3f} ({low:.3f} to {high:.3f})"
-                    f"  of totals {mean / other:.3f}  mean {mean:.4g}  {len(logs)} meshes"
-                )
+                shared = [(float(a), float(b)) for a, b in pairs if a and b]  # type: ignore[arg-type]
+                if shared:
+                    own, first = zip(*shared, strict=True)
+                    print(
+                        f"{criterion:9s} {policy:22s} {key:6s} {Ratio.of(own, first)}  of totals "
+                        f"{sum(own) / sum(first):.3f}  mean {np.mean(own):.4g}  {len(own)} meshes"
+                    )
 
 
 def parser() -> argparse.ArgumentParser:
