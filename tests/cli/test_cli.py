@@ -286,6 +286,13 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
     [
         ("view robot.urdf", "is a robot; view shows a single mesh"),
         ("view -", "only rlacd decompose reads stdin"),
+        ("view {dir}/nothing.glb", "does not exist"),
+        ("view {dir}", "is a folder"),
+        ("view {dir}/ell.stl --port 99999", "not a port"),
+        ("view {dir}/ell.stl --up w", "x, y or z"),
+        ("view {dir}/ell.stl --threshold -1", "threshold is -1"),
+        ("view {dir}/ell.stl --criterion beauty", "distance, volume or navigable"),
+        ("view {dir}/ell.stl --open wide", "auto, solid, thin"),
         ("info -", "only rlacd decompose reads stdin"),
         ("view {dir}/ell.stl --threshold 2mm", "it has to be a number or a share such as 2%"),
         ("decompose {dir}/no/chair.glb", "{dir}/no/chair.glb does not exist: check the spelling and the folder"),

@@ -157,33 +157,12 @@ def test_a_robot_with_entities_is_refused(doctype: str, used: str, ending: str, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("<robot>" + "<a>" * 100_000 + "</a>" * 100_000 + "</robot>", "deep"),
-        ("<robot>" + "<a/>" * 2_000_000 + "</robot>", "elements"),
-        ("<robot>" + COLLISION.format("/dev/zero") + "</robot>", "outside"),
-        ("<robot>" + COLLISION.format("pipe.stl") + "</robot>", "does not exist"),
-    ],
-    ids=["depth", "elements", "device", "pipe"],
-)
-def test_a_hostile_robot_is_refused_with_its_reason(text: str, says: str, tmp_path: Path) -> None:
-    path = robot(tmp_path, text)
-    os.mkfifo(path.parent / "pipe.stl")
+@pytest.mark.parametrize(("each", "says"), [("<a>{}</a>", "deep"), ("<a/>{}", "elements")])
+def test_a_hostile_robot_is_refused_with_its_reason(each: str, says: str, tmp_path: Path) -> None:
+    before, after = (part * 2_000_000 for part in each.split("{}"))
+    path = robot(tmp_path, f"<robot>{before}{after}</robot>")
     check_refused(MeshFileError, says, rewrite_robot, path, tmp_path / "out.urdf")
     assert not (tmp_path / "out.urdf").exists()
-
-
-@pytest.mark.parametrize(("scale", "says"), [("1e-320 1 1", "inverted"), ("1e999 1 1", "scale"), ("nan", "scale")])
-def test_a_scale_that_no_number_can_hold_is_refused(scale: str, says: str, tmp_path: Path) -> None:
-    text = COLLISION.format(f'box.stl" scale="{scale}')
-    check_refused(MeshFileError, says, rewrite_robot, robot(tmp_path, f"<robot>{text}</robot>"), tmp_path / "out.urdf")
-
-
-def test_a_mass_that_is_no_number_is_refused(tmp_path: Path) -> None:
-    text = '<mujoco><asset><mesh name="b" file="box.stl"/></asset><worldbody><body>{}</body></worldbody></mujoco>'
-    path = robot(tmp_path, text.format('<geom type="mesh" mesh="b" mass="true"/>'), ".xml")
-    check_refused(MeshFileError, "mass", rewrite_robot, path, tmp_path / "out.xml")
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +11,10 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 
-import rlacd
 from rlacd.cli.main import app
-from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.errors import MeshFileError
 from rlacd.io.read.cad import DEVIATION
 from rlacd.io.read.load import load_mesh
-from tests.assets import read_glb
 
 pytest.importorskip("cascadio", reason="the extra cad is not installed")
 
@@ -48,16 +45,6 @@ def test_triangles_keep_to_the_surface_and_inches_are_converted() -> None:
     assert 0.03 - of_middles.min() < DEVIATION * 0.06
 
 
-def test_hulls_lie_below_their_parts_which_keep_their_colours(tmp_path: Path) -> None:
-    result = rlacd.decompose(STAND, quality="fast", threads=1, per_node=True)
-    header, _, _ = read_glb(result.save(tmp_path / "out.glb", file_format="unreal"))
-    nodes = {node["name"]: node for node in header["nodes"]}
-    for name in ("plate", "pin_left", "pin_right"):
-        assert [header["nodes"][child]["name"] for child in nodes[name]["children"]] == [f"UCX_{name}_00"]
-    colours = [one["pbrMetallicRoughness"].get("baseColorFactor") for one in header["materials"]]
-    assert [1.0, 0.0, 0.0, 1.0] in colours
-
-
 def test_a_length_needs_no_unit_and_another_than_metres_is_warned_of(tmp_path: Path) -> None:
     words = ["decompose", str(STAND), "-o", str(tmp_path / "out.glb"), "--quality", "fast", "--threshold", "1mm"]
     assert CliRunner().invoke(app, words).exit_code == 0
@@ -72,20 +59,3 @@ def test_parts_that_lie_in_other_files_are_missed(tmp_path: Path) -> None:
     assert "left out: 1" in load_mesh(tmp_path / "one.step").warnings[0]
     with pytest.raises(MeshFileError, match="export them all into one"):
         load_mesh(tmp_path / "all.step")
-
-
-@pytest.mark.promise("hostile-files")
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [("a.step", b"ISO-10303-21;"), ("a.stp", STAND.read_bytes()[:9000]), ("a.igs", bytes(200) + b"S")],
-)
-def test_damaged_files_are_refused_in_one_sentence(tmp_path: Path, name: str, content: bytes) -> None:
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(MeshFileError, match="export"):
-        load_mesh(tmp_path / name)
-
-
-def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "cascadio", None)
-    with pytest.raises(MissingExtraError, match=r"rlacd\[cad\]"):
-        load_mesh(STAND)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -84,7 +84,7 @@ def rows(page: Any) -> int:
 
 
 @pytest.mark.slow
-def test_the_hulls_are_seen_and_listed(seen: Watched, viewer: ViewServer) -> None:
+def test_the_hulls_are_seen_listed_and_downloaded(seen: Watched, viewer: ViewServer, tmp_path: Path) -> None:
     page = seen.page
     faces = viewer.session.result[1].report["faces"]
     assert page.title() == "table: 5 hulls"
@@ -95,40 +95,55 @@ def test_the_hulls_are_seen_and_listed(seen: Watched, viewer: ViewServer) -> Non
     assert rows(page) == 5
     colors = {tuple(color) for color in pixels(page).reshape(-1, 4)[::7].tolist()}
     assert len(colors) > 50
-
-
-@pytest.mark.nightly
-def test_another_threshold_decomposes_again_and_a_bad_one_is_said(seen: Watched, viewer: ViewServer) -> None:
-    page = seen.page
-    before = pixels(page)
-    page.fill("#threshold-number", "1.9")
-    page.keyboard.press("Enter")
-    wait_for_run(page, 2)
-    assert page.title() == "table: 1 hull"
-    assert rows(page) == 1
-    assert change(before, pixels(page)) > 0.05
-    page.locator("#threshold").focus()
-    page.keyboard.press("Home")
-    wait_for_run(page, 3)
-    assert float(page.locator("#threshold-number").input_value()) == pytest.approx(0.01)
-    assert rows(page) == len(viewer.session.result[1]) > 1
-    assert viewer.session.result[1].report["options"]["threshold"] == 0.01
-    before = rows(page)
-    page.fill("#threshold-number", "-3")
-    page.keyboard.press("Enter")
-    page.wait_for_selector("#trouble:not([hidden])")
-    assert "threshold is -3" in page.locator("#trouble").inner_text()
-    assert rows(page) == before
-    assert "400" in seen.complaints.pop(), "the browser itself notes the refusal"
-
-
-@pytest.mark.nightly
-def test_files_are_downloaded(seen: Watched, tmp_path: Path) -> None:
-    with seen.page.expect_download() as found:
-        seen.page.click("button[data-format='glb']")
+    with page.expect_download() as found:
+        page.click("button[data-format='glb']")
     assert found.value.suggested_filename == "table_hulls.glb"
     found.value.save_as(tmp_path / "hulls.glb")
     assert len(trimesh.load_scene(tmp_path / "hulls.glb").geometry) == 5
+
+
+@pytest.mark.nightly
+def test_every_control_decomposes_again_and_a_bad_value_is_said(seen: Watched, viewer: ViewServer) -> None:
+    page = seen.page
+
+    def pressed(place: str, key: str) -> None:
+        page.locator(place).focus()
+        page.keyboard.press(key)
+
+    def typed(place: str, text: str) -> None:
+        page.fill(place, text)
+        pressed(place, "Enter")
+
+    assert page.locator(":is(#volume_tolerance, #radius, #balls, #openings):visible").count() == 0
+    steps: list[tuple[Callable[[], Any], str, Any, str, str]] = [
+        (lambda: page.select_option("#preset", "mujoco"), "preset", "mujoco", "#preset-note", "64 vertices"),
+        (lambda: page.check("#shapes input[value=primitives]"), "preset", "mujoco", "#summary", "5 primitives"),
+        (lambda: pressed("#overlap", "End"), "overlap", 0.1, "#summary", "5 primitives"),
+        (lambda: pressed("#overlap", "Home"), "overlap", 0, ".length:has(#overlap)", "none"),
+        (lambda: page.check("#shapes input[value=hulls]"), "preset", "mujoco", "#summary", "5 hulls"),
+        (lambda: typed("#threshold-number", "1.9"), "threshold", 1.9, "#summary", "1 hull"),
+        (lambda: pressed("#threshold", "Home"), "threshold", 0.01, "#summary", "5 hulls"),
+        (lambda: page.check("#criterion input[value=volume]"), "criterion", "volume", "#summary", "of volume added"),
+        (lambda: typed("#volume_tolerance-number", "5"), "criterion", "volume", "#summary", "1 hull"),
+        (lambda: page.check("#criterion input[value=navigable]"), "preset", "mujoco", "#summary", "left free"),
+    ]
+    for run, (act, option, value, place, text) in enumerate(steps, start=2):
+        act()
+        wait_for_run(page, run)
+        assert viewer.session.result[1].report["options"][option] == (value and pytest.approx(value)), option
+        assert text in page.locator(place).inner_text()
+    assert page.locator("#download .suited").inner_text() == "MJCF"
+    assert page.locator("#threshold").is_hidden()
+    plain = pixels(page)
+    page.locator("#balls").click()
+    settle(page)
+    assert change(plain, pixels(page)) > 0.005
+    before = rows(page)
+    typed("#radius-number", "-3")
+    page.wait_for_selector("#trouble:not([hidden])")
+    assert "radius is -3" in page.locator("#trouble").inner_text()
+    assert rows(page) == before
+    assert "400" in seen.complaints.pop(), "the browser itself notes the refusal"
 
 
 @pytest.mark.nightly
@@ -160,16 +175,6 @@ def test_another_mesh_is_dropped_and_shown(seen: Watched, viewer: ViewServer, tm
 
 
 @pytest.mark.nightly
-def test_a_preset_limits_the_hulls_and_points_out_its_format(seen: Watched, viewer: ViewServer) -> None:
-    page = seen.page
-    page.select_option("#preset", "mujoco")
-    wait_for_run(page, 2)
-    assert viewer.session.result[1].report["options"]["preset"] == "mujoco"
-    assert page.locator("#download .suited").inner_text() == "MJCF"
-    assert "64 vertices" in page.locator("#preset-note").inner_text()
-
-
-@pytest.mark.nightly
 def test_the_command_is_copied(viewer: ViewServer, mesh: Path, browser: Any) -> None:
     with open_page(browser, permissions=["clipboard-read", "clipboard-write"]) as watched:
         page = watched.page
@@ -198,19 +203,7 @@ def test_terms_are_explained_where_they_stand(seen: Watched) -> None:
 
 
 @pytest.mark.nightly
-def test_nothing_covers_the_model_on_a_phone(viewer: ViewServer, browser: Any) -> None:
-    with open_page(browser) as watched:
-        page = watched.page
-        page.set_viewport_size({"width": 390, "height": 844})
-        page.goto(viewer.address)
-        wait_for_run(page, 1)
-        stage, toolbar = page.locator("#stage").bounding_box(), page.locator("#toolbar").bounding_box()
-        assert toolbar["y"] >= stage["y"] + stage["height"] - 1
-        assert page.evaluate("document.documentElement.scrollWidth") <= 390
-
-
-@pytest.mark.nightly
-def test_no_button_of_the_toolbar_stands_alone(seen: Watched) -> None:
+def test_nothing_covers_the_model_on_a_phone_and_no_button_stands_alone(seen: Watched) -> None:
     page = seen.page
     page.evaluate("document.getElementById('balls').hidden = false")  # the widest that it gets
     each = "[...document.getElementById('toolbar').children]"
@@ -221,6 +214,9 @@ def test_no_button_of_the_toolbar_stands_alone(seen: Watched) -> None:
         found = page.evaluate(bottoms)
         assert min(map(found.count, found)) > 1, width
         assert not one_row or len(set(found)) == 1, width
+    stage, toolbar = page.locator("#stage").bounding_box(), page.locator("#toolbar").bounding_box()
+    assert toolbar["y"] >= stage["y"] + stage["height"] - 1
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 @pytest.mark.nightly
@@ -253,29 +249,6 @@ def test_an_open_box_is_explained_and_filled_at_a_click(seen: Watched, browser: 
         wait_for_run(page, 2)
         assert rows(page) == 1
         assert page.locator("#notes").is_hidden()
-
-
-@pytest.mark.nightly
-def test_each_criterion_has_its_own_numbers_and_summary(seen: Watched) -> None:
-    page = seen.page
-    assert page.locator("#volume_tolerance").is_hidden()
-    assert page.locator("#balls").is_hidden()
-    page.check("#criterion input[value=navigable]")
-    wait_for_run(page, 2)
-    assert page.locator("#threshold").is_hidden()
-    assert page.locator("#radius").is_visible()
-    assert "left free" in page.locator("#summary").inner_text()
-    plain = pixels(page)
-    page.locator("#balls").click()
-    settle(page)
-    assert change(plain, pixels(page)) > 0.005
-    page.check("#criterion input[value=volume]")
-    wait_for_run(page, 3)
-    assert "of volume added" in page.locator("#summary").inner_text()
-    page.fill("#volume_tolerance-number", "5")
-    page.locator("#volume_tolerance-number").press("Enter")
-    wait_for_run(page, 4)
-    assert rows(page) < 5
 
 
 @pytest.mark.nightly
@@ -331,26 +304,6 @@ def test_the_heat_map_is_drawn_with_its_scale(seen: Watched) -> None:
     settle(page)
     assert page.locator("#legend").is_hidden()
     assert change(plain, pixels(page)) < 0.002
-
-
-@pytest.mark.nightly
-def test_parts_become_primitives_and_overlap(seen: Watched, viewer: ViewServer) -> None:
-    page = seen.page
-    page.check("#shapes input[value=primitives]")
-    wait_for_run(page, 2)
-    assert "5 primitives" in page.locator("#summary").inner_text()
-    assert page.locator("#parts tbody td:nth-child(2)").all_inner_texts() == ["box"] * 5
-    assert "none" in page.locator(".length:has(#overlap)").inner_text()
-    page.locator("#overlap").focus()
-    page.keyboard.press("End")
-    wait_for_run(page, 3)
-    assert viewer.session.result[1].report["options"]["overlap"] == pytest.approx(0.1)
-    page.keyboard.press("Home")
-    wait_for_run(page, 4)
-    assert viewer.session.result[1].report["options"]["overlap"] == 0
-    page.check("#shapes input[value=hulls]")
-    wait_for_run(page, 5)
-    assert "primitives" not in page.locator("#summary").inner_text()
 
 
 @pytest.mark.nightly

@@ -74,18 +74,6 @@ def options_of(session: Session) -> dict[str, Any]:
     return session.result[1].report["options"]
 
 
-def test_progress_and_then_the_result(session: Session, work: Work) -> None:
-    session.decompose({"threshold": 0.1})
-    work.wait_until_it_began()
-    work.go_on(2)
-    while (state := until(session, "working")).done < 1:
-        pass
-    assert (state.stage, state.total, state.parts, state.run) == ("cut", 3, 2, None)
-    work.go_on()
-    until(session, "idle", run=1)
-    assert options_of(session) == {"threshold": 0.1}
-
-
 def test_other_options_replace_the_work_under_way(session: Session, work: Work) -> None:
     session.decompose({"threshold": 0.1})
     work.wait_until_it_began()
@@ -94,15 +82,6 @@ def test_other_options_replace_the_work_under_way(session: Session, work: Work) 
     work.go_on(100)
     until(session, "idle", run=1)
     assert options_of(session) == {"threshold": 0.3}, "what was reached with the first options is dropped"
-
-
-def test_stopping_keeps_what_is_reached(session: Session, work: Work) -> None:
-    session.decompose({})
-    work.wait_until_it_began()
-    session.stop()
-    work.go_on()
-    until(session, "idle", run=1)
-    assert session.result[1].report["complete"] is False
 
 
 def test_stopping_does_not_reach_into_the_next_run(session: Session, work: Work) -> None:
