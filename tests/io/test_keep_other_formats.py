@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 import shutil
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from fuzz.fbx import Model, fbx
 from rlacd.io.read.beside import mesh_files
 from tests.assets import Json, painted_obj, png, read_glb, view_of
 from tests.hulls import assert_convex_hull
+from tests.io.hostile.archives import MESH, model, threemf
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
 
@@ -187,49 +187,20 @@ def test_a_converted_file_is_in_the_unit_of_the_hulls(tmp_path: Path, name: str)
         assert np.allclose(placed.bounds, hull.bounds, atol=1e-6)
 
 
-def test_a_scene_in_memory_is_not_changed_by_a_scale(tmp_path: Path) -> None:
-    scene = trimesh.Scene()
-    move = trimesh.transformations.translation_matrix((0, 5, 0))
-    scene.add_geometry(trimesh.creation.box(), node_name="crate", transform=move)
-    result = rlacd.decompose(scene, quality="fast", threads=1, scale=2.0)
-    read = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True), process=False)
-    assert np.allclose(read.graph["crate"][0][:3, 3], (0, 10, 0))
-    assert np.allclose(read.bounds, result.source.bounds, atol=0.01)
-    assert np.allclose(scene.bounds, [[-0.5, 4.5, -0.5], [0.5, 5.5, 0.5]])
-    assert "crate_hull_000" in read.graph.nodes
-
-
-def plates(folder: Path, *, name: str = "plates.3mf", count: int = 3) -> Path:
+def plates(folder: Path) -> Path:
     """Boxes of 3MF: one whose own colour is red, one most of whose triangles are blue, one without a colour."""
-    box = trimesh.creation.box()
-    points = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in box.vertices.tolist())
-    objects, items = "", ""
-    for number, (called, own, each) in enumerate(
-        [("red", 'pid="1" pindex="0"', ""), ("blue", 'pid="1" pindex="0"', 'pid="9" p1="1"'), ("plain", "", "")][:count]
-    ):
-        corners = "".join(
-            f'<triangle v1="{a}" v2="{b}" v3="{c}" {each if index else ""}/>'
-            for index, (a, b, c) in enumerate(box.faces.tolist())
-        )
-        objects += f"""<object id="{10 + number}" type="model" name="{called}" {own}><mesh><vertices>{points}</vertices>
-            <triangles>{corners}</triangles></mesh></object>"""
-        items += f'<item objectid="{10 + number}" transform="1 0 0 0 1 0 0 0 1 {3 * number} 0 0"/>'
-    model = f"""<?xml version="1.0"?><model unit="millimeter"
-        xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-        xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"><resources>
-        <basematerials id="1"><base name="a" displaycolor="#FF0000"/></basematerials>
-        <m:colorgroup id="9"><m:color color="#00FF00FF"/><m:color color="#0000BC80"/></m:colorgroup>
-        {objects}</resources><build>{items}</build></model>"""
-    path = folder / name
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("3D/3dmodel.model", model)
-    return path
-
-
-def test_a_single_coloured_object_of_3mf_keeps_its_colour(tmp_path: Path) -> None:
-    header, _, _ = kept(plates(tmp_path, count=1), tmp_path / "out.glb")
-    assert [node["name"] for node in header["nodes"] if "mesh" in node] == ["plates", "UCX_plates_00"]
-    assert colors(header, 0) == [[1.0, 0.0, 0.0, 1.0]]
+    colours = '<basematerials id="1"><base name="a" displaycolor="#FF0000"/></basematerials>'
+    colours += '<m:colorgroup xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02" id="9">'
+    colours += '<m:color color="#00FF00FF"/><m:color color="#0000BC80"/></m:colorgroup>'
+    blue = MESH.replace("<triangle ", '<triangle pid="9" p1="1" ').replace(' pid="9" p1="1"', "", 1)
+    objects = [("red", 'pid="1" pindex="0"', MESH), ("blue", 'pid="1" pindex="0"', blue), ("plain", "", MESH)]
+    items = ""
+    for number, (name, own, mesh) in enumerate(objects, start=10):
+        colours += f'<object id="{number}" name="{name}" {own}>{mesh}</object>'
+        items += f'<item objectid="{number}" transform="1 0 0 0 1 0 0 0 1 {3 * number} 0 0"/>'
+    text = model(colours, items)
+    (folder / "plates.3mf").write_bytes(threemf(text))
+    return folder / "plates.3mf"
 
 
 def cart(folder: Path) -> Path:

@@ -311,34 +311,22 @@ def arm(tmp_path: Path) -> Path:
     return tmp_path / "arm.xml"
 
 
-def test_mujoco_reads_the_rewritten_mjcf(arm: Path) -> None:
+@pytest.mark.promise("robot-hulls")
+def test_mujoco_reads_the_rewritten_mjcf_and_hulls_lie_where_the_mesh_lay(arm: Path) -> None:
+    """MuJoCo moves every mesh into its own frame of inertia; placed by it, mesh and hulls still coincide."""
     before = mujoco_model(arm)
     done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
     after = mujoco_model(done.path)
+    for body in ("upper", "lower"):
+        assert bounds_of(after, body) == pytest.approx(bounds_of(before, body), abs=1e-5)
     table_hulls, big_hulls = (len(mesh.files) for mesh in done.meshes)
     # "upper" keeps its collision geom for its mass, "lower" the red one to look at too, with hulls beside them.
     assert after.ngeom == before.ngeom + table_hulls + big_hulls
-    import mujoco
-
-    elbow = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_GEOM, "elbow_mass")
-    assert after.geom_rgba[elbow, 3] == 0.0, "what stays for its mass is not drawn"
+    assert after.geom("elbow_mass").rgba[3] == 0.0, "what stays for its mass is not drawn"
     assert int(after.geom_contype.astype(bool).sum()) == table_hulls + big_hulls + 2, "and tetrahedron and sphere"
-    red = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_GEOM, "both_visual")
-    assert after.geom_contype[red] == after.geom_conaffinity[red] == 0
-    assert after.geom_rgba[red].tolist() == [1.0, 0.0, 0.0, 1.0]
-    data = mujoco.MjData(after)
-    for _ in range(20):
-        mujoco.mj_step(after, data)
-    assert np.isfinite(data.qpos).all()
-
-
-@pytest.mark.promise("robot-hulls")
-def test_hulls_lie_where_the_mesh_lay(arm: Path) -> None:
-    """MuJoCo moves every mesh into its own frame of inertia; placed by it, mesh and hulls still coincide."""
-    before = mujoco_model(arm)
-    after = mujoco_model(rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1).path)
-    assert bounds_of(after, "upper") == pytest.approx(bounds_of(before, "upper"), abs=1e-5)
-    assert bounds_of(after, "lower") == pytest.approx(bounds_of(before, "lower"), abs=1e-5)
+    red = after.geom("both_visual")
+    assert red.contype == red.conaffinity == 0
+    assert red.rgba.tolist() == [1.0, 0.0, 0.0, 1.0]
 
 
 def bounds_of(model: Any, body: str) -> np.ndarray:
@@ -346,8 +334,7 @@ def bounds_of(model: Any, body: str) -> np.ndarray:
 
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
-    own = (model.geom_bodyid == index) & (model.geom_dataid >= 0) & (model.geom_contype > 0)
+    own = (model.geom_bodyid == model.body(body).id) & (model.geom_dataid >= 0) & (model.geom_contype > 0)
     points = np.concatenate([points_of_geom(model, data, geom) for geom in np.flatnonzero(own)])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
@@ -366,12 +353,18 @@ def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
     assert any("tetrahedron" in warning and "no file" in warning for warning in done.warnings)
 
 
-GEOM = "<mujoco><compiler {compiler}/><default><default class='c'><geom {default}/></default></default><asset>\
-<mesh name='t' file='table.stl' scale='1 -1 2' refpos='0.1 0 0' refquat='1 1 0 0' {asset}/></asset><worldbody>\
-<body name='b' pos='0 0 3'><freejoint/>{inertial}<frame pos='1 0 0' euler='10 20 30'>\
-<geom class='c' type='mesh' mesh='t' group='{group}' {geom}/></frame><geom size='0.2' density='300'/>\
-<replicate count='2' offset='1 0 0'><geom class='c' type='mesh' mesh='t' pos='0 1 0' group='3'/></replicate></body>\
-</worldbody></mujoco>"
+def mjcf(folder: Path, assets: str, geoms: str, more: str = "") -> Path:
+    """A model of one free body."""
+    body = f"<worldbody><body name='b' pos='0 0 3'><freejoint/>{geoms}</body></worldbody>"
+    (folder / "in.xml").write_text(f"<mujoco>{more}<asset>{assets}</asset>{body}</mujoco>")
+    return folder / "in.xml"
+
+
+GEOMS = "{inertial}<frame pos='1 0 0' euler='10 20 30'><geom class='c' type='mesh' mesh='t' group='{group}' {geom}/>\
+</frame><geom size='0.2' density='300'/><replicate count='2' offset='1 0 0'><geom class='c' type='mesh' mesh='t'\
+ pos='0 1 0' group='3'/></replicate>"
+MESH = "<mesh name='t' file='table.stl' scale='1 -1 2' refpos='0.1 0 0' refquat='1 1 0 0' {asset}/>"
+SETTINGS = "<compiler {compiler}/><default><default class='c'><geom {default}/></default></default>"
 
 
 @pytest.mark.parametrize("group", ["0", "3"])
@@ -395,9 +388,10 @@ GEOM = "<mujoco><compiler {compiler}/><default><default class='c'><geom {default
 def test_no_body_changes_its_mass_centre_or_inertia(tmp_path: Path, how: dict[str, str], group: str) -> None:
     table().export(tmp_path / "table.stl")
     blank = dict.fromkeys(("compiler", "default", "asset", "inertial", "geom"), "")
-    (tmp_path / "in.xml").write_text(GEOM.format(**{**blank, **how, "group": group}))
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
-    before, after = (mujoco_model(path) for path in (tmp_path / "in.xml", done.path))
+    given = {**blank, **how, "group": group}
+    source = mjcf(tmp_path, *(text.format(**given) for text in (MESH, GEOMS, SETTINGS)))
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
+    before, after = (mujoco_model(path) for path in (source, done.path))
     assert after.ngeom > before.ngeom
     for name, size in (("body_mass", 1e-6), ("body_ipos", 1e-6)):
         assert getattr(after, name) == pytest.approx(getattr(before, name), rel=size, abs=1e-9)
@@ -406,24 +400,16 @@ def test_no_body_changes_its_mass_centre_or_inertia(tmp_path: Path, how: dict[st
 
 def tensors(model: Any) -> np.ndarray:
     """The inertia of each body along the axes of its frame."""
-    import mujoco
-
-    found = []
-    for quaternion, inertia in zip(model.body_iquat, model.body_inertia, strict=True):
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, quaternion)
-        found.append(turn.reshape(3, 3) * inertia @ turn.reshape(3, 3).T)
-    return np.array(found)
+    turns = [trimesh.transformations.quaternion_matrix(turn)[:3, :3] for turn in model.body_iquat]
+    return np.array([turn * inertia @ turn.T for turn, inertia in zip(turns, model.body_inertia, strict=True)])
 
 
 @pytest.mark.parametrize("inertia", ["", "inertia='exact'", "inertia='convex'"])
 def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, inertia: str) -> None:
     trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "flat.stl")
-    (tmp_path / "in.xml").write_text(
-        f"<mujoco><asset><mesh file='flat.stl' {inertia}/></asset><worldbody><body><freejoint/><inertial pos='0 0 0'"
-        " mass='1' diaginertia='1 1 1'/><geom type='mesh' mesh='flat'/></body></worldbody></mujoco>"
-    )
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threads=1)
+    weight = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"
+    source = mjcf(tmp_path, f"<mesh file='flat.stl' {inertia}/>", f"{weight}<geom type='mesh' mesh='flat'/>")
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", threads=1)
     assert mujoco_model(done.path).body_mass[1] == 1.0
     assert any("no volume" in warning for warning in done.warnings)
 
@@ -431,16 +417,12 @@ def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, ine
 @pytest.mark.parametrize("ending", ["dae", "ply", "stl"])
 def test_a_mesh_that_mujoco_cannot_read_is_copied_for_it(tmp_path: Path, ending: str) -> None:
     table().export(tmp_path / f"table.{ending}", file_type="stl_ascii" if ending == "stl" else ending)
-    (tmp_path / "in.xml").write_text(
-        f"<mujoco><asset><mesh name='t' file='table.{ending}' scale='1 1 -2' inertia='exact'/></asset>"
-        "<worldbody><body><freejoint/>"
-        "<geom type='mesh' mesh='t' density='7'/></body></worldbody></mujoco>"
-    )
+    asset = f"<mesh name='t' file='table.{ending}' scale='1 1 -2' inertia='exact'/>"
+    source = mjcf(tmp_path, asset, "<geom type='mesh' mesh='t' density='7'/>")
     with pytest.raises(ValueError, match="decoder"):
-        mujoco_model(tmp_path / "in.xml")
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
-    model = mujoco_model(done.path)
-    assert model.body_mass[1] == pytest.approx(table().volume * 2 * 7, rel=0.01)
+        mujoco_model(source)
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
+    assert mujoco_model(done.path).body_mass[1] == pytest.approx(table().volume * 2 * 7, rel=0.01)
 
 
 def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
@@ -480,13 +462,14 @@ def test_a_model_whose_paths_are_stripped_is_rewritten_with_the_paths_that_count
     (tmp_path / "meshes").mkdir()
     for name in ("table", "other"):
         table().export(tmp_path / "meshes" / f"{name}.stl")
-    (tmp_path / "in.xml").write_text(
-        '<mujoco><compiler strippath="true" meshdir="meshes"/><asset><mesh file="C:\\robot/x/table.stl"/>'
-        '<mesh file="no/where/other.stl"/></asset><worldbody><body><freejoint/><geom type="mesh" mesh="table"/>'
-        '<geom type="mesh" mesh="other" contype="0" conaffinity="0"/></body></worldbody></mujoco>'
+    source = mjcf(
+        tmp_path,
+        '<mesh file="C:\\robot/x/table.stl"/><mesh file="no/where/other.stl"/>',
+        '<geom type="mesh" mesh="table"/><geom type="mesh" mesh="other" contype="0" conaffinity="0"/>',
+        '<compiler strippath="true" meshdir="meshes"/>',
     )
-    before = mujoco_model(tmp_path / "in.xml")
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
+    before = mujoco_model(source)
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
     after = mujoco_model(done.path)
     assert after.ngeom == before.ngeom + len(done.meshes[0].files)
     assert after.body_inertia == pytest.approx(before.body_inertia, rel=1e-6)

@@ -9,9 +9,7 @@ import io
 import json
 import re
 import shlex
-import signal
 import socket
-import subprocess
 import sys
 import threading
 import urllib.parse
@@ -33,9 +31,8 @@ from rlacd.view.controls import read_controls
 from rlacd.view.downloads import offered
 from rlacd.view.server import ViewServer
 from tests.shapes import elbow
-from tests.view.viewing import open_viewer
+from tests.view.viewing import PATIENCE, Answer, ask, open_viewer, port_of
 
-PATIENCE = 60.0
 NAME = "an elbow 'n ümläut"
 
 
@@ -52,33 +49,9 @@ def viewer(mesh: Path) -> Iterator[ViewServer]:
         yield viewer
 
 
-class Answer:
-    """What a request gave."""
-
-    def __init__(self, response: http.client.HTTPResponse) -> None:
-        self.status, self.headers, self.body = response.status, response.headers, response.read()
-
-    @property
-    def json(self) -> Any:
-        return json.loads(self.body)
-
-
-def ask(viewer: ViewServer, method: str, path: str, body: Any = None, **headers: str) -> Answer:
-    place = urllib.parse.urlsplit(viewer.address)
-    connection = http.client.HTTPConnection(str(place.hostname), int(place.port or 0), timeout=PATIENCE)
-    try:
-        sent = body if isinstance(body, (bytes, type(None))) else json.dumps(body).encode()
-        kind = {"Content-Type": "application/json"} if method == "POST" else {}
-        connection.request(method, path, sent, {**kind, **{k.replace("_", "-"): v for k, v in headers.items()}})
-        return Answer(connection.getresponse())
-    finally:
-        connection.close()
-
-
 def events(viewer: ViewServer) -> Iterator[dict[str, Any]]:
     """States as the page gets them."""
-    place = urllib.parse.urlsplit(viewer.address)
-    connection = http.client.HTTPConnection(str(place.hostname), int(place.port or 0), timeout=PATIENCE)
+    connection = http.client.HTTPConnection("127.0.0.1", port_of(viewer), timeout=PATIENCE)
     connection.request("GET", "/events")
     response = connection.getresponse()
     assert response.headers["Content-Type"] == "text/event-stream"
@@ -408,8 +381,8 @@ def test_pages_of_other_sites_are_turned_away(viewer: ViewServer) -> None:
 
 @pytest.mark.promise("viewer-private")
 def test_no_other_machine_can_reach_it(viewer: ViewServer) -> None:
-    port = int(urllib.parse.urlsplit(viewer.address).port or 0)
-    assert urllib.parse.urlsplit(viewer.address).hostname == "127.0.0.1"
+    port = port_of(viewer)
+    assert viewer.address == f"http://127.0.0.1:{port}/"
     assert viewer.socket.getsockname() == ("127.0.0.1", port)
     outward = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)]
     for address in outward:
@@ -459,43 +432,16 @@ def test_closing_ends_every_thread_and_page(mesh: Path) -> None:
     assert threading.active_count() <= before
 
 
-def test_a_port_in_use_is_one_sentence(viewer: ViewServer, mesh: Path) -> None:
-    port = int(urllib.parse.urlsplit(viewer.address).port or 0)
+def test_a_port_in_use_is_one_sentence_and_without_one_a_free_one_is_found(viewer: ViewServer, mesh: Path) -> None:
+    port = port_of(viewer)
     with (
         pytest.raises(OptionError, match=f"port {port} is in use; choose another with --port"),
         open_viewer(mesh, port=port),
     ):
         pass
-    with pytest.raises(OptionError, match=r"99999 is not a port.* or 0 for any"), open_viewer(mesh, port=99_999):
-        pass
-
-
-def test_without_a_port_a_free_one_is_found(mesh: Path) -> None:
     with open_viewer(mesh) as one, open_viewer(mesh) as two:
         assert one.address != two.address
         assert ask(two, "GET", "/").status == 200
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
-def test_the_command_tells_its_address_and_ends_with_ctrl_c(mesh: Path) -> None:
-    # Background jobs of a shell ignore Ctrl-C, and so would this one.
-    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
-    start = f"{heed}; from rlacd.cli.main import main; main()"
-    command = [sys.executable, "-c", start, "view", str(mesh), "--no-browser"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            told = process.stderr.readline()
-            address = re.search(r"http://127\.0\.0\.1:(\d+)/", told)
-            assert address is not None, told
-            connection = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=PATIENCE)
-            connection.request("GET", "/")
-            assert connection.getresponse().status == 200
-            process.send_signal(signal.SIGINT)
-            assert process.wait(timeout=PATIENCE) == 0
-            assert process.stderr.read() == ""
-        finally:
-            process.kill()
 
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
