@@ -323,6 +323,8 @@ def test_links_are_followed_and_their_target_is_never_overwritten(tmp_path: Path
     ("name", "says"),
     [
         ("folder", "is a folder"),
+        ("", "is a folder"),
+        ("..", "is a folder"),
         ("dangling.stl", "does not exist"),
         ("circle.stl", ""),
         ("pipe.stl", "pipe"),

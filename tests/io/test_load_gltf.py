@@ -62,6 +62,24 @@ def test_a_sparse_array_changes_some_rows(rig: Rig, tmp_path: Path, without_view
         load_mesh(rig.glb(tmp_path / "box.glb"))
 
 
+@pytest.mark.parametrize("kind", ["<i1", "<u1", "<i2", "<u2"])
+@pytest.mark.parametrize("normalized", [True, False])
+def test_integers_are_lengths_as_the_specification_says(rig: Rig, tmp_path: Path, kind: str, normalized: bool) -> None:
+    """KHR_mesh_quantization: a normalised integer is a share of the largest, any other is its own value."""
+    signed, most = "i" in kind, np.iinfo(kind).max
+    corners = np.zeros((8, 4), kind)  # rows of positions begin at multiples of four bytes
+    corners[:, :3] = np.where(BOX.vertices > 0, most, -int(most) if signed else 0)
+    component = {"<i1": 5120, "<u1": 5121, "<i2": 5122, "<u2": 5123}[kind]
+    (primitive,) = rig.header["meshes"][0]["primitives"]
+    primitive["attributes"] = {"POSITION": rig.accessor(corners, "VEC3", component, normalized=normalized)}
+    rig.header["bufferViews"][-1]["byteStride"] = corners.strides[0]
+    rig.header["nodes"][0]["scale"] = [2.0, 2.0, 2.0]
+    rig.header["extensionsRequired"] = ["KHR_mesh_quantization"]
+    vertices = read(rig, tmp_path).vertices
+    expected = np.array([-1.0 if signed else 0.0, 1.0]) * 2 * (1 if normalized else most)
+    assert np.allclose([vertices.min(axis=0), vertices.max(axis=0)], expected[:, None])
+
+
 @pytest.mark.parametrize("bound", [True, False])
 def test_a_skinned_mesh_lies_where_its_joints_put_it(rig: Rig, tmp_path: Path, bound: bool) -> None:
     """By the formula of the specification, corner by corner; the transform of the mesh's own node is ignored."""

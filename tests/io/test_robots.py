@@ -18,7 +18,7 @@ import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.io.robots import rewrite
-from tests.models import mujoco_model, points_of_geom, table
+from tests.models import fall_in_mujoco, mujoco_model, points_of_geom, table
 
 EAR = """<?xml version="1.0"?>
 <!-- made by hand -->
@@ -327,6 +327,7 @@ def test_mujoco_reads_the_rewritten_mjcf_and_hulls_lie_where_the_mesh_lay(arm: P
     red = after.geom("both_visual")
     assert red.contype == red.conaffinity == 0
     assert red.rgba.tolist() == [1.0, 0.0, 0.0, 1.0]
+    assert np.isfinite(fall_in_mujoco(done.path, 0.05).speed)
 
 
 def bounds_of(model: Any, body: str) -> np.ndarray:
