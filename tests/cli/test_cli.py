@@ -25,18 +25,13 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.fit import told_apart
 from rlacd.run import Progress, ProgressCallback
+from tests.batch.trouble import write_ell
 from tests.hulls import hull_of
-
-ELL = [(2.0, 0.4, 0.4), (0.4, 0.4, 2.0)]
 
 
 @pytest.fixture
 def mesh(tmp_path: Path) -> Path:
-    """Two boxes that make an L."""
-    ell = trimesh.util.concatenate([trimesh.creation.box(size) for size in ELL])
-    ell.apply_translation([1.0, 2.0, 3.0])
-    ell.export(tmp_path / "ell.stl")
-    return tmp_path / "ell.stl"
+    return write_ell(tmp_path / "ell.stl")
 
 
 @pytest.fixture(autouse=True)

@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,8 @@ def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_
     plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0]))
     hull = hull_of(plate.vertices)
     for name, says in (("thin.glb", r".*\.obj"), ("thin.xml", ""), ("thin.urdf", ""), ("thin.usda", "")):
+        if name == "thin.usda" and find_spec("pxr") is None:
+            continue
         with pytest.raises(OutputError, match=rf"hull_000.*too thin for single precision{says}"):
             save_hulls([hull], tmp_path / name)
     assert list(tmp_path.iterdir()) == []

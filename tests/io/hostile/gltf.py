@@ -260,3 +260,14 @@ def _() -> bytes:
     tree["scenes"] = [{"nodes": list(range(1000))}]
     tree["skins"] = [{"joints": [0] * 100_000}]
     return json.dumps(tree).encode()
+
+
+for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "binvox", "dxf"):
+    refused(f"another format.{ending}", "convert it")(lambda: b"anything")
+refused("another format.zip", "unpack it")(lambda: b"anything")
+refused("a node below one whose mesh there is not.gltf", "no index")(
+    lambda: gltf(nodes=[{"mesh": -3, "children": [1]}, {"mesh": 0}])
+)
+refused("a node that is the parent of the scene.gltf", "itself")(
+    lambda: gltf(nodes=[{"name": "world", "children": [1]}, {"mesh": 0, "children": [0]}])
+)
