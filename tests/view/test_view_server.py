@@ -407,18 +407,6 @@ def test_a_long_search_is_cancelled_and_keeps_what_it_has(mesh: Path, tmp_path: 
         assert report["seconds"]["total"] < 60
 
 
-def test_a_file_that_is_gone_is_reported_and_its_hulls_stay(tmp_path: Path) -> None:
-    path = tmp_path / "cube.stl"
-    trimesh.creation.box().export(path)
-    with open_viewer(path, port=0) as viewer:
-        settled(viewer, run=1)
-        path.unlink()
-        ask(viewer, "POST", "/decompose", {})
-        state = next(state for state in events(viewer) if state["error"])
-        assert "cube.stl does not exist" in state["error"]
-        assert ask(viewer, "GET", "/scene").status == 200
-
-
 def test_closing_ends_every_thread_and_page(mesh: Path) -> None:
     before = threading.active_count()
     with open_viewer(mesh, port=0) as viewer:

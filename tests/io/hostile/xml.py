@@ -11,6 +11,16 @@ EXTERNAL = "<!DOCTYPE a [<!ENTITY a SYSTEM 'file:///etc/passwd'>]>"
 OUTSIDE = "<!DOCTYPE a SYSTEM 'file:///dev/zero'>"
 PARAMETER = "<!DOCTYPE a [<!ENTITY % b SYSTEM 'file:///dev/zero'> %b;]>"
 
+ENTITIES = {
+    "a billion laughs": (LAUGHS, "&a12;"),
+    "an entity used a hundred thousand times": (QUADRATIC, "&a;" * 100_000),
+    "a file as an entity": (EXTERNAL, "&a;"),
+    "a document type that is a device": (OUTSIDE, ""),
+    "a device as a parameter": (PARAMETER, ""),
+}
+"""Document types, and how they are used."""
+
+
 COLLADA = (
     '<?xml version="1.0" encoding="utf-8"?>{doctype}'
     '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
@@ -49,13 +59,7 @@ def _() -> bytes:
     return collada(scene=f'<node id="n"><instance_geometry url="#g"/></node>{include}')
 
 
-for kind, (doctype, entity) in {
-    "a billion laughs": (LAUGHS, "&a12;"),
-    "an entity used a hundred thousand times": (QUADRATIC, "&a;" * 100_000),
-    "a file as an entity": (EXTERNAL, "&a;"),
-    "a document type that is a device": (OUTSIDE, ""),
-    "a device as a parameter": (PARAMETER, ""),
-}.items():
+for kind, (doctype, entity) in ENTITIES.items():
     dae = collada(doctype=doctype, numbers=entity)
     items, named = f'<item objectid="1"/>{entity}', f'<object id="1" name="{entity[:5000]}">{MESH}</object>'
     for ending, content in {
