@@ -168,15 +168,15 @@ def view_of(header: Json, binary: bytes, view: int) -> bytes:
     return binary[known["byteOffset"] :][: known["byteLength"]]
 
 
-def painted_obj(folder: Path) -> Path:
-    """A crate as OBJ with half its faces of wood, which is a picture, and half in red."""
-    crate = trimesh.creation.box((1, 2, 3))
-    lines = ["mtllib crate.mtl", "o crate", *("v {:g} {:g} {:g}".format(*point) for point in crate.vertices)]
-    lines += ["vt 0 0", "vt 1 0", "vt 1 1"]
-    for half, paint in enumerate(("wood", "red")):
-        lines.append(f"usemtl {paint}")
-        for corners in crate.faces[half::2] + 1:
-            lines.append("f " + " ".join(f"{corner}/{place}" for place, corner in enumerate(corners, start=1)))
+def painted_obj(folder: Path, *names: str) -> Path:
+    """Crates side by side as OBJ, each with half its faces of wood, which is a picture, and half in red."""
+    lines = ["mtllib crate.mtl", "vt 0 0", "vt 1 0", "vt 1 1"]
+    for number, name in enumerate(names or ["crate"]):
+        crate = trimesh.creation.box((1, 2, 3)).apply_translation((5 * number, 0, 0))
+        lines += [f"o {name}", *("v {:g} {:g} {:g}".format(*point) for point in crate.vertices)]
+        for half, paint in enumerate(("wood", "red")):
+            faces = crate.faces[half::2] + 1 + 8 * number
+            lines += [f"usemtl {paint}", *("f {}/1 {}/2 {}/3".format(*face) for face in faces)]
     path = folder / "crate.obj"
     path.write_text("\n".join(lines) + "\n")
     paints = ["newmtl wood", "Kd 1 1 1", "map_Kd wood.png", "newmtl red", "Kd 1 0 0"]
