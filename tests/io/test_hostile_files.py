@@ -16,13 +16,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from trimesh import creation
 
 from rlacd.batch.assets import Asset
 from rlacd.batch.manifest import Ledger
 from rlacd.batch.store import FolderStore
-from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OutputError, RlacdError, TrainingError, WeightsError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import LARGEST_FILE
@@ -30,7 +28,7 @@ from rlacd.io.robots import rewrite_robot
 from rlacd.policies.network import load_network
 from tests.bounded import bounded
 from tests.io.hostile import HARMLESS, REFUSED
-from tests.io.hostile.gltf import gltf, named_often, reference
+from tests.io.hostile.gltf import gltf, named_often
 from tests.io.hostile.xml import ENTITIES
 
 
@@ -165,32 +163,6 @@ def test_a_robot_with_ten_thousand_parts_in_one_line_is_rewritten(tmp_path: Path
 
 
 # --- batches ----------------------------------------------------------------------------------------------------------
-
-
-def batch(*words: str) -> tuple[int, str]:
-    result = CliRunner().invoke(app, ["batch", *words])
-    return result.exit_code, result.output
-
-
-@pytest.mark.nightly
-def test_a_batch_passes_by_what_is_no_file(tmp_path: Path) -> None:
-    """A pipe, a device, and a glTF file whose buffer is a pipe: each is a row, and the box is done."""
-    assets, out = tmp_path / "assets", tmp_path / "out"
-    assets.mkdir()
-    creation.box().export(assets / "box.stl")
-    os.mkfifo(assets / "pipe.stl")
-    os.mkfifo(assets / "pipe.bin")
-    (assets / "device.ply").symlink_to("/dev/zero")
-    (assets / "piped.gltf").write_bytes(reference("pipe.bin"))
-    code, said = bounded(batch, str(assets), "-o", str(out), "--jobs", "1", memory=2**34)
-    assert code != 0, said
-    rows = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
-    assert {row["mesh"]: row["status"] for row in rows} == {
-        "box.stl": "done",
-        "device.ply": "failed",
-        "pipe.stl": "failed",
-        "piped.gltf": "failed",
-    }
 
 
 @pytest.mark.slow

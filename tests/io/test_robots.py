@@ -85,30 +85,21 @@ def collisions(path: Path) -> list[trimesh.Trimesh]:
 # --- URDF -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.promise("robots")
-def test_a_urdf_keeps_every_byte_but_its_collision_meshes(ear: Path) -> None:
+@pytest.mark.promise("robots", "robot-hulls")
+def test_a_urdf_keeps_every_byte_but_its_collision_meshes_whose_space_hulls_fill_at_every_scale(ear: Path) -> None:
     done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
     after = done.path.read_text()
     assert without_collision_meshes(after) == without_collision_meshes(EAR)
-    assert after.count("<!-- kept > -->") == len(done.meshes[0].files), "what else is in a collision goes to each hull"
+    first, second = (len(mesh.files) for mesh in done.meshes)  # one mesh at two scales: at one of them it is used twice
+    assert after.count("<!-- kept > -->") == first, "what else is in a collision goes to each hull"
     names = [element.get("name") for element in etree.parse(str(done.path)).iterfind(".//collision")]
-    count = len(done.meshes[0].files)
-    assert names[:count] == [f"a > b_{index:03d}" for index in range(count)]
+    assert names[:first] == [f"a > b_{index:03d}" for index in range(first)]
     assert done.warnings == []
-
-
-@pytest.mark.promise("robot-hulls")
-def test_hulls_fill_the_same_space_at_every_scale(ear: Path) -> None:
-    done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
-    assert len(done.meshes) == 2, "one mesh at two scales; the one that is used twice is decomposed once"
     hulls = collisions(done.path)
-    first, second = (len(mesh.files) for mesh in done.meshes)
     groups = [hulls[:first], hulls[first : first + second], hulls[first + second :]]
     for group, scale in zip(groups, ([0.5, 0.5, 2.0], [-1.0, 1.0, 1.0], [0.5, 0.5, 2.0]), strict=True):
-        want = table()
-        want.apply_transform(np.diag([*scale, 1.0]))
-        together = trimesh.util.concatenate(group)
-        assert together.bounds == pytest.approx(want.bounds, abs=1e-6)
+        want = table().apply_transform(np.diag([*scale, 1.0]))
+        assert trimesh.util.concatenate(group).bounds == pytest.approx(want.bounds, abs=1e-6)
         assert all(hull.volume > 0 and hull.is_convex for hull in group)
         assert sum(hull.volume for hull in group) == pytest.approx(want.volume, rel=0.02)
 
