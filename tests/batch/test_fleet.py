@@ -36,10 +36,13 @@ def touch(folder: Path, *names: str) -> None:
         (folder / name).write_bytes(b"x")
 
 
-def test_meshes_of_all_depths_are_found_in_order_and_nothing_else(tmp_path: Path) -> None:
+def test_meshes_of_all_depths_and_links_to_files_are_found_in_order_and_nothing_else(tmp_path: Path) -> None:
     touch(tmp_path, "b/椅子.OBJ", "a.stl", "notes.txt", ".hidden/c.obj", "b/.d.obj", "out/e.glb", "b/deep/er/f.3mf")
+    (tmp_path / "link.obj").symlink_to(tmp_path / "b" / "椅子.OBJ")
+    (tmp_path / "round").symlink_to(tmp_path)
+    (tmp_path / "broken.obj").symlink_to(tmp_path / "nowhere")
     names = [asset.name for asset in find_assets(tmp_path, leave_out=tmp_path / "out")]
-    assert names == ["a.stl", "b/deep/er/f.3mf", "b/椅子.OBJ"]
+    assert names == ["a.stl", "b/deep/er/f.3mf", "b/椅子.OBJ", "broken.obj", "link.obj"]
 
 
 def test_hulls_among_the_meshes_are_passed_over_by_what_is_in_them(tmp_path: Path) -> None:
@@ -78,14 +81,6 @@ def test_no_two_results_share_a_name_on_any_disk(names: set[str]) -> None:
     places = _places(sorted(names), ".glb")
     assert set(places) == names
     assert len({place.casefold() for place in places.values()}) == len(names)
-
-
-def test_links_to_files_count_and_links_to_folders_do_not(tmp_path: Path) -> None:
-    touch(tmp_path, "real/a.obj")
-    (tmp_path / "link.obj").symlink_to(tmp_path / "real" / "a.obj")
-    (tmp_path / "round").symlink_to(tmp_path)
-    (tmp_path / "broken.obj").symlink_to(tmp_path / "nowhere")
-    assert [asset.name for asset in find_assets(tmp_path)] == ["broken.obj", "link.obj", "real/a.obj"]
 
 
 # --- the key of a result ----------------------------------------------------------------------------------------------

@@ -24,17 +24,18 @@ BOX = trimesh.creation.box()
 
 WHOLE = fbx([Model("box", BOX.vertices, BOX.faces.tolist())])
 
-MODULES = {"glb": ("draco", "DracoPy"), "fbx": ("fbx", "ufbx"), "step": ("cad", "cascadio"), "igs": ("cad", "cascadio")}
-MODULES |= dict.fromkeys(("stp",), MODULES["step"]) | dict.fromkeys(("usda", "usdc", "usdz"), ("usd", "pxr"))
+USD = ("usda", "usdc", "usdz")
+EXTRAS = {"draco": "DracoPy", "fbx": "ufbx", "cad": "cascadio", "usd": "pxr"}
+FORMATS = {"glb": "draco", "fbx": "fbx", "step": "cad", "stp": "cad", "igs": "cad"} | dict.fromkeys(USD, "usd")
 
 
-@pytest.mark.parametrize("ending", sorted(MODULES.keys() - {"stp"}))
+@pytest.mark.parametrize("ending", ["glb", "fbx", "step", "igs", *USD])
 def test_a_format_whose_extra_is_missing_names_it(tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    extra, module = MODULES[ending]
-    pytest.importorskip(module)
+    extra = FORMATS[ending]
+    pytest.importorskip(EXTRAS[extra])
     path = tmp_path / f"box.{ending}"
     path.write_bytes(next(seed.content for kind, seed in written_by_extras(BOX) if kind == ending))
-    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setitem(sys.modules, EXTRAS[extra], None)
     with pytest.raises(MissingExtraError, match=rf"pip install 'rlacd\[{extra}\]'"):
         load_mesh(path)
 
@@ -58,7 +59,7 @@ def test_a_format_whose_extra_is_missing_names_it(tmp_path: Path, ending: str, m
     ],
 )
 def test_damage_is_refused_in_one_sentence(tmp_path: Path, ending: str, content: bytes) -> None:
-    pytest.importorskip(MODULES.get(ending, MODULES["fbx"])[1])
+    pytest.importorskip(EXTRAS[FORMATS.get(ending, "fbx")])
     (tmp_path / f"a.{ending}").write_bytes(content)
     says = r"not obj but fbx: rename it to \.fbx" if ending == "obj" else "export"
     with pytest.raises((MeshFileError, EmptyMeshError), match=says) as said:

@@ -117,13 +117,6 @@ def read(path: Path, content: bytes) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, mesh.faces)
 
 
-@pytest.mark.parametrize("kind", WRITERS)
-@pytest.mark.parametrize("first", range(len(L)))
-def test_an_l_is_an_l_in_every_format(tmp_path: Path, kind: str, first: int) -> None:
-    turn = trimesh.transformations.random_rotation_matrix(np.array([0.2, 0.5, 0.9]))[:3, :3]
-    assert_is_prism(read(tmp_path / f"l.{kind}", WRITERS[kind](prism(L, turn, first=first))), L)
-
-
 def test_an_l_of_usd(tmp_path: Path) -> None:
     Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
     from pxr import UsdGeom
