@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from tests.io.hostile.gltf import glb
+
 Json = dict[str, Any]
 
 
@@ -114,11 +116,7 @@ class Rig:
     def glb(self, path: Path) -> Path:
         """Write one binary file, with a chunk at its end that no reader knows."""
         header = {**self.header, "buffers": [{"byteLength": len(self.binary), "name": "all"}]}
-        text = json.dumps(header).encode()
-        text += b" " * (-len(text) % 4)
-        chunks = ((b"JSON", text), (b"BIN\0", self.binary), (b"XTRA", b"unknown!"))
-        body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
-        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+        path.write_bytes(glb(header, self.binary, b"unknown!"))
         return path
 
     def gltf(self, path: Path, *, embedded: bool = False) -> Path:

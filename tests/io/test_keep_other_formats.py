@@ -214,10 +214,10 @@ def lamp(folder: Path) -> Path:
     pytest.importorskip("pxr", reason="the extra usd is not installed")
     from pxr import Sdf, Usd, UsdShade
 
-    from tests.io.test_load_usd import add_mesh
+    from tests.io.test_load_usd import add_box
 
     stage = Usd.Stage.CreateNew(str(folder / "lamp.usda"))
-    foot, shade, _ = (add_mesh(stage, f"/Lamp/{name}", trimesh.creation.box()) for name in ("foot", "shade", "plain"))
+    foot, shade, _ = (add_box(stage, f"/Lamp/{name}") for name in ("foot", "shade", "plain"))
     shade.CreateDisplayColorAttr([(0.2, 0.4, 0.8)])
     material = UsdShade.Material.Define(stage, "/Lamp/brass")
     shader = UsdShade.Shader.Define(stage, "/Lamp/brass/surface")

@@ -13,6 +13,7 @@ import trimesh
 from rlacd.errors import MeshDataError, MeshError, MeshFileError
 from rlacd.io.read.load import load_mesh
 from tests.assets import write_mesh
+from tests.io.hostile.archives import zipped
 from tests.io.hostile.gltf import gltf, gltf_tree, reference
 
 FORMATS = ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf"]
@@ -21,13 +22,6 @@ BOX = trimesh.creation.box(extents=(1, 2, 3))
 OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in BOX.vertices.tolist())
 OBJ += "v 0 0 0\n" + "".join(f"f {a} {b} {c}\n" for a, b, c in (BOX.faces + 1).tolist())
 DAE = BOX.export(file_type="dae")
-
-
-def zipped(name, content):
-    archive = io.BytesIO()
-    with zipfile.ZipFile(archive, "w") as file:
-        file.writestr(name, content)
-    return archive.getvalue()
 
 
 def triangles(mesh):
@@ -137,11 +131,11 @@ def test_counts_of_every_variant_of_off_are_held_against_the_file(tmp_path, lett
         ("a.obj", b"v 1 2\n" + OBJ.encode(), "a vertex of 2 coordinates"),
         *(("a.obj", f"{OBJ}f 1 2 {corner}\n".encode(), "counts from 1") for corner in ("0", "0/1", "-0", "0//1 # 1")),
         ("a.dae", DAE.replace(b"<library_geometries>", b"<library_geometries>\0", 1), "damaged or cut off"),
-        ("a.zae", zipped("box.dae", DAE.replace(b"</p>", b" x</p>", 1)), "they are damaged"),
+        ("a.zae", zipped({"box.dae": DAE.replace(b"</p>", b" x</p>", 1)}), "they are damaged"),
         ("a.blend", b"BLENDER-v400", "export it from Blender"),
         ("a.obj.gz", b"\x1f\x8b\x08", "unpack it"),
-        ("a.zip", zipped("a.obj", OBJ.encode()), "unpack it"),
-        ("a.obj", zipped("a.obj", OBJ.encode()), ""),
+        ("a.zip", zipped({"a.obj": OBJ}), "unpack it"),
+        ("a.obj", zipped({"a.obj": OBJ}), ""),
         ("a.7z", b"7z\xbc\xaf\x27\x1c", "unpack it"),
     ],
 )

@@ -118,15 +118,9 @@ def read(path: Path, content: bytes) -> trimesh.Trimesh:
 
 
 def test_an_l_of_usd(tmp_path: Path) -> None:
-    Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
-    from pxr import UsdGeom
-
-    points, polygons = prism(L, first=3)
-    stage = Usd.Stage.CreateNew(str(tmp_path / "l.usda"))
-    mesh = UsdGeom.Mesh.Define(stage, "/l")
-    mesh.CreatePointsAttr(points.tolist())
-    mesh.CreateFaceVertexCountsAttr([len(p) for p in polygons])
-    mesh.CreateFaceVertexIndicesAttr([corner for p in polygons for corner in p])
+    usd = pytest.importorskip("tests.io.test_load_usd")
+    stage = usd.Usd.Stage.CreateNew(str(tmp_path / "l.usda"))
+    usd.add_mesh(stage, "/l", *prism(L, first=3))
     stage.Save()
     loaded = load_mesh(tmp_path / "l.usda")
     assert_is_prism(trimesh.Trimesh(loaded.vertices, loaded.faces), L)

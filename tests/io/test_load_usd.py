@@ -16,12 +16,17 @@ Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
 from pxr import Gf, Sdf, UsdGeom, UsdUtils, Vt  # noqa: E402
 
 
-def add_mesh(stage: Any, path: str, shape: trimesh.Trimesh) -> Any:
+def add_mesh(stage: Any, path: str, points: Any, polygons: Any) -> Any:
     mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.asarray(shape.vertices, dtype=np.float32)))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray([3] * len(shape.faces)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray(shape.faces.ravel().tolist()))
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.asarray(points, dtype=np.float32)))
+    mesh.CreateFaceVertexCountsAttr([len(polygon) for polygon in polygons])
+    mesh.CreateFaceVertexIndicesAttr([int(corner) for polygon in polygons for corner in polygon])
     return mesh
+
+
+def add_box(stage: Any, path: str, size: tuple[float, float, float] = (1, 1, 1)) -> Any:
+    box = trimesh.creation.box(size)
+    return add_mesh(stage, path, box.vertices, box.faces)
 
 
 def cupboard(path: Path) -> Path:
@@ -32,14 +37,11 @@ def cupboard(path: Path) -> Path:
     top = UsdGeom.Xform.Define(stage, "/Cupboard")
     top.AddTranslateOp().Set(Gf.Vec3d(1, 2, 3))
     top.AddRotateZOp().Set(90.0)
-    add_mesh(stage, "/Cupboard/box", trimesh.creation.box((2, 4, 6))).AddTranslateOp().Set(Gf.Vec3d(10, 0, 0))
-    quad = UsdGeom.Mesh.Define(stage, "/Cupboard/door")
-    quad.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
-    quad.CreateFaceVertexCountsAttr([4])
-    quad.CreateFaceVertexIndicesAttr([0, 1, 2, 3])
+    add_box(stage, "/Cupboard/box", (2, 4, 6)).AddTranslateOp().Set(Gf.Vec3d(10, 0, 0))
+    quad = add_mesh(stage, "/Cupboard/door", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [range(4)])
     quad.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
-    add_mesh(stage, "/Cupboard/hidden", trimesh.creation.box()).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
-    add_mesh(stage, "/Cupboard/guide", trimesh.creation.box()).CreatePurposeAttr(UsdGeom.Tokens.guide)
+    add_box(stage, "/Cupboard/hidden").CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+    add_box(stage, "/Cupboard/guide").CreatePurposeAttr(UsdGeom.Tokens.guide)
     stage.Save()
     return path
 
@@ -85,7 +87,7 @@ def test_primitives_are_read_as_meshes(tmp_path: Path, axis: str) -> None:
 
 def test_instances_are_read_each_where_it_stands(tmp_path: Path) -> None:
     add = Usd.Stage.CreateNew(str(tmp_path / "wheel.usda"))
-    add_mesh(add, "/Wheel/tyre", trimesh.creation.box())
+    add_box(add, "/Wheel/tyre")
     add.SetDefaultPrim(add.GetPrimAtPath("/Wheel"))
     add.Save()
     stage = Usd.Stage.CreateNew(str(tmp_path / "cart.usda"))
@@ -125,12 +127,9 @@ def test_a_file_that_crashes_openusd_is_refused(tmp_path: Path, changes: dict[in
 
 def test_faces_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     for number, (counts, corners) in enumerate([([3], [0, 1]), ([-3, 6], [0, 1, 2]), ([3], [0, 1, 9])]):
-        path = tmp_path / f"{number}.usda"
-        stage = Usd.Stage.CreateNew(str(path))
-        mesh = UsdGeom.Mesh.Define(stage, "/m")
-        mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
-        mesh.CreateFaceVertexCountsAttr(counts)
-        mesh.CreateFaceVertexIndicesAttr(corners)
+        stage = Usd.Stage.CreateNew(str(tmp_path / f"{number}.usda"))
+        mesh = add_mesh(stage, "/m", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [corners])
+        mesh.GetFaceVertexCountsAttr().Set(counts)
         stage.Save()
         with pytest.raises(MeshFileError, match="export it again"):
-            load_mesh(path)
+            load_mesh(tmp_path / f"{number}.usda")

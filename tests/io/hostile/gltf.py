@@ -39,13 +39,12 @@ def gltf(**changes: Any) -> bytes:
     return json.dumps(gltf_tree(**changes)).encode()
 
 
-def glb(tree: dict[str, Any], binary: bytes = b"") -> bytes:
+def glb(tree: dict[str, Any], *binary: bytes) -> bytes:
+    """A GLB file of a tree and a buffer; what else there is follows in a chunk that no reader knows."""
     text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
-    if binary:
-        chunks += struct.pack("<II", len(binary), 0x004E4942) + binary
-    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+    chunks = zip((b"JSON", b"BIN\0", b"XTRA"), (text + b" " * (-len(text) % 4), *binary), strict=False)
+    body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
 def accessors(*changes: dict[str, Any]) -> list[dict[str, Any]]:
