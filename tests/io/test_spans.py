@@ -54,3 +54,5 @@ def test_setting_attributes_of_any_element_changes_nothing_else(text: str, data:
     assert after.startswith(root.file.data[: element.start])
     assert after.endswith(root.file.data[element.end :])
     assert root.file.data[element.head : element.end] in after
+    if wanted.keys().isdisjoint(element.attributes):
+        assert after.replace(f" tnew={quoteattr(wanted['tnew'])}".encode(), b"", 1) == root.file.data

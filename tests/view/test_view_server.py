@@ -24,6 +24,7 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 
+import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import OptionError, OutputError
 from rlacd.options import Options
@@ -208,13 +209,19 @@ def test_bad_options_are_answered_in_a_sentence_and_change_nothing(viewer: ViewS
 
 
 def test_the_input_is_there_before_any_hull(mesh: Path) -> None:
-    with open_viewer(mesh, {"quality": "best"}, port=0) as viewer:
+    go = threading.Event()
+
+    def late(*words: Any, **options: Any) -> rlacd.Decomposition:
+        assert go.wait(PATIENCE)
+        return rlacd.decompose(*words, **options)
+
+    with open_viewer(mesh, {"quality": "fast"}, decompose=late, port=0) as viewer:
         scene = ask(viewer, "GET", "/scene").json
-        if scene["report"] is None:  # a machine may be quicker than this
-            assert scene["parts"] == []
-        assert scene["name"] == NAME
+        go.set()
+        assert (scene["report"], scene["parts"], scene["name"]) == (None, [], NAME)
         assert scene["input"]["faces"]
         assert scene["scale"] == pytest.approx(1.0)
+        settled(viewer, run=1)
 
 
 def post_file(viewer: ViewServer, name: str, content: bytes, **headers: str) -> Answer:

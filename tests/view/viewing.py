@@ -15,9 +15,11 @@ from rlacd.view.server import ViewServer
 PATIENCE = 60.0
 
 
-def open_viewer(mesh: Any, options: dict[str, Any] | None = None, **given: Any) -> AbstractContextManager[ViewServer]:
+def open_viewer(
+    mesh: Any, options: dict[str, Any] | None = None, *, decompose: Any = rlacd.decompose, **given: Any
+) -> AbstractContextManager[ViewServer]:
     """Open it with what decomposes here."""
-    return viewer.open_viewer(mesh, rlacd.decompose, options, **given)
+    return viewer.open_viewer(mesh, decompose, options, **given)
 
 
 class Answer:
