@@ -81,11 +81,13 @@ def test_ply_keeps_hulls_apart_exact_and_coloured(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["obj", "ply", "stl"])
 def test_a_second_parser_reads_the_same(tmp_path: Path, ending: str) -> None:
     pcu = pytest.importorskip("point_cloud_utils", reason="it has no wheel for some processors and new Pythons")
-    vertices, faces = pcu.load_mesh_vf(str(save_hulls(THREE[:1], tmp_path / f"out.{ending}")))
+    path = save_hulls(THREE[:1], tmp_path / f"out.{ending}")
+    vertices, faces = pcu.load_mesh_vf(str(path))
     mesh = trimesh.Trimesh(vertices, faces, process=ending == "stl")
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(THREE[0].volume, rel=1e-5)
     assert len(faces) == len(THREE[0].faces)
+    assert ending != "stl" or path.stat().st_size == 84 + 50 * len(faces), "binary, which every reader accepts"
 
 
 @pytest.mark.parametrize("ending", FORMATS)
