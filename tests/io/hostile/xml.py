@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from tests.io.hostile.archives import MESH, model, threemf, zipped
 from tests.io.hostile.registry import BOX, harmless, refused
 
@@ -59,16 +62,17 @@ def _() -> bytes:
     return collada(scene=f'<node id="n"><instance_geometry url="#g"/></node>{include}')
 
 
-for kind, (doctype, entity) in ENTITIES.items():
-    dae = collada(doctype=doctype, numbers=entity)
-    items, named = f'<item objectid="1"/>{entity}', f'<object id="1" name="{entity[:5000]}">{MESH}</object>'
-    for ending, content in {
-        ".dae": dae,
-        " in UTF-16.dae": dae.decode().replace("utf-8", "utf-16").encode("utf-16"),
-        ".3mf": threemf(model(doctype=doctype, items=items)),
-        " in an attribute.3mf": threemf(model(doctype=doctype, objects=named)),
-    }.items():
-        refused(kind + ending, "DOCTYPE")(lambda content=content: content)
+USES: dict[str, Callable[[str, str], bytes]] = {
+    ".dae": lambda doctype, used: collada(doctype=doctype, numbers=used),
+    " in UTF-16.dae": lambda *of: USES[".dae"](*of).decode().replace("utf-8", "utf-16").encode("utf-16"),
+    ".3mf": lambda doctype, used: threemf(model(doctype=doctype, items=f'<item objectid="1"/>{used}')),
+    " in an attribute.3mf": lambda doctype, used: threemf(
+        model(doctype=doctype, objects=f'<object id="1" name="{used[:5000]}">{MESH}</object>')
+    ),
+}
+for kind, entity in ENTITIES.items():
+    for ending, write in USES.items():
+        refused(kind + ending, "DOCTYPE")(partial(write, *entity))
 refused("elements a hundred thousand deep.dae", "deep|again")(
     lambda: collada(scene="<node>" * 100_000 + "</node>" * 100_000)
 )
