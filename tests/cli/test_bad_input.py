@@ -225,6 +225,12 @@ def test_cancelled_at_any_step_the_hulls_still_cover_the_solid() -> None:
         assert result.report["hausdorff"]["under"] < 2e-3
 
 
+def test_an_exception_of_the_callback_is_the_callers_own() -> None:
+    with pytest.raises(ZeroDivisionError):
+        rlacd.decompose((ELL, FACES), progress=lambda progress: bool(1 / 0), threads=2)
+    assert len(rlacd.decompose((ELL, FACES), threads=2)) == 2, "the next run is not disturbed"
+
+
 # --- files, through the command line ----------------------------------------------------------------------------------
 
 
