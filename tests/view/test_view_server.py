@@ -12,6 +12,7 @@ import shlex
 import socket
 import sys
 import threading
+import time
 import urllib.parse
 import zipfile
 from collections.abc import Callable, Iterator
@@ -57,8 +58,10 @@ def events(viewer: ViewServer) -> Iterator[dict[str, Any]]:
     connection.request("GET", "/events")
     response = connection.getresponse()
     assert response.headers["Content-Type"] == "text/event-stream"
+    end = time.monotonic() + PATIENCE
     try:
-        for line in response:
+        for line in response:  # also where nothing changes: signs of life
+            assert time.monotonic() < end, "what is waited for does not come"
             if line.startswith(b"data: "):
                 yield json.loads(line.removeprefix(b"data: "))
     finally:
