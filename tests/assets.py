@@ -6,25 +6,22 @@ import base64
 import copy
 import json
 import struct
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 
+from tests.io.hostile.gltf import glb
+
 Json = dict[str, Any]
 
 
 def png() -> bytes:
     """A picture of 2 by 2 pixels."""
-
-    def piece(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    pixels = b"".join(b"\0" + bytes([200, 30, 30, 30, 30, 200]) for _ in range(2))
-    header = struct.pack(">IIBBBBB", 2, 2, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + piece(b"IHDR", header) + piece(b"IDAT", zlib.compress(pixels)) + piece(b"IEND", b"")
+    return base64.b64decode(
+        "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAIAAAD91JpzAAAAEElEQVR4nGM4IQcEJxggFAAcfgQRs56ClAAAAABJRU5ErkJggg=="
+    )
 
 
 class Rig:
@@ -119,11 +116,7 @@ class Rig:
     def glb(self, path: Path) -> Path:
         """Write one binary file, with a chunk at its end that no reader knows."""
         header = {**self.header, "buffers": [{"byteLength": len(self.binary), "name": "all"}]}
-        text = json.dumps(header).encode()
-        text += b" " * (-len(text) % 4)
-        chunks = ((b"JSON", text), (b"BIN\0", self.binary), (b"XTRA", b"unknown!"))
-        body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
-        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+        path.write_bytes(glb(header, self.binary, b"unknown!"))
         return path
 
     def gltf(self, path: Path, *, embedded: bool = False) -> Path:
@@ -173,15 +166,15 @@ def view_of(header: Json, binary: bytes, view: int) -> bytes:
     return binary[known["byteOffset"] :][: known["byteLength"]]
 
 
-def painted_obj(folder: Path) -> Path:
-    """A crate as OBJ with half its faces of wood, which is a picture, and half in red."""
-    crate = trimesh.creation.box((1, 2, 3))
-    lines = ["mtllib crate.mtl", "o crate", *("v {:g} {:g} {:g}".format(*point) for point in crate.vertices)]
-    lines += ["vt 0 0", "vt 1 0", "vt 1 1"]
-    for half, paint in enumerate(("wood", "red")):
-        lines.append(f"usemtl {paint}")
-        for corners in crate.faces[half::2] + 1:
-            lines.append("f " + " ".join(f"{corner}/{place}" for place, corner in enumerate(corners, start=1)))
+def painted_obj(folder: Path, *names: str) -> Path:
+    """Crates side by side as OBJ, each with half its faces of wood, which is a picture, and half in red."""
+    lines = ["mtllib crate.mtl", "vt 0 0", "vt 1 0", "vt 1 1"]
+    for number, name in enumerate(names or ["crate"]):
+        crate = trimesh.creation.box((1, 2, 3)).apply_translation((5 * number, 0, 0))
+        lines += [f"o {name}", *("v {:g} {:g} {:g}".format(*point) for point in crate.vertices)]
+        for half, paint in enumerate(("wood", "red")):
+            faces = crate.faces[half::2] + 1 + 8 * number
+            lines += [f"usemtl {paint}", *("f {}/1 {}/2 {}/3".format(*face) for face in faces)]
     path = folder / "crate.obj"
     path.write_text("\n".join(lines) + "\n")
     paints = ["newmtl wood", "Kd 1 1 1", "map_Kd wood.png", "newmtl red", "Kd 1 0 0"]

@@ -9,7 +9,8 @@ import os
 import re
 import time
 from collections.abc import Callable
-from multiprocessing.connection import Connection
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -32,52 +33,31 @@ PATIENCE = 900.0
 """Seconds by the clock after which a process is taken to be stuck."""
 
 
-class Died(AssertionError):
-    """The process crashed, or was ended because it took too long."""
-
-
 def bounded(
-    function: Callable[..., Any], *args: Any, memory: int = 2**30, seconds: int = 60, needs: str | None = None
+    function: Callable[..., Any], *args: Any, memory: int = 2**30, seconds: int = 60, needs: str = "rlacd"
 ) -> Any:
     """What `function` returns or raises, called in a process that may take `memory` more bytes of address space.
 
     It may use this many `seconds` of CPU time; time spent waiting for a processor does not count.
-    A module that it `needs` is imported before that is counted.
+    The module that it `needs` is imported before that is counted.
     """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each of its threads reserves memory of its own
     _server.set_forkserver_preload(PRELOADED)
-    here, there = _server.Pipe(duplex=False)
-    process = _server.Process(target=_answer, args=(there, memory, seconds, needs, function, args))
-    process.start()
-    there.close()
+    pool = ProcessPoolExecutor(1, _server, _limit, (memory, seconds, needs))
     try:
-        if not here.poll(PATIENCE):
-            raise Died(f"no answer within {PATIENCE:g} s")
-        kind, value = here.recv()
-    except EOFError:
-        process.join()
-        raise Died(f"ended with code {process.exitcode}") from None
+        return pool.submit(function, *args).result(PATIENCE)
+    except BrokenProcessPool as error:
+        raise AssertionError("it crashed, or was ended because it took too long") from error
     finally:
-        process.kill()
-        process.join()
-    if kind == "raised":
-        raise value
-    return value
+        for process in list(pool._processes.values()):
+            process.kill()
+        pool.shutdown()
 
 
-def _answer(
-    pipe: Connection, memory: int, seconds: int, needs: str | None, function: Callable[..., Any], args: tuple[Any, ...]
-) -> None:
-    if needs is not None:
-        importlib.import_module(needs)
+def _limit(memory: int, seconds: int, needs: str) -> None:
+    importlib.import_module(needs)
     held = int(re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text(encoding="utf-8"))[1]) * 1024  # type: ignore[index]
     resource.setrlimit(resource.RLIMIT_AS, (held + memory, held + memory))
     spent = math.ceil(time.process_time())
     resource.setrlimit(resource.RLIMIT_CPU, (spent + seconds, spent + seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    try:
-        answer: tuple[str, Any] = ("returned", function(*args))
-    except BaseException as error:  # which one it is, is what is tested
-        error.__cause__ = error.__context__ = None
-        answer = ("raised", error)
-    pipe.send(answer)

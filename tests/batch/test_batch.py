@@ -146,27 +146,34 @@ MJCF = """<mujoco><asset><mesh name="m" file="meshes/l.obj"/></asset>
 <worldbody><body><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
 
 
-def test_robots_are_worked_on_like_meshes_and_other_xml_is_passed_over(tmp_path: Path) -> None:
+def test_robots_and_stages_are_worked_on_like_meshes_and_other_xml_is_passed_over(tmp_path: Path) -> None:
     assets, out = tmp_path / "in", tmp_path / "out"
     box(assets / "meshes" / "l.obj")
     for name, text in (("r.urdf", URDF), ("r.xml", MJCF), ("package.xml", "<package/>"), ("bad.urdf", "no robot")):
         box(assets / name, text.encode())
     box(assets / "wide.xml", MJCF.encode("utf-16"))
-    run = batch(assets, "-o", out, "--jobs", 1, "--quality", "fast")
+    robots_usd = pytest.importorskip("tests.io.test_robots_usd")
+    robots_usd.write_stage(assets / "stage.usda")
+    how = ("--quality", "fast", "--format", "usd")
+    run = batch(assets, "-o", out, "--jobs", 1, *how)
     assert run.exit_code == 5, run.output
     assert "1 file (1 .xml)" in run.stderr
     told = rows(out)
     assert {name: row["status"] for name, row in told.items()} == {
-        **dict.fromkeys(["r.urdf", "r.xml", "meshes/l.obj"], "done"),
+        **dict.fromkeys(["r.urdf", "r.xml", "meshes/l.obj", "stage.usda"], "done"),
         **dict.fromkeys(["bad.urdf", "wide.xml"], "failed"),
     }
     assert "save it as UTF-8" in told["wide.xml"]["error"]
     assert set(told["r.urdf"]["outputs"]) == {"r.urdf", "r_urdf/r_l_000.obj", "r_urdf/r_hulls.json"}
     assert b"r_urdf/r_l_000.obj" in (out / "r.urdf").read_bytes()
-    again = batch(assets, "-o", out, "--glob", "*.urdf", "--quality", "fast")
+    (assets / "stage.usda").unlink()
+    stage = robots_usd.Usd.Stage.Open(str(out / "stage.usd"))
+    assert stage.GetPrimAtPath("/robot/table")
+    assert len(robots_usd.colliders(stage)) == told["stage.usda"]["parts"] > 1
+    again = batch(assets, "-o", out, "--glob", "*.urdf", *how)
     assert "0 now" in again.stderr
     write_ell(assets / "meshes" / "l.obj")
-    changed = batch(assets, "-o", out, "--glob", "r.*", "--jobs", 1, "--quality", "fast")
+    changed = batch(assets, "-o", out, "--glob", "r.*", "--jobs", 1, *how)
     assert "2 of 2 meshes are done" in changed.stderr
     assert rows(out)["r.urdf"]["parts"] > 1, "done again when a mesh has changed"
 
@@ -199,20 +206,6 @@ def test_a_folder_of_robots_with_their_meshes_beside_them_takes_one_command(tmp_
         assert len(pybullet.getCollisionShapeData(body, -1)) == row["parts"] > 1
         assert len(pybullet.getVisualShapeData(body)) == 1
     pybullet.disconnect()
-
-
-def test_a_stage_that_collides_becomes_a_stage_with_hulls(tmp_path: Path) -> None:
-    pytest.importorskip("pxr", reason="the extra usd is not installed")
-    from tests.io.test_robots_usd import Usd, colliders, write_stage
-
-    (tmp_path / "in").mkdir()
-    write_stage(tmp_path / "in" / "r.usda")
-    run = batch(tmp_path / "in", "-o", tmp_path / "out", "--format", "usd", "--jobs", 1, "--quality", "fast")
-    assert run.exit_code == 0, run.output
-    (tmp_path / "in" / "r.usda").unlink()
-    stage = Usd.Stage.Open(str(tmp_path / "out" / "r.usd"))
-    assert stage.GetPrimAtPath("/robot/table")
-    assert len(colliders(stage)) == rows(tmp_path / "out")["r.usda"]["parts"] > 1
 
 
 def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ import dataclasses
 import inspect
 import json
 import os
-import shutil
 from pathlib import Path
 
 import pytest
@@ -24,7 +23,6 @@ from rlacd.cli.batch import COMMAND
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OutputError
 from rlacd.options import Options
-from tests.batch.trouble import write_ell
 from tests.hulls import save_hulls
 
 NOT_OPTIONS = ("self", "path", "file_format", "scene")
@@ -38,29 +36,25 @@ def touch(folder: Path, *names: str) -> None:
         (folder / name).write_bytes(b"x")
 
 
-def test_meshes_of_all_depths_are_found_in_order_and_nothing_else(tmp_path: Path) -> None:
+def test_meshes_of_all_depths_and_links_to_files_are_found_in_order_and_nothing_else(tmp_path: Path) -> None:
     touch(tmp_path, "b/椅子.OBJ", "a.stl", "notes.txt", ".hidden/c.obj", "b/.d.obj", "out/e.glb", "b/deep/er/f.3mf")
+    (tmp_path / "link.obj").symlink_to(tmp_path / "b" / "椅子.OBJ")
+    (tmp_path / "round").symlink_to(tmp_path)
+    (tmp_path / "broken.obj").symlink_to(tmp_path / "nowhere")
     names = [asset.name for asset in find_assets(tmp_path, leave_out=tmp_path / "out")]
-    assert names == ["a.stl", "b/deep/er/f.3mf", "b/椅子.OBJ"]
+    assert names == ["a.stl", "b/deep/er/f.3mf", "b/椅子.OBJ", "broken.obj", "link.obj"]
 
 
-def test_hulls_that_decompose_wrote_among_the_meshes_are_passed_over(tmp_path: Path) -> None:
-    touch(tmp_path, "a.stl", "a_hulls.glb", "b/c.obj", "b/c_hulls.stl", "own_hulls.glb", "b/a_hulls.obj")
-    save_hulls([trimesh.creation.box()], f"{tmp_path}/b/hulls/", stem="mesh", file_format="stl")
-    touch(tmp_path, "b/hulls/mesh_001.stl")
-    names = [asset.name for asset in find_assets(tmp_path)]
-    assert names == ["a.stl", "b/a_hulls.obj", "b/c.obj", "b/hulls/mesh_001.stl", "own_hulls.glb"]
-
-
-def test_hulls_are_passed_over_under_any_name(tmp_path: Path) -> None:
+def test_hulls_among_the_meshes_are_passed_over_by_what_is_in_them(tmp_path: Path) -> None:
     box = trimesh.creation.box()
-    box.export(tmp_path / "box.glb")
-    box.export(tmp_path / "box.obj")
-    for ending in ("glb", "obj", "ply"):
-        save_hulls([box], tmp_path / f"result.{ending}")
+    touch(tmp_path, "a.stl", "a_hulls.glb", "b/c.obj", "b/c_hulls.stl", "own_hulls.glb", "b/a_hulls.obj")
+    save_hulls([box], f"{tmp_path}/b/hulls/", stem="mesh", file_format="stl")
+    touch(tmp_path, "b/hulls/mesh_001.stl")
+    for name in ("result.glb", "result.obj", "result.ply"):
+        save_hulls([box], tmp_path / name)
     rlacd.decompose(box, quality="fast").save(tmp_path / "model.xml")
     names = [asset.name for asset in find_assets(tmp_path)]
-    assert names == ["box.glb", "box.obj"]
+    assert names == ["a.stl", "b/a_hulls.obj", "b/c.obj", "b/hulls/mesh_001.stl", "own_hulls.glb"]
 
 
 @pytest.mark.parametrize(
@@ -73,17 +67,12 @@ def test_hulls_are_passed_over_under_any_name(tmp_path: Path) -> None:
         ("nothing", []),
     ],
 )
-def test_a_glob_picks_by_the_last_part_or_the_whole_name(tmp_path: Path, glob: str, names: list[str]) -> None:
+def test_a_glob_picks_by_the_last_part_or_the_whole_name_and_decides_no_place(
+    tmp_path: Path, glob: str, names: list[str]
+) -> None:
     touch(tmp_path, "a.obj", "a.stl", "x/a.obj", "x/y/b.obj")
-    assert [asset.name for asset in find_assets(tmp_path, glob)] == names
-
-
-def test_what_a_result_is_called_does_not_depend_on_the_glob(tmp_path: Path) -> None:
-    touch(tmp_path, "a.obj", "a.stl", "b.obj")
-    everything = {asset.name: asset.place for asset in find_assets(tmp_path)}
-    assert everything == {"a.obj": "a.obj", "a.stl": "a.stl", "b.obj": "b"}
-    for glob in ("*.obj", "*.stl"):
-        assert all(everything[asset.name] == asset.place for asset in find_assets(tmp_path, glob))
+    places = {"a.obj": "a.obj", "a.stl": "a.stl", "x/a.obj": "x/a", "x/y/b.obj": "x/y/b"}
+    assert {asset.name: asset.place for asset in find_assets(tmp_path, glob)} == {name: places[name] for name in names}
 
 
 @pytest.mark.slow
@@ -94,43 +83,20 @@ def test_no_two_results_share_a_name_on_any_disk(names: set[str]) -> None:
     assert len({place.casefold() for place in places.values()}) == len(names)
 
 
-def test_links_to_files_count_and_links_to_folders_do_not(tmp_path: Path) -> None:
-    touch(tmp_path, "real/a.obj")
-    (tmp_path / "link.obj").symlink_to(tmp_path / "real" / "a.obj")
-    (tmp_path / "round").symlink_to(tmp_path)
-    (tmp_path / "broken.obj").symlink_to(tmp_path / "nowhere")
-    assert [asset.name for asset in find_assets(tmp_path)] == ["broken.obj", "link.obj", "real/a.obj"]
-
-
 # --- the key of a result ----------------------------------------------------------------------------------------------
 
 
-def gltf(folder: Path, buffer: bytes) -> str:
-    mesh = trimesh.creation.box()
-    files = trimesh.exchange.gltf.export_gltf(trimesh.Scene(mesh), merge_buffers=True)
-    folder.mkdir(exist_ok=True)
-    for name, data in files.items():
-        (folder / name).write_bytes(data)
-    (folder / "gltf_buffer.bin").write_bytes(buffer)
-    (asset,) = find_assets(folder)
-    return content_hash(asset.files())
-
-
-def test_the_buffer_a_gltf_file_names_is_part_of_the_mesh(tmp_path: Path) -> None:
-    assert gltf(tmp_path, b"one") == gltf(tmp_path / "again", b"one")
-    shutil.rmtree(tmp_path / "again")
-    assert gltf(tmp_path, b"one") != gltf(tmp_path, b"two")
-
-
-def test_a_buffer_outside_the_folder_is_not_read(tmp_path: Path) -> None:
-    (tmp_path / "secret.bin").write_bytes(b"secret")
-    inside = tmp_path / "in"
-    inside.mkdir()
+def test_the_buffers_of_a_gltf_file_in_its_folder_are_part_of_the_mesh_and_others_are_not_read(tmp_path: Path) -> None:
+    touch(tmp_path, "secret.bin", "in/b c.bin")
     uris = ["../secret.bin", str(tmp_path / "secret.bin"), "data:,x", "b%20c.bin", "missing.bin"]
-    (inside / "m.gltf").write_text(json.dumps({"asset": {}, "buffers": [{"uri": uri} for uri in uris]}))
-    (inside / "b c.bin").write_bytes(b"b")
-    (asset,) = find_assets(inside)
+    (tmp_path / "in/m.gltf").write_text(json.dumps({"asset": {}, "buffers": [{"uri": uri} for uri in uris]}))
+    (asset,) = find_assets(tmp_path / "in")
+    before = content_hash(asset.files())
     assert list(asset.files()) == ["m.gltf", "b c.bin"]
+    (tmp_path / "secret.bin").write_bytes(b"another")
+    assert content_hash(asset.files()) == before
+    (tmp_path / "in/b c.bin").write_bytes(b"y")
+    assert content_hash(asset.files()) != before
 
 
 def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
@@ -229,23 +195,17 @@ def test_rows_outlive_a_run_that_never_ended(store: ResultStore) -> None:
     assert store.read("m.jsonl") == before
 
 
-def test_a_row_removes_the_files_only_its_forerunner_had(store: ResultStore) -> None:
+def test_a_row_removes_the_files_that_only_its_forerunner_had_and_none_of_another_mesh(store: ResultStore) -> None:
     for name in ("a.obj", "a_000.obj", "a_001.obj"):
         store.write(name, b"x")
     ledger = Ledger(store, "m.jsonl")
-    ledger.add({"mesh": "a", "outputs": {"a.obj": 1, "a_000.obj": 1, "a_001.obj": 1}})
-    ledger.add({"mesh": "a", "outputs": {"a.obj": 1, "a_000.obj": 1}})
+    ledger.add({"mesh": "a.stl", "outputs": {"a.obj": 1, "a_000.obj": 1, "a_001.obj": 1}})
+    ledger.add({"mesh": "a.stl", "outputs": {"a.obj": 1, "a_000.obj": 1}})
     assert [store.size(name) for name in ("a.obj", "a_000.obj", "a_001.obj")] == [1, 1, None]
-
-
-def test_a_mesh_that_is_gone_cannot_claim_the_result_of_another(store: ResultStore) -> None:
-    store.write("a.glb", b"x")
-    ledger = Ledger(store, "m.jsonl")
-    ledger.add({"mesh": "a.stl", "outputs": {"a.glb": 1}})
-    ledger.add({"mesh": "a.obj", "outputs": {"a.glb": 1}})
-    assert [mesh for mesh in ("a.obj", "a.stl") if ledger.get(mesh)] == ["a.obj"]
+    ledger.add({"mesh": "a.ply", "outputs": {"a.obj": 1}})
+    assert [mesh for mesh in ("a.ply", "a.stl") if ledger.get(mesh)] == ["a.ply"]
     ledger.add({"mesh": "a.stl", "outputs": {}})
-    assert store.size("a.glb") == 1
+    assert store.size("a.obj") == 1
 
 
 def test_half_a_line_is_cut_off_and_a_damaged_one_is_reported(tmp_path: Path) -> None:
@@ -262,7 +222,8 @@ def test_half_a_line_is_cut_off_and_a_damaged_one_is_reported(tmp_path: Path) ->
         Ledger(store, "m.jsonl")
 
 
-def test_two_runs_cannot_write_to_one_folder(tmp_path: Path) -> None:
+def test_two_runs_cannot_write_to_one_folder_and_the_next_sweeps_up_what_a_killed_one_left(tmp_path: Path) -> None:
+    touch(tmp_path, "a/mesh.stl", "a/.rlacd-0123.tmp")
     first, second = FolderStore(tmp_path), FolderStore(tmp_path)
     first.open()
     with pytest.raises(OutputError, match="another run"):
@@ -270,12 +231,4 @@ def test_two_runs_cannot_write_to_one_folder(tmp_path: Path) -> None:
     first.close()
     second.open()
     second.close()
-
-
-def test_opening_sweeps_up_what_a_killed_run_left(tmp_path: Path) -> None:
-    write_ell(tmp_path / "a" / "mesh.stl")
-    (tmp_path / "a" / ".rlacd-0123.tmp").write_bytes(b"half")
-    store = FolderStore(tmp_path)
-    store.open()
-    store.close()
-    assert sorted(os.listdir(tmp_path / "a")) == ["mesh.stl"]
+    assert os.listdir(tmp_path / "a") == ["mesh.stl"]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +56,11 @@ def test_the_largest_and_the_smallest_numbers_there_are() -> None:
     assert np.abs(largest.hulls[0].vertices).max() == np.finfo(float).max
     denormal = check((BOX[0] * 1e-310, BOX[1]))
     assert 0 < np.abs(denormal.hulls[0].vertices).max() < 1e-300
+    points = [[1e308, 0, 4], [-23, 0, 13], [-14, 0, 4], [-14, 0, 13], [-14, 0.1, 13], [1e308, 1.7e308, -1e308]]
+    faces = [[3, 1, 2], [0, 2, 1], [3, 4, 1], [5, 0, 1], [5, 4, 0]]
+    for limits in ({}, {"max_faces": 8}, {"max_vertices": 4}, {"preset": "unreal"}):
+        result = rlacd.decompose((points, faces), threshold=0.2, quality="fast", threads=1, **limits)
+        assert all(np.isfinite(hull.vertices).all() for hull in result)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e-7])
@@ -111,21 +114,14 @@ def test_closed_bodies_that_hide_each_other_count_once() -> None:
         assert sum(hull.volume for hull in all_of_them) == pytest.approx(sum(hull.volume for hull in one), rel=1e-3)
 
 
-FAR = (np.vstack([ELL, [[1e6, 0, 0]]]), np.vstack([FACES, [[0, 1, len(ELL)]]]))
-"""With a triangle that ends far away."""
-
-
-def test_a_triangle_that_ends_far_away_is_kept() -> None:
-    assert check(FAR).report["hausdorff"]["under"] < 1e-3
-
-
 @pytest.mark.promise("loss-named")
-def test_a_triangle_that_is_given_up_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_triangle_that_ends_far_away_is_kept_or_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    far = np.vstack([ELL, [[1e6, 0, 0]]]), np.vstack([FACES, [[0, 1, len(ELL)]]])
+    assert check(far).report["hausdorff"]["under"] < 1e-3
     monkeypatch.setattr(repairing, "MOST_PATCHES", 0)
-    result = check(FAR)
-    missed = result.report["hausdorff"]["under"]
-    assert missed > 1
-    assert any("outside the hulls, farthest near (1e+06, 0, 0)" in sentence for sentence in result.report["warnings"])
+    report = check(far).report
+    assert report["hausdorff"]["under"] > 1
+    assert any("outside the hulls, farthest near (1e+06, 0, 0)" in sentence for sentence in report["warnings"])
 
 
 # --- meshes that give an error ----------------------------------------------------------------------------------------
@@ -209,17 +205,6 @@ def test_an_option_out_of_range_is_named_with_its_range(name: str, value: Any) -
     assert is_one_sentence(str(caught.value))
 
 
-@pytest.mark.parametrize("max_hulls", [1, 2])
-@pytest.mark.parametrize("max_vertices", [None, 4, 8])
-def test_hulls_and_corners_can_be_limited_below_what_fits(max_hulls: int, max_vertices: int | None) -> None:
-    result = check((ELL, FACES), max_hulls=max_hulls, max_vertices=max_vertices)
-    assert len(result) <= max_hulls
-    assert all(len(hull.vertices) <= (max_vertices or np.inf) for hull in result)
-    too_coarse = max_hulls == 1 or max_vertices == 4  # two boxes that cross are what it is
-    assert any("exceed the concavity" in sentence for sentence in result.report["warnings"]) == too_coarse
-    assert result.report["hausdorff"]["under"] < 2e-3
-
-
 # --- stopping ---------------------------------------------------------------------------------------------------------
 
 
@@ -241,14 +226,8 @@ def test_cancelled_at_any_step_the_hulls_still_cover_the_solid() -> None:
 
 
 def test_an_exception_of_the_callback_is_the_callers_own() -> None:
-    class MyError(Exception):
-        pass
-
-    def fail(progress: rlacd.Progress) -> bool:
-        raise MyError
-
-    with pytest.raises(MyError):
-        rlacd.decompose((ELL, FACES), progress=fail, threads=2)
+    with pytest.raises(ZeroDivisionError):
+        rlacd.decompose((ELL, FACES), progress=lambda progress: bool(1 / 0), threads=2)
     assert len(rlacd.decompose((ELL, FACES), threads=2)) == 2, "the next run is not disturbed"
 
 
@@ -306,6 +285,7 @@ def test_any_file_name_works(name: str, tmp_path: Path) -> None:
         ("y" * 300 + ".glb", "too long"),
         ("box.stl/out.glb", "not a folder"),
         ("circle.glb", "cannot write"),
+        ("folder.glb", "it is a folder"),
         ("pipe.obj", "not an ordinary file"),
         ("/proc/out.glb", "cannot write"),
     ],
@@ -315,6 +295,7 @@ def test_an_output_that_cannot_be_written_has_code_3(output: str, says: str, tmp
     creation.box().export(path)
     (tmp_path / "circle.glb").symlink_to(tmp_path / "circle.glb")
     os.mkfifo(tmp_path / "pipe.obj")
+    (tmp_path / "folder.glb").mkdir()
     if output.startswith("/proc") and not Path("/proc/self").exists():
         pytest.skip("no /proc here")
     before = sorted(tmp_path.iterdir())
@@ -348,6 +329,8 @@ def test_links_are_followed_and_their_target_is_never_overwritten(tmp_path: Path
     ("name", "says"),
     [
         ("folder", "is a folder"),
+        ("", "is a folder"),
+        ("..", "is a folder"),
         ("dangling.stl", "does not exist"),
         ("circle.stl", ""),
         ("pipe.stl", "pipe"),
@@ -368,35 +351,3 @@ def test_an_input_that_is_no_file_has_code_2(name: str, says: str, tmp_path: Pat
     assert name in result.stderr
     assert says in result.stderr
     assert not (tmp_path / "out.glb").exists()
-
-
-@pytest.mark.slow
-@pytest.mark.promise("whole-files")
-def test_a_disk_that_is_full_leaves_the_old_file(tmp_path: Path) -> None:
-    """In a process that may write no file larger than 100 bytes: what the system says then ends in one sentence."""
-    resource = pytest.importorskip("resource")
-    path, output = tmp_path / "box.stl", tmp_path / "out.glb"
-    creation.box().export(path)
-    output.write_bytes(b"old")
-    command = [sys.executable, "-m", "rlacd", "decompose", str(path), "-o", str(output)]
-    done = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)),
-    )
-    assert done.returncode == 3, done.stderr
-    assert is_one_sentence(done.stderr)
-    assert output.read_bytes() == b"old"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["box.stl", "out.glb"]
-
-
-@pytest.mark.parametrize("limits", [{}, {"max_faces": 8}, {"max_vertices": 4}, {"preset": "unreal"}])
-def test_hulls_of_coordinates_near_the_largest_number_stay_finite(limits):
-    points = np.array(
-        [[1e308, 0, 4], [-23, 0, 13], [-14, 0, 4], [-14, 0, 13], [-14, 0.1, 13], [1e308, 1.7e308, -1e308]]
-    )
-    faces = [[3, 1, 2], [0, 2, 1], [3, 4, 1], [5, 0, 1], [5, 4, 0]]
-    result = rlacd.decompose((points, faces), threshold=0.2, quality="fast", threads=1, **limits)
-    assert all(np.isfinite(hull.vertices).all() for hull in result)

@@ -6,6 +6,7 @@ writes in the encoding of the system, which differs, is an error.
 
 import builtins
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,73 +15,13 @@ import warnings
 from typing import Any
 
 MODULES = {"fcntl", "grp", "pty", "pwd", "resource", "syslog", "termios", "tty"}
-NAMES = set(
-    [
-        "O_CLOEXEC",
-        "O_DIRECTORY",
-        "O_DSYNC",
-        "O_NOCTTY",
-        "O_NOFOLLOW",
-        "O_NONBLOCK",
-        "O_PATH",
-        "O_SYNC",
-        "O_TMPFILE",
-        "chown",
-        "fchmod",
-        "fchown",
-        "fork",
-        "forkpty",
-        "getegid",
-        "geteuid",
-        "getgid",
-        "getgroups",
-        "getloadavg",
-        "getpgid",
-        "getpriority",
-        "getrandom",
-        "getuid",
-        "killpg",
-        "memfd_create",
-        "mkfifo",
-        "mknod",
-        "nice",
-        "openpty",
-        "posix_spawn",
-        "pread",
-        "pwrite",
-        "sched_getaffinity",
-        "sched_setaffinity",
-        "sched_yield",
-        "sendfile",
-        "setpgid",
-        "setpriority",
-        "setsid",
-        "statvfs",
-        "sync",
-        "sysconf",
-        "ttyname",
-        "uname",
-        "wait3",
-        "wait4",
-        "SIGALRM",
-        "SIGCHLD",
-        "SIGCONT",
-        "SIGHUP",
-        "SIGPIPE",
-        "SIGQUIT",
-        "SIGSTOP",
-        "SIGTSTP",
-        "SIGUSR1",
-        "SIGUSR2",
-        "alarm",
-        "pause",
-        "pthread_kill",
-        "pthread_sigmask",
-        "setitimer",
-        "sigpending",
-        "sigwait",
-        "siginterrupt",
-    ]
+LACKING = re.compile(
+    r"""O_(?!APPEND|CREAT|EXCL|RDONLY|RDWR|TRUNC|WRONLY).+ | SIG(?!ABRT|FPE|ILL|INT|KILL|SEGV|TERM|_).+
+    | (get|set)(e|re|res)?[ug]id | (get|set)(groups|itimer|pgid|priority|sid) | get(loadavg|random)
+    | (posix|pthread|sched)_.+ | sig(interrupt|pending|wait.*) | .*fork.* | (open)?pty | ttyname | killpg | wait[34]
+    | l?f?chown | fchmod | mkfifo | mknod | memfd_create | p(read|write)v? | sendfile | statvfs | sync
+    | alarm | nice | pause | sysconf | uname""",
+    re.VERBOSE,
 )
 """Of `os` and `signal`. (SIGKILL is not on Windows either, but named beside `killpg`.)"""
 
@@ -93,7 +34,7 @@ class Lacking(types.ModuleType):
     """A module some of whose names rlacd cannot see."""
 
     def __getattribute__(self, name: str) -> Any:
-        if name in NAMES and _asked_by_rlacd(sys._getframe(1)):
+        if LACKING.fullmatch(name) and _asked_by_rlacd(sys._getframe(1)):
             raise AttributeError(f"module has no attribute {name!r} on this system")
         return super().__getattribute__(name)
 

@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,9 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rlacd.errors import OptionError, OutputError
+from rlacd.errors import OutputError
 from rlacd.io.write import FORMATS, hull_target
 from rlacd.io.write.palette import hull_colors
-from rlacd.options.output import OutputOptions
 from tests.assets import read_glb
 from tests.hulls import assert_convex_hull, hull_of, moved, random_hull, save_hulls
 
@@ -81,17 +81,13 @@ def test_ply_keeps_hulls_apart_exact_and_coloured(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["obj", "ply", "stl"])
 def test_a_second_parser_reads_the_same(tmp_path: Path, ending: str) -> None:
     pcu = pytest.importorskip("point_cloud_utils", reason="it has no wheel for some processors and new Pythons")
-    vertices, faces = pcu.load_mesh_vf(str(save_hulls(THREE[:1], tmp_path / f"out.{ending}")))
+    path = save_hulls(THREE[:1], tmp_path / f"out.{ending}")
+    vertices, faces = pcu.load_mesh_vf(str(path))
     mesh = trimesh.Trimesh(vertices, faces, process=ending == "stl")
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(THREE[0].volume, rel=1e-5)
     assert len(faces) == len(THREE[0].faces)
-
-
-def test_one_stl_hull_is_binary_and_many_are_solids(tmp_path: Path) -> None:
-    one = save_hulls(THREE[:1], tmp_path / "one.stl").read_bytes()
-    assert len(one) == 84 + 50 * len(THREE[0].faces)
-    assert save_hulls(THREE, tmp_path / "three.stl").read_text().count("endsolid") == 3
+    assert ending != "stl" or path.stat().st_size == 84 + 50 * len(faces), "binary, which every reader accepts"
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -137,8 +133,11 @@ def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_
     plate = trimesh.creation.box((1.0, 1.0, 1e-9))
     plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0]))
     hull = hull_of(plate.vertices)
-    with pytest.raises(OutputError, match=r"hull_000.*single precision.*\.obj"):
-        save_hulls([hull], tmp_path / "thin.glb")
+    for name, says in (("thin.glb", r".*\.obj"), ("thin.xml", ""), ("thin.urdf", ""), ("thin.usda", "")):
+        if name == "thin.usda" and find_spec("pxr") is None:
+            continue
+        with pytest.raises(OutputError, match=rf"hull_000.*too thin for single precision{says}"):
+            save_hulls([hull], tmp_path / name)
     assert list(tmp_path.iterdir()) == []
     for ending in ("obj", "ply", "stl"):
         (mesh,) = load(save_hulls([hull], tmp_path / f"thin.{ending}")).values()
@@ -148,42 +147,12 @@ def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_
 # --- places -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["hulls.fbx", "hulls", "hulls.glb.zip", ".glb"])
-def test_an_unknown_ending_is_refused_with_the_known_ones(tmp_path: Path, name: str) -> None:
-    with pytest.raises(OptionError, match=r"\.glb, \.obj, \.ply, \.stl"):
-        save_hulls(THREE, tmp_path / name)
-
-
 @pytest.mark.parametrize("place", ["new/out.glb", "new/deep/OUT.STL", "new/", "new/deep/er/"])
 def test_missing_folders_are_made_with_the_file(tmp_path: Path, place: str) -> None:
     hull_target(f"{tmp_path}/{place}")
     assert list(tmp_path.iterdir()) == [], "checking makes nothing"
     written = save_hulls(THREE, f"{tmp_path}/{place}")
     assert written.is_dir() if place.endswith("/") else written.stat().st_size > 0
-
-
-def test_places_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("mine")
-    (tmp_path / "folder.glb").mkdir()
-    with pytest.raises(OutputError, match="is a file, not a folder"):
-        hull_target(f"{tmp_path}/file/new/out/")
-    with pytest.raises(OutputError, match="it is a folder"):
-        hull_target(tmp_path / "folder.glb")
-    with pytest.raises(OutputError, match="it is a file, not a folder"):
-        hull_target(f"{tmp_path}/file/")
-    with pytest.raises(OutputError, match="is a file, not a folder"):
-        hull_target(tmp_path / "file" / "out.glb")
-    with pytest.raises(OptionError, match="no name"):
-        hull_target("")
-    for name in ("\0.glb", "y" * 300 + ".stl"):
-        with pytest.raises(OutputError):
-            save_hulls(THREE, tmp_path / name)
-    with pytest.raises(OutputError, match="no hulls"):
-        save_hulls([], tmp_path / "out.glb")
-    with pytest.raises(OptionError, match="contradicts"):
-        hull_target(tmp_path / "out.glb", OutputOptions(file_format="obj"))
-    with pytest.raises(OptionError, match="unknown format"):
-        hull_target(f"{tmp_path}/out/", OutputOptions(file_format="fbx"))
 
 
 # --- whole or not at all ----------------------------------------------------------------------------------------------

@@ -80,20 +80,33 @@ def test_a_textured_animated_scene_comes_back_node_by_node(
         assert sorted(added) == ["UCX_axle_00", "UCX_flag_00", "UCX_wheel_00", "UCX_wheel_01"]
 
 
+def placed(read: trimesh.Scene, node: str) -> trimesh.Trimesh:
+    transform, mesh = read.graph[node]
+    return read.geometry[mesh].copy().apply_transform(transform)
+
+
+@pytest.mark.parametrize(("how", "factor"), [({}, 1), ({"unit": "cm"}, 100), ({"scale": 0.01}, 100)])
 @pytest.mark.promise("scene")
-def test_hulls_lie_around_their_node_wherever_it_goes(tmp_path: Path, cart: Path, apart: rlacd.Decomposition) -> None:
-    """Placed by a reader of its own, each hull covers what its node shows; the scene is stretched, turned, mirrored."""
-    read = trimesh.load_scene(apart.save(tmp_path / "out.glb", file_format="unreal"), process=False)
+def test_hulls_lie_around_their_node_wherever_it_goes_in_the_unit_of_the_scene(
+    tmp_path: Path, cart: Path, how: dict[str, Any], factor: float
+) -> None:
+    """Placed by a reader of its own, each hull covers what its node shows; the scene is stretched, turned, mirrored.
+
+    Hulls alone are converted; in the input's scene they are as large as what they lie around.
+    """
+    result = rlacd.decompose(cart, per_node=True, threads=1, **how)
     before = trimesh.load_scene(cart, process=False)
-    for number, hull in enumerate(apart):
-        node = hull.metadata["node"]
-        transform, mesh = read.graph[f"UCX_{node}_00"]
-        placed = read.geometry[mesh].copy().apply_transform(transform)
-        assert_convex_hull(placed)
-        assert placed.volume == pytest.approx(hull.volume, rel=1e-5)
-        assert np.allclose(placed.bounds, hull.bounds, atol=1e-6)
-        assert apart.report["provenance"][number]["node"] == node
+    assert np.allclose(result.source.extents, before.extents / factor, rtol=1e-5)
+    read = trimesh.load_scene(result.save(tmp_path / "out.glb", file_format="unreal"), process=False)
     assert np.allclose(read.bounds, before.bounds, atol=0.02)
+    for number, hull in enumerate(result):
+        there = placed(read, f"UCX_{hull.metadata['node']}_00")
+        assert_convex_hull(there)
+        assert there.volume == pytest.approx(hull.volume * factor**3, rel=1e-5)
+        assert np.allclose(there.bounds, hull.bounds * factor, atol=1e-5)
+        assert result.report["provenance"][number]["node"] == hull.metadata["node"]
+    alone = trimesh.load_scene(result.save(tmp_path / "hulls.glb"), process=False)
+    assert np.allclose(alone.extents, before.extents / factor, rtol=0.02)
 
 
 def test_hulls_of_a_scene_as_a_whole_know_their_node(tmp_path: Path, cart: Path) -> None:
@@ -140,22 +153,25 @@ def test_nodes_apart_cannot_have_a_navigable_space() -> None:
         rlacd.decompose(trimesh.creation.box(), per_node=True, criterion=rlacd.NavigableSpace(radius=0.1))
 
 
-def test_a_scene_in_memory_keeps_its_looks(tmp_path: Path) -> None:
-    scene = trimesh.Scene()
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_a_scene_in_memory_keeps_its_looks_and_is_not_changed(tmp_path: Path, scale: float) -> None:
     red = trimesh.creation.box((1, 1, 1))
     red.visual = trimesh.visual.ColorVisuals(red, vertex_colors=np.tile([255, 0, 0, 255], (8, 1)))
-    turn = trimesh.transformations.rotation_matrix(0.4, (0, 0, 1)) @ trimesh.transformations.translation_matrix(
-        (3, 0, 0)
-    )
+    turn = trimesh.transformations.rotation_matrix(0.4, (0, 0, 1))
+    turn[:3, 3] = (3, 0, 0)
+    scene = trimesh.Scene()
     scene.add_geometry(red, node_name="crate", transform=turn)
     scene.add_geometry(trimesh.creation.icosphere(2), node_name="ball")
-    result = rlacd.decompose(scene, threads=1)
+    before = scene.bounds.copy()
+    result = rlacd.decompose(scene, threads=1, scale=scale)
     read = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True), process=False)
     assert (np.asarray(read.geometry[read.graph["crate"][1]].visual.vertex_colors)[:, :3] == [255, 0, 0]).all()
-    assert np.allclose(read.graph["crate"][0], turn, atol=1e-6)
+    assert np.allclose(read.graph["crate"][0][:3, 3], scale * turn[:3, 3], atol=1e-6)
+    assert np.allclose(read.bounds, result.source.bounds, atol=0.01)
+    assert np.array_equal(scene.bounds, before)
     for hull in result:
-        transform, mesh = read.graph[f"{hull.metadata['node']}_hull_000"]
-        assert np.allclose(read.geometry[mesh].copy().apply_transform(transform).bounds, hull.bounds, atol=1e-5)
+        there = placed(read, f"{hull.metadata['node']}_hull_000")
+        assert np.allclose(there.bounds, hull.bounds, atol=1e-5)
 
 
 def test_an_input_without_a_scene_is_kept_in_grey(tmp_path: Path) -> None:
@@ -248,21 +264,6 @@ def test_hulls_of_a_scene_in_memory_and_of_other_files_give_way(tmp_path: Path) 
         read = trimesh.load_scene(result.save(tmp_path / "out.glb", file_format="unreal"), process=False)
         assert read.extents.max() == pytest.approx(3.0)
         assert len(read.graph.nodes_geometry) == 2
-
-
-@pytest.mark.parametrize("how", [{"unit": "cm"}, {"scale": 0.01}])
-def test_a_gltf_file_stays_in_its_own_unit(tmp_path: Path, cart: Path, how: dict[str, Any]) -> None:
-    """Hulls alone are converted; in the input's scene they are as large as what they lie around."""
-    result = rlacd.decompose(cart, per_node=True, threads=1, **how)
-    before = trimesh.load_scene(cart, process=False)
-    assert np.allclose(result.source.extents, before.extents / 100, rtol=1e-5)
-    read = trimesh.load_scene(result.save(tmp_path / "out.glb", file_format="unreal"), process=False)
-    assert np.allclose(read.bounds, before.bounds, atol=0.02)
-    for hull in result:
-        transform, mesh = read.graph[f"UCX_{hull.metadata['node']}_00"]
-        assert np.allclose(read.geometry[mesh].copy().apply_transform(transform).bounds, 100 * hull.bounds, atol=1e-5)
-    alone = trimesh.load_scene(result.save(tmp_path / "hulls.glb"), process=False)
-    assert np.allclose(alone.extents, before.extents / 100, rtol=0.02)
 
 
 def test_a_file_of_hulls_alone_is_decomposed() -> None:

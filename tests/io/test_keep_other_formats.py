@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import io
-import zipfile
+import re
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from trimesh.exchange.dae import export_collada
 
 import rlacd
+from fuzz.fbx import Model, fbx
 from rlacd.io.read.beside import mesh_files
 from tests.assets import Json, painted_obj, png, read_glb, view_of
 from tests.hulls import assert_convex_hull
+from tests.io.hostile.archives import MESH, model, threemf
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
+
+
+RED, BLUE, PLAIN = [1, 0, 0, 1], [0, 0, 1, 1], [0.456, 0.468, 0.491, 1]
+WOOD = None
 
 
 def kept(path: Path, out: Path, **options: Any) -> tuple[Json, bytes, rlacd.Decomposition]:
@@ -30,13 +39,12 @@ def pixels(data: bytes) -> Any:
 
 
 def colors(header: Json, mesh: int = 0) -> list[list[float] | None]:
-    """The base colour of each material of a mesh, None where it is a picture."""
-    found = []
-    for primitive in header["meshes"][mesh]["primitives"]:
-        described = header["materials"][primitive["material"]]["pbrMetallicRoughness"]
-        assert described["metallicFactor"] == 0.0
-        found.append(None if "baseColorTexture" in described else described.get("baseColorFactor"))
-    return sorted(found, key=str)
+    """The base colour of each material of a mesh, None where it is a picture or nothing is said."""
+    painted = [
+        header["materials"][one["material"]] for one in header["meshes"][mesh]["primitives"] if "material" in one
+    ]
+    looks = [one["pbrMetallicRoughness"] for one in painted]
+    return [None if "baseColorTexture" in look else look.get("baseColorFactor") for look in looks]
 
 
 def test_an_obj_keeps_its_materials_and_its_picture_in_one_node(tmp_path: Path) -> None:
@@ -56,26 +64,8 @@ def test_an_obj_keeps_its_materials_and_its_picture_in_one_node(tmp_path: Path) 
 
 
 def two_painted(folder: Path) -> Path:
-    """Two objects, each half wood and half red, and a hull for an engine."""
-    text = painted_obj(folder).read_text().splitlines()[0] + "\nvt 0 0\nvt 1 0\nvt 1 1\n"
-    for number, name in enumerate(("crate", "lid", "UCX_old")):
-        box = trimesh.creation.box((1, 2, 3)).apply_translation((5 * number, 0, 0))
-        text += f"o {name}\n" + "".join("v {} {} {}\n".format(*point) for point in box.vertices)
-        for half, paint in enumerate(("wood", "red")):
-            faces = box.faces[half::2] + 1 + 8 * number
-            text += f"usemtl {paint}\n" + "".join("f {}/1 {}/2 {}/3\n".format(*face) for face in faces)
-    (folder / "pair.obj").write_text(text)
-    return folder / "pair.obj"
-
-
-def test_hulls_of_an_obj_of_several_objects_lie_below_their_objects(tmp_path: Path) -> None:
-    header, _, result = kept(two_painted(tmp_path), tmp_path / "out.glb", per_node=True)
-    nodes = {node["name"]: node for node in header["nodes"] if "name" in node}
-    assert {hull.metadata["node"] for hull in result} == {"crate", "lid"}
-    assert sorted(nodes) == ["UCX_crate_00", "UCX_lid_00", "crate", "lid"]
-    for name in ("crate", "lid"):
-        assert len(header["meshes"][nodes[name]["mesh"]]["primitives"]) == 2
-        assert [header["nodes"][child]["name"] for child in nodes[name]["children"]] == [f"UCX_{name}_00"]
+    """Two objects, and a hull for an engine."""
+    return painted_obj(folder, "crate", "lid", "UCX_old")
 
 
 @pytest.mark.parametrize("name", ["crate.obj", "pair.obj", "arm.dae"])
@@ -161,48 +151,15 @@ def test_a_ply_keeps_the_colours_of_its_vertices(tmp_path: Path, encoding: str) 
 
 def arm(folder: Path) -> Path:
     """A scene as COLLADA, with a node in red and one in blue that is turned and moved."""
-    box = trimesh.creation.box((1, 0.2, 0.2))
-    points, corners = (" ".join(map(str, array.ravel().tolist())) for array in (box.vertices, box.faces))
-    turn = trimesh.transformations.translation_matrix((2, 0, 0)) @ trimesh.transformations.rotation_matrix(
-        0.5, (0, 0, 1)
-    )
-    effects, materials, geometries, nodes = "", "", "", ""
-    for name, tint, matrix in (("upper", "1 0 0 1", np.eye(4)), ("lower", "0 0 1 1", turn)):
-        effects += f"""<effect id="{name}-e"><profile_COMMON><technique sid="c"><lambert><diffuse><color>{tint}</color>
-            </diffuse></lambert></technique></profile_COMMON></effect>"""
-        materials += f'<material id="{name}-m"><instance_effect url="#{name}-e"/></material>'
-        geometries += f"""<geometry id="{name}"><mesh>
-            <source id="{name}-p"><float_array id="{name}-a" count="24">{points}</float_array><technique_common>
-            <accessor source="#{name}-a" count="8" stride="3"><param name="X" type="float"/>
-            <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
-            <vertices id="{name}-v"><input semantic="POSITION" source="#{name}-p"/></vertices>
-            <triangles count="12" material="{name}-m"><input semantic="VERTEX" source="#{name}-v" offset="0"/>
-            <p>{corners}</p></triangles></mesh></geometry>"""
-        placed = " ".join(map(str, matrix.ravel().tolist()))
-        nodes += f"""<node id="{name}-n"><matrix>{placed}</matrix><instance_geometry url="#{name}"><bind_material>
-            <technique_common><instance_material symbol="{name}-m" target="#{name}-m"/></technique_common>
-            </bind_material></instance_geometry></node>"""
-    path = folder / "arm.dae"
-    path.write_text(f"""<?xml version="1.0"?>
-        <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-        <asset><unit name="metre" meter="1"/><up_axis>Z_UP</up_axis></asset>
-        <library_effects>{effects}</library_effects><library_materials>{materials}</library_materials>
-        <library_geometries>{geometries}</library_geometries>
-        <library_visual_scenes><visual_scene id="s">{nodes}</visual_scene></library_visual_scenes>
-        <scene><instance_visual_scene url="#s"/></scene></COLLADA>""")
-    return path
-
-
-def test_a_collada_file_keeps_nodes_and_colours(tmp_path: Path) -> None:
-    header, _, result = kept(arm(tmp_path), tmp_path / "out.glb", per_node=True)
-    named = {hull.metadata["node"] for hull in result}
-    assert len(named) == 2
-    nodes = header["nodes"]
-    for name in named:
-        node = next(node for node in nodes if node.get("name") == name)
-        assert [nodes[child]["name"] for child in node["children"]] == [f"UCX_{name}_00"]
-    tints = [colors(header, mesh)[0] for mesh in range(2)]
-    assert sorted(tints, key=str) == [[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, 1.0]]
+    boxes = [trimesh.creation.box((1, 0.2, 0.2)) for _ in range(2)]
+    for box, tint in zip(boxes, ([255, 0, 0, 255], [0, 0, 255, 255]), strict=True):
+        box.visual.face_colors = tint
+    turn = trimesh.transformations.rotation_matrix(0.5, (0, 0, 1))
+    turn[0, 3] = 2
+    placed = f"<matrix>{' '.join(map(str, turn.ravel().tolist()))}</matrix>"
+    text = export_collada(boxes).decode().replace("Y_UP", "Z_UP")
+    (folder / "arm.dae").write_text(re.sub(r'(<node[^>]*id="node1"[^>]*>)', rf"\g<1>{placed}", text))
+    return folder / "arm.dae"
 
 
 @pytest.mark.parametrize("name", ["crate.obj", "arm.dae"])
@@ -222,61 +179,82 @@ def test_a_converted_file_is_in_the_unit_of_the_hulls(tmp_path: Path, name: str)
         assert np.allclose(placed.bounds, hull.bounds, atol=1e-6)
 
 
-def test_a_scene_in_memory_is_not_changed_by_a_scale(tmp_path: Path) -> None:
-    scene = trimesh.Scene()
-    move = trimesh.transformations.translation_matrix((0, 5, 0))
-    scene.add_geometry(trimesh.creation.box(), node_name="crate", transform=move)
-    result = rlacd.decompose(scene, quality="fast", threads=1, scale=2.0)
-    read = trimesh.load_scene(result.save(tmp_path / "out.glb", keep_input=True), process=False)
-    assert np.allclose(read.graph["crate"][0][:3, 3], (0, 10, 0))
-    assert np.allclose(read.bounds, result.source.bounds, atol=0.01)
-    assert np.allclose(scene.bounds, [[-0.5, 4.5, -0.5], [0.5, 5.5, 0.5]])
-    assert "crate_hull_000" in read.graph.nodes
-
-
-def plates(folder: Path, *, name: str = "plates.3mf", count: int = 3) -> Path:
+def plates(folder: Path) -> Path:
     """Boxes of 3MF: one whose own colour is red, one most of whose triangles are blue, one without a colour."""
-    box = trimesh.creation.box()
-    points = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in box.vertices.tolist())
-    objects, items = "", ""
-    for number, (called, own, each) in enumerate(
-        [("red", 'pid="1" pindex="0"', ""), ("blue", 'pid="1" pindex="0"', 'pid="9" p1="1"'), ("plain", "", "")][:count]
-    ):
-        corners = "".join(
-            f'<triangle v1="{a}" v2="{b}" v3="{c}" {each if index else ""}/>'
-            for index, (a, b, c) in enumerate(box.faces.tolist())
-        )
-        objects += f"""<object id="{10 + number}" type="model" name="{called}" {own}><mesh><vertices>{points}</vertices>
-            <triangles>{corners}</triangles></mesh></object>"""
-        items += f'<item objectid="{10 + number}" transform="1 0 0 0 1 0 0 0 1 {3 * number} 0 0"/>'
-    model = f"""<?xml version="1.0"?><model unit="millimeter"
-        xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-        xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"><resources>
-        <basematerials id="1"><base name="a" displaycolor="#FF0000"/></basematerials>
-        <m:colorgroup id="9"><m:color color="#00FF00FF"/><m:color color="#0000BC80"/></m:colorgroup>
-        {objects}</resources><build>{items}</build></model>"""
-    path = folder / name
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("3D/3dmodel.model", model)
-    return path
+    colours = '<basematerials id="1"><base name="a" displaycolor="#FF0000"/></basematerials>'
+    colours += '<m:colorgroup xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02" id="9">'
+    colours += '<m:color color="#00FF00FF"/><m:color color="#0000BC80"/></m:colorgroup>'
+    blue = MESH.replace("<triangle ", '<triangle pid="9" p1="1" ').replace(' pid="9" p1="1"', "", 1)
+    objects = [("red", 'pid="1" pindex="0"', MESH), ("blue", 'pid="1" pindex="0"', blue), ("plain", "", MESH)]
+    items = ""
+    for number, (name, own, mesh) in enumerate(objects, start=10):
+        colours += f'<object id="{number}" name="{name}" {own}>{mesh}</object>'
+        items += f'<item objectid="{number}" transform="1 0 0 0 1 0 0 0 1 {3 * number} 0 0"/>'
+    text = model(colours, items)
+    (folder / "plates.3mf").write_bytes(threemf(text))
+    return folder / "plates.3mf"
 
 
-def test_a_3mf_file_keeps_the_colours_of_its_objects(tmp_path: Path) -> None:
-    header, _, _ = kept(plates(tmp_path), tmp_path / "out.glb")
-    looks = {
-        node["name"]: header["materials"][header["meshes"][node["mesh"]]["primitives"][0]["material"]]
-        for node in header["nodes"]
-        if "mesh" in node and not node["name"].startswith("UCX_")
-    }
-    assert sorted(looks) == ["blue", "plain", "red"]
-    assert looks["red"]["pbrMetallicRoughness"]["baseColorFactor"] == [1.0, 0.0, 0.0, 1.0]
-    blue = looks["blue"]["pbrMetallicRoughness"]["baseColorFactor"]  # BC of sRGB is half the light
-    assert blue == pytest.approx([0.0, 0.0, 0.5, 0.5], abs=0.005)
-    assert looks["blue"]["alphaMode"] == "BLEND"
-    assert {look["pbrMetallicRoughness"]["metallicFactor"] for look in looks.values()} == {0.0}
+def cart(folder: Path) -> Path:
+    pytest.importorskip("ufbx", reason="the extra fbx is not installed")
+    box = trimesh.creation.box((2, 4, 6))
+    shape = (box.vertices, box.faces.tolist())
+    models = [Model("case", *shape, RED[:3]), Model("lid", *shape, below=0), Model("UCX_case_00", *shape)]
+    (folder / "cart.fbx").write_bytes(fbx(models))
+    return folder / "cart.fbx"
 
 
-def test_a_single_coloured_object_of_3mf_keeps_its_colour(tmp_path: Path) -> None:
-    header, _, _ = kept(plates(tmp_path, count=1), tmp_path / "out.glb")
-    assert [node["name"] for node in header["nodes"] if "mesh" in node] == ["plates", "UCX_plates_00"]
-    assert colors(header, 0) == [[1.0, 0.0, 0.0, 1.0]]
+def stand(folder: Path) -> Path:
+    pytest.importorskip("cascadio", reason="the extra cad is not installed")
+    return Path(shutil.copy(Path(__file__).parents[1] / "cases" / "stand.step", folder))
+
+
+def lamp(folder: Path) -> Path:
+    """A foot of brass, a shade whose colour is its own, and a plain one."""
+    pytest.importorskip("pxr", reason="the extra usd is not installed")
+    from pxr import Sdf, Usd, UsdShade
+
+    from tests.io.test_load_usd import add_box
+
+    stage = Usd.Stage.CreateNew(str(folder / "lamp.usda"))
+    foot, shade, _ = (add_box(stage, f"/Lamp/{name}") for name in ("foot", "shade", "plain"))
+    shade.CreateDisplayColorAttr([(0.2, 0.4, 0.8)])
+    material = UsdShade.Material.Define(stage, "/Lamp/brass")
+    shader = UsdShade.Shader.Define(stage, "/Lamp/brass/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    # As exporters do: the colour is an input of the material, to which the shader's is connected.
+    tint = material.CreateInput("tint", Sdf.ValueTypeNames.Color3f)
+    tint.Set((0.8, 0.6, 0.2))
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(tint)
+    shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(1.0)
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.25)
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    UsdShade.MaterialBindingAPI.Apply(foot.GetPrim()).Bind(material)
+    stage.Save()
+    return folder / "lamp.usda"
+
+
+@pytest.mark.parametrize(
+    ("write", "looks"),
+    [
+        (two_painted, {"crate": [WOOD, RED], "lid": [WOOD, RED]}),
+        (arm, {"node0": [RED], "node1": [BLUE]}),
+        (plates, {"red": [RED], "blue": [[0, 0, 0.5, 0.5]], "plain": [PLAIN]}),  # BC of sRGB is half the light
+        (cart, {"case": [RED], "lid": [PLAIN]}),
+        (stand, {"plate": [], "pin_left": [RED], "pin_right": [RED]}),
+        (lamp, {"foot": [[0.8, 0.6, 0.2, 1]], "shade": [[0.2, 0.4, 0.8, 1]], "plain": [PLAIN]}),
+    ],
+)
+def test_hulls_lie_below_their_nodes_which_keep_their_colours(
+    tmp_path: Path, write: Callable[[Path], Path], looks: dict[str, list[Any]]
+) -> None:
+    header, _, result = kept(write(tmp_path), tmp_path / "out.glb", per_node=True)
+    nodes = {node["name"]: node for node in header["nodes"] if "mesh" in node}
+    assert sorted(nodes) == sorted([*looks, *(f"UCX_{name}_00" for name in looks)])
+    assert {hull.metadata["node"] for hull in result} == set(looks)
+    for name, tints in looks.items():
+        assert [header["nodes"][child]["name"] for child in nodes[name]["children"]] == [f"UCX_{name}_00"]
+        assert colors(header, nodes[name]["mesh"]) == [pytest.approx(tint, abs=0.005) for tint in tints]
+    metals = [one["pbrMetallicRoughness"].get("metallicFactor") for one in header["materials"]]
+    assert write is stand or metals == [float(write is lamp and number == 0) for number in range(len(metals))]
+    assert write is not lamp or header["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] == 0.25

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import json
 import socket
 import zipfile
 from pathlib import Path
@@ -14,14 +13,15 @@ import trimesh
 from rlacd.errors import MeshDataError, MeshError, MeshFileError
 from rlacd.io.read.load import load_mesh
 from tests.assets import write_mesh
-from tests.io.hostile.gltf import reference
+from tests.io.hostile.archives import zipped
+from tests.io.hostile.gltf import gltf, gltf_tree, reference
 
 FORMATS = ["obj", "stl", "ply", "off", "glb", "gltf", "dae", "3mf"]
 
-
-@pytest.fixture
-def box():
-    return trimesh.creation.box(extents=(1, 2, 3))
+BOX = trimesh.creation.box(extents=(1, 2, 3))
+OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in BOX.vertices.tolist())
+OBJ += "v 0 0 0\n" + "".join(f"f {a} {b} {c}\n" for a, b, c in (BOX.faces + 1).tolist())
+DAE = BOX.export(file_type="dae")
 
 
 def triangles(mesh):
@@ -31,20 +31,22 @@ def triangles(mesh):
     return rows.reshape(-1, 9)[np.lexsort(rows.reshape(-1, 9).T[::-1])]
 
 
-@pytest.mark.parametrize("extension", FORMATS)
+@pytest.mark.parametrize("extension", [*FORMATS, "vrm"])
 @pytest.mark.promise("formats")
-def test_every_format_gives_the_same_triangles(box, tmp_path, extension):
-    loaded = load_mesh(write_mesh(box, tmp_path / f"box.{extension}"))
+def test_every_format_gives_the_same_triangles(tmp_path, extension):
+    written = write_mesh(BOX, tmp_path / f"box.{extension.replace('vrm', 'glb')}")
+    loaded = load_mesh(written.rename(written.with_suffix(f".{extension}")))
     assert loaded.vertices.dtype == np.float64
     assert loaded.faces.dtype == np.int64
-    np.testing.assert_allclose(triangles(loaded), triangles(box), atol=1e-5)
+    np.testing.assert_allclose(triangles(loaded), triangles(BOX), atol=1e-5)
+    assert loaded.asset is None or loaded.asset.is_gltf == (extension in ("glb", "gltf", "vrm"))
 
 
 @pytest.mark.parametrize("extension", FORMATS)
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.7, 0.9])
 @pytest.mark.promise("refused")
-def test_a_file_cut_off_is_an_error_or_usable(box, tmp_path, extension, share):
-    path = write_mesh(box, tmp_path / f"mesh.{extension}")
+def test_a_file_cut_off_is_an_error_or_usable(tmp_path, extension, share):
+    path = write_mesh(BOX, tmp_path / f"mesh.{extension}")
     content = path.read_bytes()
     path.write_bytes(content[: int(len(content) * share)])
     if extension == "obj" and share > 0:  # nothing in an obj file tells its length
@@ -57,61 +59,53 @@ def test_a_file_cut_off_is_an_error_or_usable(box, tmp_path, extension, share):
 
 @pytest.mark.parametrize("extension", ["stl", "ply", "off", "glb", "dae", "3mf"])
 @pytest.mark.parametrize("lie", ["obj", "stl", "ply", "glb", "dae", "txt"])
-def test_a_wrong_extension_names_the_right_one(box, tmp_path, extension, lie):
+def test_a_wrong_extension_names_the_right_one(tmp_path, extension, lie):
     if extension == lie:
         pytest.skip("that would be the truth")
-    wrong = write_mesh(box, tmp_path / f"mesh.{extension}").rename(tmp_path / f"mesh.{lie}")
+    wrong = write_mesh(BOX, tmp_path / f"mesh.{extension}").rename(tmp_path / f"mesh.{lie}")
     with pytest.raises(MeshFileError, match=f"rename it to .{extension}"):
         load_mesh(wrong)
 
 
-EXTRAS = {"ST": "0.5 0.25", "C": "255 0 0 255", "N": "0 0 1"}
-"""What a letter before OFF puts on the line of each vertex."""
-
-
-def off(mesh, letters="", *, header="{keyword}\n{counts}", comments=False):
-    """A mesh as the OFF file of some letters."""
-    order = [letter for letter in ("N", "C", "ST") if letter in letters]
-    lines = [" ".join([*map(repr, point), *(EXTRAS[letter] for letter in order)]) for point in mesh.vertices.tolist()]
-    lines += [f"3 {a} {b} {c}" + " 0.1 0.2 0.3" * (i % 2) for i, (a, b, c) in enumerate(mesh.faces.tolist())]
+def off(letters="", *, header="{keyword}\n{counts}", comments=False):
+    """The box as the OFF file of some letters, each of which puts numbers on the lines of vertices."""
+    more = " ".join(
+        text for key, text in {"N": "0 0 1", "C": "255 0 0 255", "ST": "0.5 0.25"}.items() if key in letters
+    )
+    lines = [f"{x!r} {y!r} {z!r} {more}" for x, y, z in BOX.vertices.tolist()]
+    lines += [f"3 {a} {b} {c}" + " 0.1 0.2 0.3" * (i % 2) for i, (a, b, c) in enumerate(BOX.faces.tolist())]
     if comments:
         lines = [word for line in lines for word in ("# a line\n", f"  {line}\t# {line} 7")]
-    return (
-        header.format(keyword=f"{letters}OFF", counts=f"{len(mesh.vertices)} {len(mesh.faces)} 0")
-        + "\n"
-        + "\n".join(lines)
-    )
+    return "\n".join([header.format(keyword=f"{letters}OFF", counts="8 12 0"), *lines])
+
+
+LETTERS = ["", "N", "C", "ST", "CN", "STCN"]
 
 
 HEADERS = [
     "{keyword}\n{counts}",
     "{keyword} {counts}",
-    "# made by hand\n\n{keyword} # a keyword\n\n{counts} # and counts\n",
+    "# a\n\n{keyword} # b\n\n{counts} # c\n",
     "\ufeff{keyword}\r\n{counts}\r",
 ]
-LETTERS = ["", "N", "C", "ST", "CN", "STCN"]
 
 
-@pytest.mark.parametrize("header", HEADERS)
-@pytest.mark.parametrize("letters", LETTERS)
-def test_every_variant_of_off_gives_the_same_triangles(box, tmp_path, letters, header):
+@pytest.mark.parametrize(
+    ("letters", "header"),
+    [*((letters, header) for letters in LETTERS for header in HEADERS)]
+    + [("", header) for header in ("OFF{counts}", "{counts}", "off\n{counts}")],
+)
+def test_every_variant_of_off_gives_the_same_triangles(tmp_path, letters, header):
     path = tmp_path / "box.off"
     for comments in (False, True):
-        path.write_text(off(box, letters, header=header, comments=comments), encoding="utf-8", newline="")
-        np.testing.assert_array_equal(triangles(load_mesh(path)), triangles(box))
-
-
-@pytest.mark.parametrize("header", ["OFF{counts}", "{counts}", "off\n{counts}"])
-def test_off_without_its_keyword_or_glued_to_the_counts(box, tmp_path, header):
-    path = tmp_path / "box.off"
-    path.write_text(off(box, header=header))
-    np.testing.assert_array_equal(triangles(load_mesh(path)), triangles(box))
+        path.write_text(off(letters, header=header, comments=comments), encoding="utf-8", newline="")
+        np.testing.assert_array_equal(triangles(load_mesh(path)), triangles(BOX))
 
 
 @pytest.mark.parametrize("letters", LETTERS)
-def test_counts_of_every_variant_of_off_are_held_against_the_file(box, tmp_path, letters):
+def test_counts_of_every_variant_of_off_are_held_against_the_file(tmp_path, letters):
     path = tmp_path / "box.off"
-    whole = off(box, letters).split("\n")
+    whole = off(letters).split("\n")
     for lines in (whole[:-1], whole[:5], [whole[0], "8 1000000000000 0", *whole[2:]]):
         path.write_text("\n".join(lines))
         with pytest.raises(MeshFileError, match=r"cut off \(its header declares 8 vertices and 1"):
@@ -122,45 +116,51 @@ def test_counts_of_every_variant_of_off_are_held_against_the_file(box, tmp_path,
             load_mesh(path)
 
 
-def test_off_that_is_not_read_is_refused_for_what_it_is(box, tmp_path):
-    path = tmp_path / "box.off"
-    for content, says in (
-        (b"OFF BINARY\n" + bytes(200), "binary OFF file"),
-        (b"STCNOFF BINARY\n" + bytes(200), "binary OFF file"),
-        (b"nOFF\n3\n1 0 0\n1 2 3\n", "nOFF or 4OFF, for any number of dimensions"),
-        (b"4OFF\n3 1 0\n0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n", "nOFF or 4OFF, for any number of dimensions"),
-        (b"OFF\n", "lacks the counts"),
-        (b"NOFF", "lacks the counts"),
-        (b"# OFF", "lacks the counts"),
-    ):
-        path.write_bytes(content)
-        with pytest.raises(MeshFileError, match=says):
-            load_mesh(path)
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("a.off", b"OFF BINARY\n" + bytes(200), "binary OFF file"),
+        ("a.off", b"STCNOFF BINARY\n" + bytes(200), "binary OFF file"),
+        ("a.off", b"nOFF\n3\n1 0 0\n1 2 3\n", "nOFF or 4OFF, for any number of dimensions"),
+        ("a.off", b"4OFF\n3 1 0\n0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n", "nOFF or 4OFF, for any number of dimensions"),
+        ("a.off", b"OFF\n", "lacks the counts"),
+        ("a.off", b"NOFF", "lacks the counts"),
+        ("a.off", b"# OFF", "lacks the counts"),
+        ("a.stl", BOX.export(file_type="stl_ascii").rpartition("endsolid")[0].encode(), "damaged or cut off"),
+        ("a.xyz", b"0 0 0\n1 0 0 1\n0 1 0\n", "damaged or cut off"),
+        ("a.obj", b"v 1 2\n" + OBJ.encode(), "a vertex of 2 coordinates"),
+        *(("a.obj", f"{OBJ}f 1 2 {corner}\n".encode(), "counts from 1") for corner in ("0", "0/1", "-0", "0//1 # 1")),
+        ("a.dae", DAE.replace(b"<library_geometries>", b"<library_geometries>\0", 1), "damaged or cut off"),
+        ("a.zae", zipped({"box.dae": DAE.replace(b"</p>", b" x</p>", 1)}), "they are damaged"),
+        ("a.blend", b"BLENDER-v400", "export it from Blender"),
+        ("a.obj.gz", b"\x1f\x8b\x08", "unpack it"),
+        ("a.zip", zipped({"a.obj": OBJ}), "unpack it"),
+        ("a.obj", zipped({"a.obj": OBJ}), ""),
+        ("a.7z", b"7z\xbc\xaf\x27\x1c", "unpack it"),
+    ],
+)
+def test_what_is_not_read_is_refused_for_what_it_is(tmp_path, name, content, says):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshFileError, match=says) as said:
+        load_mesh(tmp_path / name)
+    text = str(said.value)
+    assert "\n" not in text
+    assert "rename" not in text
+    assert "3mf" not in text
 
 
-def test_instances_are_placed_and_mirrored_ones_face_outward(box, tmp_path):
+def test_instances_are_placed_and_mirrored_ones_face_outward(tmp_path):
     scene = trimesh.Scene()
-    scene.add_geometry(box, geom_name="box")
+    scene.add_geometry(BOX, geom_name="box")
     mirror = np.diag([-1.0, 1, 1, 1])
     mirror[0, 3] = 10
     scene.graph.update(frame_to="second", matrix=mirror, geometry="box")
     path = tmp_path / "two.glb"
     scene.export(path)
     for loaded in (load_mesh(path), load_mesh(scene)):
-        assert len(loaded.faces) == 2 * len(box.faces)
+        assert len(loaded.faces) == 2 * len(BOX.faces)
         np.testing.assert_allclose(np.ptp(loaded.vertices, axis=0), [11, 2, 3], atol=1e-6)
         assert trimesh.Trimesh(loaded.vertices, loaded.faces).volume == pytest.approx(12)
-
-
-def test_polygons_groups_and_missing_materials_of_an_obj(tmp_path):
-    path = tmp_path / "house.obj"
-    path.write_text(
-        "mtllib nowhere.mtl\no a\ng one two\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\n"
-        "f 1 2 3 4\ng other\nusemtl blue\nf 2 5 6 3\nf -6/1/1 -5/2/1 -4\nl 1 2\n"
-    )
-    assert len(load_mesh(path).faces) == 5
-    path.write_text("\n".join(f"v {np.cos(a)} {np.sin(a)} 0" for a in np.linspace(0, 6, 7)) + "\nf 1 2 3 4 5 6 7\n")
-    assert len(load_mesh(path).faces) == 5
 
 
 def test_arrays_and_quads():
@@ -180,32 +180,34 @@ def test_faces_with_vertices_that_are_not_finite_are_left_out(bad):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
+    ("changes", "says"),
     [
-        ("nodes", "ab"),
-        ("nodes", ["x"]),
-        ("nodes", [None]),
-        ("meshes", "ab"),
-        ("scenes", "s"),
+        ({"nodes": "ab"}, "damaged"),
+        ({"nodes": ["x"]}, "damaged"),
+        ({"nodes": [None]}, "damaged"),
+        ({"meshes": "ab"}, "damaged"),
+        ({"scenes": "s"}, "damaged"),
+        ({"extensionsRequired": ["FOO_bar"]}, "requires the extension 'FOO_bar'"),
+        (
+            {"nodes": [{"children": [2]}, {"children": [2]}, {"mesh": 0}], "scenes": [{"nodes": [0, 1]}]},
+            "below two others",
+        ),
+        ({"nodes": [{"children": [True]}, {"mesh": 0}]}, "True is no index"),
+        *(
+            ({key: [one | change for one in gltf_tree()[key]]}, r"it declares \d+ rows but has no room for them")
+            for key, change in (
+                ("accessors", {"count": 999}),
+                ("accessors", {"byteOffset": 4}),
+                ("bufferViews", {"byteStride": 1}),
+            )
+        ),
     ],
+    ids=str,
 )
-def test_what_is_no_object_in_gltf_is_damage(box, tmp_path, key, value):
-    path = write_mesh(box, tmp_path / "mesh.gltf")
-    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
-    with pytest.raises(MeshFileError, match="damaged"):
-        load_mesh(path)
-
-
-@pytest.mark.parametrize(
-    ("key", "name", "value"),
-    [("accessors", "count", 999), ("accessors", "byteOffset", 4), ("bufferViews", "byteStride", 1)],
-)
-def test_arrays_of_gltf_that_their_views_cannot_hold_are_refused_in_plain_words(box, tmp_path, key, name, value):
-    path = write_mesh(box, tmp_path / "mesh.gltf")
-    scene = json.loads(path.read_text())
-    path.write_text(json.dumps(scene | {key: [one | {name: value} for one in scene[key]]}))
-    with pytest.raises(MeshFileError, match=r"it declares \d+ rows but has no room for them"):
-        load_mesh(path)
+def test_damage_in_gltf_is_refused_in_plain_words(tmp_path, changes, says):
+    (tmp_path / "mesh.gltf").write_bytes(gltf(**changes))
+    with pytest.raises(MeshFileError, match=says):
+        load_mesh(tmp_path / "mesh.gltf")
 
 
 def test_nothing_is_fetched(tmp_path, monkeypatch):
@@ -222,25 +224,8 @@ def test_nothing_is_fetched(tmp_path, monkeypatch):
         load_mesh("http://localhost:1/mesh.stl")
 
 
-def test_what_an_xml_parser_says_on_two_lines_is_one_sentence(box, tmp_path):
-    path = tmp_path / "box.dae"
-    path.write_bytes(box.export(file_type="dae").replace(b"<library_geometries>", b"<library_geometries>\0", 1))
-    with pytest.raises(MeshFileError, match="damaged or cut off") as said:
-        load_mesh(path)
-    assert "\n" not in str(said.value)
-
-
-def test_a_damaged_zae_file_is_not_told_to_take_its_own_name(box, tmp_path):
-    path = tmp_path / "box.zae"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("box.dae", box.export(file_type="dae").replace(b"</p>", b" x</p>", 1))
-    with pytest.raises(MeshFileError, match="they are damaged") as said:
-        load_mesh(path)
-    assert "rename" not in str(said.value)
-
-
-def test_paths_in_a_scene_are_ignored(box):
-    scene = trimesh.Scene([box, trimesh.load_path(np.array([[0.0, 0, 0], [9, 9, 9]]))])
+def test_paths_in_a_scene_are_ignored():
+    scene = trimesh.Scene([BOX, trimesh.load_path(np.array([[0.0, 0, 0], [9, 9, 9]]))])
     assert len(load_mesh(scene).faces) == 12
 
 
@@ -294,43 +279,6 @@ def test_text_ply_is_read_whole_or_refused(kind: str, tail: bytes, tmp_path: Pat
             load_mesh(path)
 
 
-def zipped(name):
-    archive = io.BytesIO()
-    with zipfile.ZipFile(archive, "w") as file:
-        file.writestr(name, b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    return archive.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "advice"),
-    [
-        ("chair.blend", b"BLENDER-v400", "export it from Blender"),
-        ("chair.obj.gz", b"\x1f\x8b\x08", "unpack it"),
-        ("chair.zip", zipped("chair.obj"), "unpack it"),
-        ("chair.obj", zipped("chair.obj"), ""),
-        ("chair.7z", b"7z\xbc\xaf\x27\x1c", "unpack it"),
-    ],
-)
-def test_files_that_people_have_are_refused_with_the_way_out(tmp_path, name, content, advice):
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(MeshFileError, match=advice) as error:
-        load_mesh(tmp_path / name)
-    assert "3mf" not in str(error.value)
-
-
-def test_a_vrm_is_a_glb_under_another_name(box, tmp_path):
-    box.export(tmp_path / "who.glb")
-    (tmp_path / "who.glb").rename(tmp_path / "who.vrm")
-    mesh = load_mesh(tmp_path / "who.vrm")
-    assert (mesh.up, mesh.metres, len(mesh.faces)) == ("y", 1.0, 12)
-    assert mesh.asset.is_gltf
-
-
-BOX = trimesh.creation.box()
-OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in BOX.vertices.tolist())
-OBJ += "v 0 0 0\n" + "".join(f"f {a} {b} {c}\n" for a, b, c in (BOX.faces + 1).tolist())
-
-
 @pytest.mark.parametrize(
     "content",
     [
@@ -363,24 +311,6 @@ def test_vertices_of_an_obj_may_have_more_numbers_than_others(tmp_path):
     lines[:6] = [f"{line} 1 0 0" if i % 2 else f"{line} 1" for i, line in enumerate(lines[:6])]
     (tmp_path / "box.obj").write_text("\n".join(lines))
     np.testing.assert_array_equal(triangles(load_mesh(tmp_path / "box.obj")), triangles(BOX))
-    (tmp_path / "box.obj").write_text("v 1 2\n" + OBJ)
-    with pytest.raises(MeshFileError, match="a vertex of 2 coordinates"):
-        load_mesh(tmp_path / "box.obj")
-
-
-@pytest.mark.parametrize("corner", ["0", "0/1", "-0", "0//1 # 1"])
-def test_an_obj_counted_from_zero_is_refused(tmp_path, corner):
-    (tmp_path / "box.obj").write_text(OBJ + f"f 1 2 {corner}\n")
-    with pytest.raises(MeshFileError, match="counts from 1"):
-        load_mesh(tmp_path / "box.obj")
-
-
-def test_a_text_stl_that_is_cut_off_and_points_of_uneven_lines_are_refused(tmp_path):
-    whole = BOX.export(file_type="stl_ascii")
-    for name, text in (("box.stl", whole[: whole.rindex("endsolid")]), ("box.xyz", "0 0 0\n1 0 0 1\n0 1 0\n")):
-        (tmp_path / name).write_text(text)
-        with pytest.raises(MeshFileError, match="damaged or cut off"):
-            load_mesh(tmp_path / name)
 
 
 def test_an_stl_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path):
@@ -420,10 +350,10 @@ def test_objects_of_an_obj_are_nodes_or_else_its_groups(tmp_path, word):
     assert len(load_mesh(path).nodes) == 1
 
 
-def test_the_model_of_a_3mf_file_may_have_any_name(box, tmp_path):
-    trimesh.Scene(box).export(tmp_path / "usual.3mf")
+def test_the_model_of_a_3mf_file_may_have_any_name(tmp_path):
+    trimesh.Scene(BOX).export(tmp_path / "usual.3mf")
     with zipfile.ZipFile(tmp_path / "usual.3mf") as usual, zipfile.ZipFile(tmp_path / "other.3mf", "w") as other:
         for name in usual.namelist():
             content = usual.read(name).replace(b"3D/3dmodel.model", b"parts/box.model")
             other.writestr(name.replace("3D/3dmodel.model", "parts/box.model"), content)
-    np.testing.assert_allclose(triangles(load_mesh(tmp_path / "other.3mf")), triangles(box), atol=1e-5)
+    np.testing.assert_allclose(triangles(load_mesh(tmp_path / "other.3mf")), triangles(BOX), atol=1e-5)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +11,7 @@ import trimesh
 
 import rlacd
 from fuzz.fbx import PIVOTED, Model, Tree, fbx
-from rlacd.errors import MeshFileError, MissingExtraError
 from rlacd.io.read.load import load_mesh
-from tests.assets import read_glb
 
 pytest.importorskip("ufbx", reason="the extra fbx is not installed")
 
@@ -67,19 +64,6 @@ def test_a_file_that_points_up_along_a_negative_axis_is_turned_to_y(tmp_path: Pa
     assert parts["lid"].volume == pytest.approx(96)
 
 
-def test_hulls_lie_below_their_nodes_and_those_of_an_engine_give_way(tmp_path: Path) -> None:
-    old = Model("UCX_case_00", BOX.vertices, QUADS)
-    (tmp_path / "box.fbx").write_bytes(fbx([CASE, LID, old]))
-    result = rlacd.decompose(tmp_path / "box.fbx", quality="fast", threads=1, per_node=True)
-    assert any("hulls of an engine (UCX_case_00)" in said for said in result.report["warnings"])
-    header, _, _ = read_glb(result.save(tmp_path / "out.glb", file_format="unreal"))
-    nodes = {node["name"]: node for node in header["nodes"] if "name" in node}
-    assert sorted(nodes) == ["UCX_case_00", "UCX_lid_00", "case", "lid"]
-    assert [header["nodes"][child]["name"] for child in nodes["case"]["children"]] == ["UCX_case_00"]
-    colours = [one["pbrMetallicRoughness"].get("baseColorFactor") for one in header["materials"]]
-    assert [1.0, 0.0, 0.0, 1.0] in colours
-
-
 def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     bone: Tree = ("Deformer", [5, "skin\0\1Deformer", "Skin"], [])
     level: Tree = ("NodeAttribute", [6, "levels\0\1NodeAttribute", "LodGroup"], [])
@@ -99,37 +83,6 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
         "lower levels of detail of box.fbx were left out: 2",
         "invisible nodes of box.fbx were left out: 1",
     }
-
-
-@pytest.mark.promise("hostile-files")
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"Kaydara FBX Binary  \0\x1a\0",
-        fbx([CASE])[:-500],
-        fbx([Model("wild", BOX.vertices, [[0, 1, 800]])]),
-        fbx([CASE]).replace(b"Vertices", b"Verticez"),
-        b"; FBX 6.1.0 project file\n",
-    ],
-    ids=["head", "cut off", "index", "no points", "empty"],
-)
-def test_damaged_files_are_refused_in_one_sentence(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "box.fbx").write_bytes(content)
-    with pytest.raises((MeshFileError, rlacd.EmptyMeshError), match=r"again|check the export"):
-        load_mesh(tmp_path / "box.fbx")
-
-
-def test_an_fbx_file_by_another_name_is_recognised(tmp_path: Path) -> None:
-    (tmp_path / "box.obj").write_bytes(fbx([CASE]))
-    with pytest.raises(MeshFileError, match=r"not obj but fbx: rename it to \.fbx"):
-        load_mesh(tmp_path / "box.obj")
-
-
-def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "box.fbx").write_bytes(fbx([CASE]))
-    monkeypatch.setitem(sys.modules, "ufbx", None)
-    with pytest.raises(MissingExtraError, match=r"rlacd\[fbx\]"):
-        load_mesh(tmp_path / "box.fbx")
 
 
 @pytest.mark.nightly

@@ -117,23 +117,10 @@ def read(path: Path, content: bytes) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, mesh.faces)
 
 
-@pytest.mark.parametrize("kind", WRITERS)
-@pytest.mark.parametrize("first", range(len(L)))
-def test_an_l_is_an_l_in_every_format(tmp_path: Path, kind: str, first: int) -> None:
-    turn = trimesh.transformations.random_rotation_matrix(np.array([0.2, 0.5, 0.9]))[:3, :3]
-    assert_is_prism(read(tmp_path / f"l.{kind}", WRITERS[kind](prism(L, turn, first=first))), L)
-
-
 def test_an_l_of_usd(tmp_path: Path) -> None:
-    Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
-    from pxr import UsdGeom
-
-    points, polygons = prism(L, first=3)
-    stage = Usd.Stage.CreateNew(str(tmp_path / "l.usda"))
-    mesh = UsdGeom.Mesh.Define(stage, "/l")
-    mesh.CreatePointsAttr(points.tolist())
-    mesh.CreateFaceVertexCountsAttr([len(p) for p in polygons])
-    mesh.CreateFaceVertexIndicesAttr([corner for p in polygons for corner in p])
+    usd = pytest.importorskip("tests.io.test_load_usd")
+    stage = usd.Usd.Stage.CreateNew(str(tmp_path / "l.usda"))
+    usd.add_mesh(stage, "/l", *prism(L, first=3))
     stage.Save()
     loaded = load_mesh(tmp_path / "l.usda")
     assert_is_prism(trimesh.Trimesh(loaded.vertices, loaded.faces), L)
@@ -182,13 +169,7 @@ def test_looks_stay_on_the_triangles_of_a_concave_face(tmp_path: Path) -> None:
     assert sum(one.area for one in kept) == pytest.approx(2 * 5 + 12, rel=1e-5)
 
 
-def test_convex_faces_are_fans_as_ever() -> None:
-    hexagon = [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 6, endpoint=False)]
-    points, polygons = prism(hexagon)
-    found = triangles_of(points, np.array([len(p) for p in polygons]), np.concatenate(polygons))
-    fans = [[p[0], p[i], p[i + 1]] for p in polygons for i in range(1, len(p) - 1)]
-    assert found.tolist() == fans
-
+COMB = np.linspace(0, 2 * np.pi, MOST_CORNERS + 2, endpoint=False)
 
 ODD = {
     "crosses itself": [(0, 0), (2, 2), (2, 0), (0, 2)],
@@ -198,6 +179,8 @@ ODD = {
     "there and back": [(0, 0), (2, 0), (2, 2), (2, 0), (1, 0), (0, 2)],
     "not finite": [(0, 0), (2, 0), (np.nan, 1), (np.inf, 2), (0, 2)],
     "huge": [(0, 0), (1e308, 0), (1e307, 1e307), (0, 1e308)],
+    "an edge": [(0, 0), (1, 0)],
+    "very long": (1 + np.arange(len(COMB)) % 2)[:, None] * np.c_[np.cos(COMB), np.sin(COMB)],
 }
 
 
@@ -211,31 +194,17 @@ def test_odd_faces_give_as_many_triangles_as_a_fan(outline) -> None:
     assert all(set(face) <= set(polygons[i]) for face, i in zip(found.tolist(), owner.tolist(), strict=True))
 
 
-def test_edges_points_and_very_long_outlines() -> None:
-    assert triangles_of(np.zeros((3, 3)), np.array([1, 2, 0]), np.array([0, 1, 2])).shape == (0, 3)
-    assert triangles_of(np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)).shape == (0, 3)
-    count = MOST_CORNERS + 2
-    radii = np.where(np.arange(count) % 2, 1.0, 2.0)
-    angles = np.linspace(0, 2 * np.pi, count, endpoint=False)
-    comb = np.c_[radii * np.cos(angles), radii * np.sin(angles), np.zeros(count)]
-    assert len(triangles_of(comb, np.array([count]), np.arange(count))) == count - 2
-
-
 @pytest.mark.parametrize("order", ["", "<", ">"])
 def test_strips_of_a_ply_file_are_triangles_of_alternating_turn(tmp_path: Path, order: str) -> None:
     """A box: strips that -1 ends, and one in a list of its own."""
     points = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
     strips = [[0, 1, 4, 5, -1, 1, 2, 5, 6, -1, 2, 3, 6, 7, -1, 3, 0, 7, 4, -1, 0, 3, 1, 2], [4, 5, 7, 6]]
     content = ply((points, strips), order, "i", "tristrips")
-    (tmp_path / "box.ply").write_bytes(content)
-    mesh = load_mesh(tmp_path / "box.ply")
-    assert mesh.warnings == ()
-    solid = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    solid = read(tmp_path / "box.ply", content)
     assert solid.is_volume
     assert solid.volume == pytest.approx(1)
-    (tmp_path / "box.ply").write_bytes(content.replace(b"vertex_indices", b"strips_of_what"))
     with pytest.raises(MeshError, match="damaged"):
-        load_mesh(tmp_path / "box.ply")
+        read(tmp_path / "box.ply", content.replace(b"vertex_indices", b"strips_of_what"))
 
 
 BOX = [(0, 0), (2, 0), (2, 2), (0, 2)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.io.robots import rewrite
-from tests.models import mujoco_model, points_of_geom, table
+from tests.models import fall_in_mujoco, mujoco_model, points_of_geom, table
 
 EAR = """<?xml version="1.0"?>
 <!-- made by hand -->
@@ -44,10 +45,14 @@ EAR = """<?xml version="1.0"?>
 <!-- the end -->"""
 
 
-def urdf(folder: Path, *attributes: str) -> Path:
+def part(*attributes: str) -> str:
     """A robot of one link, which collides as meshes of these attributes."""
     each = "".join(f"<collision><geometry><mesh {words}/></geometry></collision>" for words in attributes)
-    (folder / "r.urdf").write_text(f"<robot name='r'><link name='l'>{each}</link></robot>")
+    return f"<robot name='r'><link name='l'>{each}</link></robot>"
+
+
+def urdf(folder: Path, *attributes: str) -> Path:
+    (folder / "r.urdf").write_text(part(*attributes))
     return folder / "r.urdf"
 
 
@@ -80,30 +85,21 @@ def collisions(path: Path) -> list[trimesh.Trimesh]:
 # --- URDF -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.promise("robots")
-def test_a_urdf_keeps_every_byte_but_its_collision_meshes(ear: Path) -> None:
+@pytest.mark.promise("robots", "robot-hulls")
+def test_a_urdf_keeps_every_byte_but_its_collision_meshes_whose_space_hulls_fill_at_every_scale(ear: Path) -> None:
     done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
     after = done.path.read_text()
     assert without_collision_meshes(after) == without_collision_meshes(EAR)
-    assert after.count("<!-- kept > -->") == len(done.meshes[0].files), "what else is in a collision goes to each hull"
+    first, second = (len(mesh.files) for mesh in done.meshes)  # one mesh at two scales: at one of them it is used twice
+    assert after.count("<!-- kept > -->") == first, "what else is in a collision goes to each hull"
     names = [element.get("name") for element in etree.parse(str(done.path)).iterfind(".//collision")]
-    count = len(done.meshes[0].files)
-    assert names[:count] == [f"a > b_{index:03d}" for index in range(count)]
+    assert names[:first] == [f"a > b_{index:03d}" for index in range(first)]
     assert done.warnings == []
-
-
-@pytest.mark.promise("robot-hulls")
-def test_hulls_fill_the_same_space_at_every_scale(ear: Path) -> None:
-    done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
-    assert len(done.meshes) == 2, "one mesh at two scales; the one that is used twice is decomposed once"
     hulls = collisions(done.path)
-    first, second = (len(mesh.files) for mesh in done.meshes)
     groups = [hulls[:first], hulls[first : first + second], hulls[first + second :]]
     for group, scale in zip(groups, ([0.5, 0.5, 2.0], [-1.0, 1.0, 1.0], [0.5, 0.5, 2.0]), strict=True):
-        want = table()
-        want.apply_transform(np.diag([*scale, 1.0]))
-        together = trimesh.util.concatenate(group)
-        assert together.bounds == pytest.approx(want.bounds, abs=1e-6)
+        want = table().apply_transform(np.diag([*scale, 1.0]))
+        assert trimesh.util.concatenate(group).bounds == pytest.approx(want.bounds, abs=1e-6)
         assert all(hull.volume > 0 and hull.is_convex for hull in group)
         assert sum(hull.volume for hull in group) == pytest.approx(want.volume, rel=0.02)
 
@@ -306,34 +302,23 @@ def arm(tmp_path: Path) -> Path:
     return tmp_path / "arm.xml"
 
 
-def test_mujoco_reads_the_rewritten_mjcf(arm: Path) -> None:
+@pytest.mark.promise("robot-hulls")
+def test_mujoco_reads_the_rewritten_mjcf_and_hulls_lie_where_the_mesh_lay(arm: Path) -> None:
+    """MuJoCo moves every mesh into its own frame of inertia; placed by it, mesh and hulls still coincide."""
     before = mujoco_model(arm)
     done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
     after = mujoco_model(done.path)
+    for body in ("upper", "lower"):
+        assert bounds_of(after, body) == pytest.approx(bounds_of(before, body), abs=1e-5)
     table_hulls, big_hulls = (len(mesh.files) for mesh in done.meshes)
     # "upper" keeps its collision geom for its mass, "lower" the red one to look at too, with hulls beside them.
     assert after.ngeom == before.ngeom + table_hulls + big_hulls
-    import mujoco
-
-    elbow = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_GEOM, "elbow_mass")
-    assert after.geom_rgba[elbow, 3] == 0.0, "what stays for its mass is not drawn"
+    assert after.geom("elbow_mass").rgba[3] == 0.0, "what stays for its mass is not drawn"
     assert int(after.geom_contype.astype(bool).sum()) == table_hulls + big_hulls + 2, "and tetrahedron and sphere"
-    red = mujoco.mj_name2id(after, mujoco.mjtObj.mjOBJ_GEOM, "both_visual")
-    assert after.geom_contype[red] == after.geom_conaffinity[red] == 0
-    assert after.geom_rgba[red].tolist() == [1.0, 0.0, 0.0, 1.0]
-    data = mujoco.MjData(after)
-    for _ in range(20):
-        mujoco.mj_step(after, data)
-    assert np.isfinite(data.qpos).all()
-
-
-@pytest.mark.promise("robot-hulls")
-def test_hulls_lie_where_the_mesh_lay(arm: Path) -> None:
-    """MuJoCo moves every mesh into its own frame of inertia; placed by it, mesh and hulls still coincide."""
-    before = mujoco_model(arm)
-    after = mujoco_model(rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1).path)
-    assert bounds_of(after, "upper") == pytest.approx(bounds_of(before, "upper"), abs=1e-5)
-    assert bounds_of(after, "lower") == pytest.approx(bounds_of(before, "lower"), abs=1e-5)
+    red = after.geom("both_visual")
+    assert red.contype == red.conaffinity == 0
+    assert red.rgba.tolist() == [1.0, 0.0, 0.0, 1.0]
+    assert np.isfinite(fall_in_mujoco(done.path, 0.05).speed)
 
 
 def bounds_of(model: Any, body: str) -> np.ndarray:
@@ -341,8 +326,7 @@ def bounds_of(model: Any, body: str) -> np.ndarray:
 
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
-    own = (model.geom_bodyid == index) & (model.geom_dataid >= 0) & (model.geom_contype > 0)
+    own = (model.geom_bodyid == model.body(body).id) & (model.geom_dataid >= 0) & (model.geom_contype > 0)
     points = np.concatenate([points_of_geom(model, data, geom) for geom in np.flatnonzero(own)])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
@@ -361,12 +345,18 @@ def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
     assert any("tetrahedron" in warning and "no file" in warning for warning in done.warnings)
 
 
-GEOM = "<mujoco><compiler {compiler}/><default><default class='c'><geom {default}/></default></default><asset>\
-<mesh name='t' file='table.stl' scale='1 -1 2' refpos='0.1 0 0' refquat='1 1 0 0' {asset}/></asset><worldbody>\
-<body name='b' pos='0 0 3'><freejoint/>{inertial}<frame pos='1 0 0' euler='10 20 30'>\
-<geom class='c' type='mesh' mesh='t' group='{group}' {geom}/></frame><geom size='0.2' density='300'/>\
-<replicate count='2' offset='1 0 0'><geom class='c' type='mesh' mesh='t' pos='0 1 0' group='3'/></replicate></body>\
-</worldbody></mujoco>"
+def mjcf(folder: Path, assets: str, geoms: str, more: str = "") -> Path:
+    """A model of one free body."""
+    body = f"<worldbody><body name='b' pos='0 0 3'><freejoint/>{geoms}</body></worldbody>"
+    (folder / "in.xml").write_text(f"<mujoco>{more}<asset>{assets}</asset>{body}</mujoco>")
+    return folder / "in.xml"
+
+
+GEOMS = "{inertial}<frame pos='1 0 0' euler='10 20 30'><geom class='c' type='mesh' mesh='t' group='{group}' {geom}/>\
+</frame><geom size='0.2' density='300'/><replicate count='2' offset='1 0 0'><geom class='c' type='mesh' mesh='t'\
+ pos='0 1 0' group='3'/></replicate>"
+MESH = "<mesh name='t' file='table.stl' scale='1 -1 2' refpos='0.1 0 0' refquat='1 1 0 0' {asset}/>"
+SETTINGS = "<compiler {compiler}/><default><default class='c'><geom {default}/></default></default>"
 
 
 @pytest.mark.parametrize("group", ["0", "3"])
@@ -390,9 +380,10 @@ GEOM = "<mujoco><compiler {compiler}/><default><default class='c'><geom {default
 def test_no_body_changes_its_mass_centre_or_inertia(tmp_path: Path, how: dict[str, str], group: str) -> None:
     table().export(tmp_path / "table.stl")
     blank = dict.fromkeys(("compiler", "default", "asset", "inertial", "geom"), "")
-    (tmp_path / "in.xml").write_text(GEOM.format(**{**blank, **how, "group": group}))
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
-    before, after = (mujoco_model(path) for path in (tmp_path / "in.xml", done.path))
+    given = {**blank, **how, "group": group}
+    source = mjcf(tmp_path, *(text.format(**given) for text in (MESH, GEOMS, SETTINGS)))
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
+    before, after = (mujoco_model(path) for path in (source, done.path))
     assert after.ngeom > before.ngeom
     for name, size in (("body_mass", 1e-6), ("body_ipos", 1e-6)):
         assert getattr(after, name) == pytest.approx(getattr(before, name), rel=size, abs=1e-9)
@@ -401,24 +392,16 @@ def test_no_body_changes_its_mass_centre_or_inertia(tmp_path: Path, how: dict[st
 
 def tensors(model: Any) -> np.ndarray:
     """The inertia of each body along the axes of its frame."""
-    import mujoco
-
-    found = []
-    for quaternion, inertia in zip(model.body_iquat, model.body_inertia, strict=True):
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, quaternion)
-        found.append(turn.reshape(3, 3) * inertia @ turn.reshape(3, 3).T)
-    return np.array(found)
+    turns = [trimesh.transformations.quaternion_matrix(turn)[:3, :3] for turn in model.body_iquat]
+    return np.array([turn * inertia @ turn.T for turn, inertia in zip(turns, model.body_inertia, strict=True)])
 
 
 @pytest.mark.parametrize("inertia", ["", "inertia='exact'", "inertia='convex'"])
 def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, inertia: str) -> None:
     trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "flat.stl")
-    (tmp_path / "in.xml").write_text(
-        f"<mujoco><asset><mesh file='flat.stl' {inertia}/></asset><worldbody><body><freejoint/><inertial pos='0 0 0'"
-        " mass='1' diaginertia='1 1 1'/><geom type='mesh' mesh='flat'/></body></worldbody></mujoco>"
-    )
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threads=1)
+    weight = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"
+    source = mjcf(tmp_path, f"<mesh file='flat.stl' {inertia}/>", f"{weight}<geom type='mesh' mesh='flat'/>")
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", threads=1)
     assert mujoco_model(done.path).body_mass[1] == 1.0
     assert any("no volume" in warning for warning in done.warnings)
 
@@ -426,16 +409,12 @@ def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, ine
 @pytest.mark.parametrize("ending", ["dae", "ply", "stl"])
 def test_a_mesh_that_mujoco_cannot_read_is_copied_for_it(tmp_path: Path, ending: str) -> None:
     table().export(tmp_path / f"table.{ending}", file_type="stl_ascii" if ending == "stl" else ending)
-    (tmp_path / "in.xml").write_text(
-        f"<mujoco><asset><mesh name='t' file='table.{ending}' scale='1 1 -2' inertia='exact'/></asset>"
-        "<worldbody><body><freejoint/>"
-        "<geom type='mesh' mesh='t' density='7'/></body></worldbody></mujoco>"
-    )
+    asset = f"<mesh name='t' file='table.{ending}' scale='1 1 -2' inertia='exact'/>"
+    source = mjcf(tmp_path, asset, "<geom type='mesh' mesh='t' density='7'/>")
     with pytest.raises(ValueError, match="decoder"):
-        mujoco_model(tmp_path / "in.xml")
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
-    model = mujoco_model(done.path)
-    assert model.body_mass[1] == pytest.approx(table().volume * 2 * 7, rel=0.01)
+        mujoco_model(source)
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
+    assert mujoco_model(done.path).body_mass[1] == pytest.approx(table().volume * 2 * 7, rel=0.01)
 
 
 def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
@@ -475,13 +454,14 @@ def test_a_model_whose_paths_are_stripped_is_rewritten_with_the_paths_that_count
     (tmp_path / "meshes").mkdir()
     for name in ("table", "other"):
         table().export(tmp_path / "meshes" / f"{name}.stl")
-    (tmp_path / "in.xml").write_text(
-        '<mujoco><compiler strippath="true" meshdir="meshes"/><asset><mesh file="C:\\robot/x/table.stl"/>'
-        '<mesh file="no/where/other.stl"/></asset><worldbody><body><freejoint/><geom type="mesh" mesh="table"/>'
-        '<geom type="mesh" mesh="other" contype="0" conaffinity="0"/></body></worldbody></mujoco>'
+    source = mjcf(
+        tmp_path,
+        '<mesh file="C:\\robot/x/table.stl"/><mesh file="no/where/other.stl"/>',
+        '<geom type="mesh" mesh="table"/><geom type="mesh" mesh="other" contype="0" conaffinity="0"/>',
+        '<compiler strippath="true" meshdir="meshes"/>',
     )
-    before = mujoco_model(tmp_path / "in.xml")
-    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", quality="fast", threads=1)
+    before = mujoco_model(source)
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
     after = mujoco_model(done.path)
     assert after.ngeom == before.ngeom + len(done.meshes[0].files)
     assert after.body_inertia == pytest.approx(before.body_inertia, rel=1e-6)
@@ -499,37 +479,38 @@ def test_a_robot_of_primitives_is_copied(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
-        ("a.urdf.xacro", "<robot/>", "expand its macros with"),
-        ("w.sdf", "<sdf/>", "rewritten as .urdf and .xml"),
-        ("a.urdf", EAR.replace("meshes/table.stl", "package:///x.stl"), "names no package"),
+        ("r.urdf.xacro", "<robot/>", "expand its macros with"),
+        ("r.sdf", "<sdf/>", "rewritten as .urdf and .xml"),
+        ("r.urdf", part("filename='package:///x.stl'"), "names no package"),
+        ("r.urdf", "<robot><link></robot>", "not well-formed"),
+        ("r.urdf", "", "not well-formed"),
+        ("r.urdf", '<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "xacro"),
+        ("r.urdf", "<sdf/>", "is not URDF: it starts with <sdf>"),
+        ("r.urdf", '<?xml version="1.0" encoding="klingon"?><robot/>', "klingon|encoding"),
+        ("r.urdf", part(""), "no filename"),
+        *(
+            ("r.urdf", part(f"filename='box.stl' scale='{scale}'"), "not three numbers other than zero")
+            for scale in ("0 1 1", "a b c", "1 1", "nan nan nan", "inf 1 1", "1e999 1 1")
+        ),
+        ("r.urdf", part("filename='box.stl' scale='1e-320 1 1'"), "inverted"),
+        (
+            "r.xml",
+            '<mujoco><asset><mesh name="b" file="box.stl"/></asset><worldbody><body>'
+            '<geom type="mesh" mesh="b" mass="true"/></body></worldbody></mujoco>',
+            "mass",
+        ),
     ],
 )
+@pytest.mark.promise("refused")
 def test_robots_that_cannot_be_rewritten_say_what_to_do(tmp_path: Path, name: str, text: str, says: str) -> None:
     (tmp_path / name).write_text(text)
+    trimesh.creation.box().export(tmp_path / "box.stl")
+    before = sorted(tmp_path.iterdir())
     run = CliRunner().invoke(app, ["decompose", str(tmp_path / name)])
     assert run.exit_code == 2
     assert re.search(says, " ".join(run.stderr.split())), run.stderr
-
-
-# --- files that must not be trusted -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("<robot><link></robot>", "not well-formed"),
-        ("", "not well-formed"),
-        ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "xacro"),
-        ("<sdf/>", "is not URDF: it starts with <sdf>"),
-        ('<?xml version="1.0" encoding="klingon"?><robot/>', "klingon|encoding"),
-        ("<robot><link name='l'><collision><geometry><mesh/></geometry></collision></link></robot>", "no filename"),
-    ],
-)
-def test_bad_files_are_refused_in_one_sentence(tmp_path: Path, text: str, says: str) -> None:
-    (tmp_path / "r.urdf").write_text(text)
-    with pytest.raises(MeshFileError, match=says):
-        rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf")
-    assert [path.name for path in tmp_path.iterdir()] == ["r.urdf"]
+    assert run.stderr.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
 
 
 @pytest.mark.parametrize(
@@ -545,6 +526,8 @@ def test_bad_files_are_refused_in_one_sentence(tmp_path: Path, text: str, says: 
         "..\\..\\outside.stl",
         "http://example.org/a.stl",
         "a\x7fb.stl",
+        "/dev/zero",
+        "pipe.stl",
         "missing.stl",
         "meshes",
     ],
@@ -556,6 +539,7 @@ def test_a_robot_cannot_name_what_lies_outside_its_package(tmp_path: Path, refer
     package = tmp_path / "deep" / "r"
     (package / "meshes").mkdir(parents=True)
     (package / "package.xml").write_text("<package><name>r</name></package>")
+    os.mkfifo(package / "pipe.stl")
     urdf(package, f"filename='{reference.format(outside=outside)}'")
     with pytest.raises(MeshFileError) as caught:
         rlacd.rewrite_robot(package / "r.urdf", package / "out.urdf")
@@ -563,13 +547,6 @@ def test_a_robot_cannot_name_what_lies_outside_its_package(tmp_path: Path, refer
     if "outside" in reference and "package" not in reference:
         done = rlacd.rewrite_robot(package / "r.urdf", package / "out.urdf", package_dirs=[str(tmp_path)], threads=1)
         assert done.meshes[0].path == outside, "unless the user allows it"
-
-
-@pytest.mark.parametrize("scale", ["0 1 1", "a b c", "1 1", "nan nan nan", "inf 1 1"])
-def test_scales_that_are_none_are_refused(ear: Path, scale: str) -> None:
-    ear.write_text(EAR.replace("-1 1 1", scale), encoding="utf-8")
-    with pytest.raises(MeshFileError, match="not three numbers other than zero"):
-        rlacd.rewrite_robot(ear, ear.with_name("out.urdf"))
 
 
 def test_places_are_checked_before_the_work(ear: Path, tmp_path: Path) -> None:

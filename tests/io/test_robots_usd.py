@@ -18,16 +18,15 @@ from tests.models import TABLE_VOLUME, table
 pytest.importorskip("pxr", reason="the extra usd is not installed")
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdValidation, Vt
 
+from tests.io.test_load_usd import add_mesh
+
 SCALE = (100.0, 200.0, 100.0)
 
 
 def add_table(stage: Any, path: str) -> Any:
     """A table that collides and lacks a triangle, moved and stretched unequally."""
-    shape, mesh = table(), UsdGeom.Mesh.Define(stage, path)
-    shape.update_faces(np.arange(len(shape.faces)) > 0)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.array(shape.vertices, dtype=np.float32)))
-    mesh.CreateFaceVertexCountsAttr([3] * len(shape.faces))
-    mesh.CreateFaceVertexIndicesAttr(shape.faces.ravel().tolist())
+    shape = table()
+    mesh = add_mesh(stage, path, shape.vertices, shape.faces[1:])
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array(shape.bounds, dtype=np.float32)))
     mesh.AddTranslateOp().Set((1, 2, 3))
     mesh.AddScaleOp().Set(SCALE)

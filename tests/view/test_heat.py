@@ -67,9 +67,3 @@ def test_the_number_of_triangles_and_the_threads_are_kept() -> None:
     for one, two in zip(heat_map(result, threads=1), heat_map(result, threads=2), strict=True):
         assert np.array_equal(one.vertices, two.vertices)
         assert np.array_equal(one.distance, two.distance)
-
-
-def test_a_cloud_of_points_has_no_surface_to_measure_to() -> None:
-    corners = np.array(box((0, 0, 0), (1, 1, 1)).vertices)
-    result = rlacd.decompose((corners, np.empty((0, 3), dtype=np.int32)))
-    assert heat_map(result) == []

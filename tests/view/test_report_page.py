@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import gzip
-import html.parser
 import json
 import re
 import sys
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
+from lxml import html
 
 import rlacd
 from rlacd.cli.main import app
@@ -32,29 +32,8 @@ def result() -> Decomposition:
     return rlacd.decompose(elbow(1.0), threshold=0.05)
 
 
-class Reader(html.parser.HTMLParser):
-    """Elements with their attributes and text, as a browser would see them."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.texts: list[tuple[str, dict[str, str | None], str]] = []
-        self.feed(page)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        if self.elements:
-            self.texts.append((*self.elements[-1], data))
-
-    def text_of(self, **wanted: str) -> str:
-        return next(text for _, attributes, text in self.texts if wanted.items() <= attributes.items())
-
-
 def payload(page: str) -> dict[str, Any]:
-    return json.loads(gzip.decompress(base64.b64decode(Reader(page).text_of(id="data"))))
+    return json.loads(gzip.decompress(base64.b64decode(html.fromstring(page).get_element_by_id("data").text)))
 
 
 def points(text: str) -> np.ndarray:
@@ -92,23 +71,20 @@ def test_the_scene_lies_about_the_origin_and_knows_its_up(result: Decomposition)
 
 @pytest.mark.promise("no-network")
 def test_nothing_is_fetched(result: Decomposition) -> None:
-    reader = Reader(report_page(result, picture=False))
-    policy = next(a["content"] for tag, a in reader.elements if a.get("http-equiv") == "Content-Security-Policy")
-    assert policy is not None
+    page = html.fromstring(report_page(result, picture=False))
+    (policy,) = page.xpath("//meta[@http-equiv='Content-Security-Policy']/@content")
     assert "default-src 'none'" in policy
     assert "connect-src 'none'" in policy
     assert "http" not in policy
-    for tag, attributes in reader.elements:
-        for name in ("src", "href", "action"):
-            address = attributes.get(name)
-            assert address is None or address.startswith("data:"), (tag, address)
+    assert all(address.startswith("data:") for address in page.xpath("//@src | //@href | //@action"))
 
 
 def test_every_script_is_inside(result: Decomposition) -> None:
-    reader = Reader(report_page(result, picture=False))
-    imports = json.loads(reader.text_of(type="importmap"))["imports"]
+    page = html.fromstring(report_page(result, picture=False))
+    (table,), (main,) = (page.xpath(f"//script[@type='{kind}']/text()") for kind in ("importmap", "module"))
+    imports = json.loads(table)["imports"]
     scripts = [base64.b64decode(address.split(",")[1]).decode() for address in imports.values()]
-    wanted = {name for text in [*scripts, reader.text_of(type="module")] for name in re.findall(r'from "(.*?)"', text)}
+    wanted = {name for text in [*scripts, main] for name in re.findall(r'from "(.*?)"', text)}
     assert wanted == set(imports) == {f"page/{name}" for name in MODULES}
 
 
@@ -117,12 +93,12 @@ def test_every_script_is_inside(result: Decomposition) -> None:
 )
 def test_a_name_stays_a_name(name: str) -> None:
     cube = trimesh.creation.box()
-    page = report_page(Decomposition([hull_of(cube.vertices)], {"name": name, "scale": 2.0}, cube), picture=False)
-    usual = report_page(Decomposition([hull_of(cube.vertices)], {"name": "cube", "scale": 2.0}, cube), picture=False)
-    assert [tag for tag, _ in Reader(page).elements] == [tag for tag, _ in Reader(usual).elements]
-    assert payload(page)["name"] == name
-    title = next(text for tag, _, text in Reader(page).texts if tag == "title")
-    assert title == f"{name}: convex hulls"
+    hulls = [hull_of(cube.vertices)]
+    pages = [report_page(Decomposition(hulls, {"name": n, "scale": 2.0}, cube), picture=False) for n in (name, "cube")]
+    named, usual = map(html.fromstring, pages)
+    assert [element.tag for element in named.iter()] == [element.tag for element in usual.iter()]
+    assert payload(pages[0])["name"] == name
+    assert named.findtext(".//title") == f"{name}: convex hulls"
 
 
 def test_the_same_result_gives_the_same_bytes(result: Decomposition, tmp_path: Path) -> None:

@@ -80,7 +80,7 @@ def _() -> bytes:
     return file.getvalue()
 
 
-refused("an archive in an archive.3mf", "again", lambda: zipped({"inner.3mf": threemf(model())}))
+refused("an archive in an archive.3mf", "again")(lambda: zipped({"inner.3mf": threemf(model())}))
 
 
 @refused("parts of parts, forty times two.3mf", "triangles|places")
@@ -107,7 +107,7 @@ def _() -> bytes:
     return threemf(model(f'<object id="1">{MESH}</object>{chain}', '<item objectid="10000"/>'))
 
 
-refused("a million items.3mf", "places|unpacks to", lambda: threemf(model(items='<item objectid="1"/>' * 1_000_000)))
+refused("a million items.3mf", "places|unpacks to")(lambda: threemf(model(items='<item objectid="1"/>' * 1_000_000)))
 
 
 @harmless("a name of a megabyte.3mf")

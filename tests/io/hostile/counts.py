@@ -17,10 +17,8 @@ def ply(elements: str, body: bytes = b"\1" * 1000, kind: str = "binary_little_en
     return PLY.format(kind=kind, elements=elements).encode() + body
 
 
-refused(
-    "a trillion vertices.ply",
-    "declares|again",
-    lambda: ply(f"element vertex {10**12}\n{XYZ}element face 1\n{LIST.format(count='uchar')}"),
+refused("a trillion vertices.ply", "declares|again")(
+    lambda: ply(f"element vertex {10**12}\n{XYZ}element face 1\n{LIST.format(count='uchar')}")
 )
 
 
@@ -30,10 +28,8 @@ def _() -> bytes:
     return ply(f"element vertex 3\n{XYZ}element face 1\n{lists}", bytes(40_000))
 
 
-refused(
-    "a trillion vertices in text.ply",
-    "declares",
-    lambda: ply(f"element vertex {10**12}\n{XYZ}", b"0 0 0\n1 0 0\n0 1 0\n", "ascii"),
+refused("a trillion vertices in text.ply", "declares")(
+    lambda: ply(f"element vertex {10**12}\n{XYZ}", b"0 0 0\n1 0 0\n0 1 0\n", "ascii")
 )
 
 
@@ -49,32 +45,20 @@ def _() -> bytes:
     return ply(f"element vertex 3\n{XYZ}element face 1\n{LIST.format(count='int')}", body)
 
 
-refused(
-    "faces without corners, a billion of them.ply",
-    "declares|again",
-    lambda: ply(f"element vertex 3\n{XYZ}element face {10**9}\n{LIST.format(count='uchar')}", b"\0" * 5000),
+refused("faces without corners, a billion of them.ply", "declares|again")(
+    lambda: ply(f"element vertex 3\n{XYZ}element face {10**9}\n{LIST.format(count='uchar')}", b"\0" * 5000)
 )
-refused(
-    "ten million empty lines of FORMAT  ASCII.ply",
-    "declares|again",
-    lambda: ply(f"element vertex {10**7}\n{XYZ}", b"\n" * 10**7, " ASCII"),
+refused("ten million empty lines of FORMAT  ASCII.ply", "declares|again")(
+    lambda: ply(f"element vertex {10**7}\n{XYZ}", b"\n" * 10**7, " ASCII")
 )
-refused("four billion triangles.stl", "declares 4294967295 triangles", lambda: b"\0" * 80 + b"\xff" * 4 + b"\0" * 500)
-refused(
-    "a trillion vertices.off", "declares", lambda: f"OFF\n{10**12} {10**12} 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".encode()
+refused("four billion triangles.stl", "declares 4294967295 triangles")(lambda: b"\0" * 80 + b"\xff" * 4 + b"\0" * 500)
+refused("a comment of ten million characters, and nothing else.off", "counts|empty")(lambda: b"#" * 10**7)
+refused("a face of vertex 10^12.obj", "vertex|again")(lambda: f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {10**12}\n".encode())
+refused("a face of a vertex with a million digits.obj", "vertex|again|digits")(
+    lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 " + b"9" * 10**6 + b"\nf 1 2 3 1\n"
 )
-refused("counts below zero.off", "again|no points", lambda: b"OFF\n-3 -1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
-refused("a comment of ten million characters, and nothing else.off", "counts|empty", lambda: b"#" * 10**7)
-refused("a face of vertex 10^12.obj", "vertex|again", lambda: f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {10**12}\n".encode())
-refused(
-    "a face of a vertex with a million digits.obj",
-    "vertex|again|digits",
-    lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 " + b"9" * 10**6 + b"\nf 1 2 3 1\n",
-)
-refused(
-    "only numbers that are too large.obj",
-    "NaN or infinite",
-    lambda: b"v 1e999999 0 0\nv 1 -1e999999 0\nv 0 nan 1e999999\nf 1 2 3\n",
+refused("only numbers that are too large.obj", "NaN or infinite")(
+    lambda: b"v 1e999999 0 0\nv 1 -1e999999 0\nv 0 nan 1e999999\nf 1 2 3\n"
 )
 
 
@@ -112,4 +96,4 @@ def _() -> bytes:
     return (libraries + vertices + "usemtl evil\n" + faces).encode()
 
 
-refused("ten million zeros.xyz", "again|empty", lambda: b"\0" * 10**7 + b"x")
+refused("ten million zeros.xyz", "again|empty")(lambda: b"\0" * 10**7 + b"x")

@@ -39,13 +39,12 @@ def gltf(**changes: Any) -> bytes:
     return json.dumps(gltf_tree(**changes)).encode()
 
 
-def glb(tree: dict[str, Any], binary: bytes = b"") -> bytes:
+def glb(tree: dict[str, Any], *binary: bytes) -> bytes:
+    """A GLB file of a tree and a buffer; what else there is follows in a chunk that no reader knows."""
     text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
-    if binary:
-        chunks += struct.pack("<II", len(binary), 0x004E4942) + binary
-    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+    chunks = zip((b"JSON", b"BIN\0", b"XTRA"), (text + b" " * (-len(text) % 4), *binary), strict=False)
+    body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
 def accessors(*changes: dict[str, Any]) -> list[dict[str, Any]]:
@@ -58,11 +57,11 @@ def _() -> bytes:
     return gltf(accessors=nothing, meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}])
 
 
-refused(
-    "a billion vertices in 96 bytes.gltf", "decodes to more", lambda: gltf(accessors=accessors({"count": 10**9}, {}))
+refused("a billion vertices in 96 bytes.gltf", "decodes to more")(
+    lambda: gltf(accessors=accessors({"count": 10**9}, {}))
 )
-refused(
-    "a count that is no whole number.gltf", "count|damaged", lambda: gltf(accessors=accessors({"count": 1e300}, {}))
+refused("a count that is no whole number.gltf", "count|damaged")(
+    lambda: gltf(accessors=accessors({"count": 1e300}, {}))
 )
 
 
@@ -101,57 +100,32 @@ def _() -> bytes:
     return glb(tree, b"\0" * 36 * 1000)
 
 
-refused(
-    "a million nodes.gltf",
-    "nodes",
-    lambda: gltf(nodes=many(1_000_000, {"mesh": 0}), scenes=[{"nodes": list(range(1_000_000))}]),
+refused("a million nodes.gltf", "nodes")(
+    lambda: gltf(nodes=many(1_000_000, {"mesh": 0}), scenes=[{"nodes": list(range(1_000_000))}])
 )
-refused(
-    "nodes that are their own children.gltf",
-    "itself",
-    lambda: gltf(nodes=[{"children": [1]}, {"children": [2, 0]}, {"mesh": 0, "children": [1]}]),
+refused("nodes that are their own children.gltf", "itself")(
+    lambda: gltf(nodes=[{"children": [1]}, {"children": [2, 0]}, {"mesh": 0, "children": [1]}])
 )
-harmless(
-    "two children each, forty deep.gltf",
-    lambda: gltf(nodes=[*({"children": [i + 1, i + 1]} for i in range(40)), {"mesh": 0}]),
+harmless("two children each, forty deep.gltf")(
+    lambda: gltf(nodes=[*({"children": [i + 1, i + 1]} for i in range(40)), {"mesh": 0}])
 )
 
 
-@harmless("nodes twenty thousand deep.gltf")
-def _() -> bytes:
-    count = 20_000
-    return gltf(nodes=[*({"children": [i + 1]} for i in range(count)), {"mesh": 0}])
-
-
-harmless(
-    "meshes in nodes fifty thousand deep.gltf",
-    lambda: gltf(nodes=[*({"children": [i + 1], "mesh": 0} for i in range(49_000)), {"mesh": 0}]),
+harmless("meshes in nodes fifty thousand deep.gltf")(
+    lambda: gltf(nodes=[*({"children": [i + 1], "mesh": 0} for i in range(49_000)), {"mesh": 0}])
 )
-refused(
-    "brackets a million deep.gltf",
-    "deep",
-    lambda: b'{"asset": {"version": "2.0"}, "extras": ' + b"[" * 10**6 + b"]" * 10**6 + b"}",
+refused("brackets a million deep.gltf", "deep")(
+    lambda: b'{"asset": {"version": "2.0"}, "extras": ' + b"[" * 10**6 + b"]" * 10**6 + b"}"
 )
 
 
-@refused("brackets a million deep.glb", "deep")
-def _() -> bytes:
-    text = b'{"asset": {"version": "2.0"}, "extras": ' + b"[" * 10**6 + b"]" * 10**6 + b"}"
-    chunk = struct.pack("<II", len(text), 0x4E4F534A) + text
-    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunk)) + chunk
-
-
-refused(
-    "a chunk of four billion bytes.glb",
-    "cut off|again",
-    lambda: struct.pack("<IIIII", 0x46546C67, 2, 0xFFFFFFFF, 0xFFFFFFF0, 0x4E4F534A) + b'{"asset":{}}',
+refused("a chunk of four billion bytes.glb", "cut off|again")(
+    lambda: struct.pack("<IIIII", 0x46546C67, 2, 0xFFFFFFFF, 0xFFFFFFF0, 0x4E4F534A) + b'{"asset":{}}'
 )
-refused(
-    "each of a thousand nodes below each.gltf",
-    "references",
-    lambda: gltf(nodes=[{"children": list(range(1000))}] * 999 + [{"mesh": 0}]),
+refused("each of a thousand nodes below each.gltf", "references")(
+    lambda: gltf(nodes=[{"children": list(range(1000))}] * 999 + [{"mesh": 0}])
 )
-refused("a million buffers.glb", "buffers", lambda: glb(gltf_tree(buffers=many(1_000_000, {"uri": "data:;base64,"}))))
+refused("a million buffers.glb", "buffers")(lambda: glb(gltf_tree(buffers=many(1_000_000, {"uri": "data:;base64,"}))))
 
 
 @refused("quantized views that only meshopt reads, in a buffer without bytes.gltf", "EXT_meshopt_compression")
@@ -285,3 +259,14 @@ def _() -> bytes:
     tree["scenes"] = [{"nodes": list(range(1000))}]
     tree["skins"] = [{"joints": [0] * 100_000}]
     return json.dumps(tree).encode()
+
+
+for ending in ("xaml", "3dxml", "xdmf", "h5", "vtk", "binvox", "dxf"):
+    refused(f"another format.{ending}", "convert it")(lambda: b"anything")
+refused("another format.zip", "unpack it")(lambda: b"anything")
+refused("a node below one whose mesh there is not.gltf", "no index")(
+    lambda: gltf(nodes=[{"mesh": -3, "children": [1]}, {"mesh": 0}])
+)
+refused("a node that is the parent of the scene.gltf", "itself")(
+    lambda: gltf(nodes=[{"name": "world", "children": [1]}, {"mesh": 0, "children": [0]}])
+)

@@ -19,24 +19,13 @@ HARMLESS: dict[str, Build] = {}
 BOX = creation.box()
 
 
-def refused(name: str, says: str, content: Content | None = None) -> Callable[[Content], None]:
-    """Register what makes the content of a file, given here or decorated; its ending is the last part of `name`."""
-
-    def register(content: Content) -> None:
-        REFUSED[name] = (_writer(name, content), says)
-
-    if content is not None:
-        register(content)
-    return register
+def refused(name: str, says: str) -> Callable[[Content], None]:
+    """Register what makes the content of a file; its ending is the last part of `name`."""
+    return lambda content: REFUSED.update({name: (_writer(name, content), says)})
 
 
-def harmless(name: str, content: Content | None = None) -> Callable[[Content], None]:
-    def register(content: Content) -> None:
-        HARMLESS[name] = _writer(name, content)
-
-    if content is not None:
-        register(content)
-    return register
+def harmless(name: str) -> Callable[[Content], None]:
+    return lambda content: HARMLESS.update({name: _writer(name, content)})
 
 
 def _writer(name: str, content: Content) -> Build:

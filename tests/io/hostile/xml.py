@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from tests.io.hostile.archives import MESH, model, threemf, zipped
 from tests.io.hostile.registry import BOX, harmless, refused
 
@@ -10,6 +13,16 @@ QUADRATIC = f"<!DOCTYPE a [<!ENTITY a '{'1 ' * 100_000}'>]>"
 EXTERNAL = "<!DOCTYPE a [<!ENTITY a SYSTEM 'file:///etc/passwd'>]>"
 OUTSIDE = "<!DOCTYPE a SYSTEM 'file:///dev/zero'>"
 PARAMETER = "<!DOCTYPE a [<!ENTITY % b SYSTEM 'file:///dev/zero'> %b;]>"
+
+ENTITIES = {
+    "a billion laughs": (LAUGHS, "&a12;"),
+    "an entity used a hundred thousand times": (QUADRATIC, "&a;" * 100_000),
+    "a file as an entity": (EXTERNAL, "&a;"),
+    "a document type that is a device": (OUTSIDE, ""),
+    "a device as a parameter": (PARAMETER, ""),
+}
+"""Document types, and how they are used."""
+
 
 COLLADA = (
     '<?xml version="1.0" encoding="utf-8"?>{doctype}'
@@ -38,7 +51,7 @@ def collada(**parts: str) -> bytes:
     return COLLADA.format(**{**text, **parts}).encode()
 
 
-harmless("a box.dae", lambda: collada())
+harmless("a box.dae")(lambda: collada())
 
 
 @harmless("a box that includes what it must not.dae")
@@ -49,35 +62,19 @@ def _() -> bytes:
     return collada(scene=f'<node id="n"><instance_geometry url="#g"/></node>{include}')
 
 
-for kind, (doctype, entity) in {
-    "a billion laughs": (LAUGHS, "&a12;"),
-    "an entity used a hundred thousand times": (QUADRATIC, "&a;" * 100_000),
-    "a file as an entity": (EXTERNAL, "&a;"),
-    "a document type that is a device": (OUTSIDE, ""),
-    "a device as a parameter": (PARAMETER, ""),
-}.items():
-
-    def _dae(doctype: str = doctype, entity: str = entity) -> bytes:
-        return collada(doctype=doctype, numbers=entity)
-
-    def _dae16(doctype: str = doctype, entity: str = entity) -> bytes:
-        text = collada(doctype=doctype, numbers=entity).decode().replace("utf-8", "utf-16")
-        return text.encode("utf-16")
-
-    def _3mf(doctype: str = doctype, entity: str = entity) -> bytes:
-        return threemf(model(doctype=doctype, items=f'<item objectid="1"/>{entity}'))
-
-    def _attribute(doctype: str = doctype, entity: str = entity) -> bytes:
-        return threemf(model(doctype=doctype, objects=f'<object id="1" name="{entity[:5000]}">{MESH}</object>'))
-
-    refused(f"{kind}.dae", "DOCTYPE", _dae)
-    refused(f"{kind} in UTF-16.dae", "DOCTYPE", _dae16)
-    refused(f"{kind}.3mf", "DOCTYPE", _3mf)
-    refused(f"{kind} in an attribute.3mf", "DOCTYPE", _attribute)
-refused(
-    "elements a hundred thousand deep.dae",
-    "deep|again",
-    lambda: collada(scene="<node>" * 100_000 + "</node>" * 100_000),
+USES: dict[str, Callable[[str, str], bytes]] = {
+    ".dae": lambda doctype, used: collada(doctype=doctype, numbers=used),
+    " in UTF-16.dae": lambda *of: USES[".dae"](*of).decode().replace("utf-8", "utf-16").encode("utf-16"),
+    ".3mf": lambda doctype, used: threemf(model(doctype=doctype, items=f'<item objectid="1"/>{used}')),
+    " in an attribute.3mf": lambda doctype, used: threemf(
+        model(doctype=doctype, objects=f'<object id="1" name="{used[:5000]}">{MESH}</object>')
+    ),
+}
+for kind, entity in ENTITIES.items():
+    for ending, write in USES.items():
+        refused(kind + ending, "DOCTYPE")(partial(write, *entity))
+refused("elements a hundred thousand deep.dae", "deep|again")(
+    lambda: collada(scene="<node>" * 100_000 + "</node>" * 100_000)
 )
 
 
@@ -102,19 +99,14 @@ def _() -> bytes:
     return collada(nodes=nodes, scene='<node id="n"><instance_node url="#a"/></node>')
 
 
-harmless(
-    "a name of a megabyte.dae",
-    lambda: collada(scene=f'<node name="{"n" * 10**6}">' + '<instance_geometry url="#g"/>' * 5000 + "</node>"),
+harmless("a name of a megabyte.dae")(
+    lambda: collada(scene=f'<node name="{"n" * 10**6}">' + '<instance_geometry url="#g"/>' * 5000 + "</node>")
 )
-refused(
-    "a million placed boxes.dae",
-    "places",
-    lambda: collada(scene='<node id="n">' + '<instance_geometry url="#g"/>' * 300_000 + "</node>"),
+refused("a million placed boxes.dae", "places")(
+    lambda: collada(scene='<node id="n">' + '<instance_geometry url="#g"/>' * 300_000 + "</node>")
 )
-refused(
-    "a polygon of two billion corners.dae",
-    "corners",
-    lambda: collada(faces=f'<polylist count="1">{INPUT}<vcount>2000000000</vcount><p>{INDICES}</p></polylist>'),
+refused("a polygon of two billion corners.dae", "corners")(
+    lambda: collada(faces=f'<polylist count="1">{INPUT}<vcount>2000000000</vcount><p>{INDICES}</p></polylist>')
 )
 
 
@@ -124,6 +116,6 @@ def _() -> bytes:
     return collada(faces=f'<triangles count="12">{far}<p>{INDICES}</p></triangles>')
 
 
-refused("an archive behind a mesh.dae", "archive", lambda: collada() + zipped({"bomb.dae": bytes(2**28)}))
-refused("a gigabyte of spaces.zae", "unpacks to", lambda: zipped({"mesh.dae": bytes(2**28)}))
-harmless("a box.zae", lambda: zipped({"manifest.xml": "<dae_root>mesh.dae</dae_root>", "mesh.dae": collada()}))
+refused("an archive behind a mesh.dae", "archive")(lambda: collada() + zipped({"bomb.dae": bytes(2**28)}))
+refused("a gigabyte of spaces.zae", "unpacks to")(lambda: zipped({"mesh.dae": bytes(2**28)}))
+harmless("a box.zae")(lambda: zipped({"manifest.xml": "<dae_root>mesh.dae</dae_root>", "mesh.dae": collada()}))

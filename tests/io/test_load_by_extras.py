@@ -1,0 +1,115 @@
+"""Formats that extras read: without its extra each is named, and damage is refused in one sentence."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+from fuzz.damaged import CASES, written_by_extras
+from fuzz.fbx import Model, fbx
+from rlacd.cli.main import app
+from rlacd.errors import EmptyMeshError, MeshFileError, MissingExtraError
+from rlacd.io.read.cad import DEVIATION
+from rlacd.io.read.load import load_mesh
+
+BOX = trimesh.creation.box()
+
+WHOLE = fbx([Model("box", BOX.vertices, BOX.faces.tolist())])
+
+USD = ("usda", "usdc", "usdz")
+EXTRAS = {"draco": "DracoPy", "fbx": "ufbx", "cad": "cascadio", "usd": "pxr"}
+FORMATS = {"glb": "draco", "fbx": "fbx", "step": "cad", "stp": "cad", "igs": "cad"} | dict.fromkeys(USD, "usd")
+
+
+@pytest.mark.parametrize("ending", ["glb", "fbx", "step", "igs", *USD])
+def test_a_format_whose_extra_is_missing_names_it(tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    extra = FORMATS[ending]
+    pytest.importorskip(EXTRAS[extra])
+    path = tmp_path / f"box.{ending}"
+    path.write_bytes(next(seed.content for kind, seed in written_by_extras(BOX) if kind == ending))
+    monkeypatch.setitem(sys.modules, EXTRAS[extra], None)
+    with pytest.raises(MissingExtraError, match=rf"pip install 'rlacd\[{extra}\]'"):
+        load_mesh(path)
+
+
+@pytest.mark.promise("hostile-files")
+@pytest.mark.parametrize(
+    ("ending", "content"),
+    [
+        pytest.param("fbx", b"Kaydara FBX Binary  \0\x1a\0", id="the head of an FBX file"),
+        pytest.param("fbx", WHOLE[:-500], id="an FBX file cut off"),
+        pytest.param("fbx", fbx([Model("wild", BOX.vertices, [[0, 1, 800]])]), id="an index of FBX"),
+        pytest.param("fbx", WHOLE.replace(b"Vertices", b"Verticez"), id="FBX without points"),
+        pytest.param("fbx", b"; FBX 6.1.0 project file\n", id="an empty FBX file"),
+        pytest.param("step", b"ISO-10303-21;", id="the head of a STEP file"),
+        pytest.param("stp", (CASES / "stand.step").read_bytes()[:9000], id="a STEP file cut off"),
+        pytest.param("igs", bytes(200) + b"S", id="zeros as IGES"),
+        pytest.param("usda", b"#usda 1.0\n(((", id="USD as text"),
+        pytest.param("usdc", b"PXR-USDC" + b"\xff" * 200, id="USD in binary"),
+        pytest.param("usdz", b"PK\x03\x04" + bytes(60), id="an archive of USD"),
+        pytest.param("obj", WHOLE, id="FBX by another name"),
+    ],
+)
+def test_damage_is_refused_in_one_sentence(tmp_path: Path, ending: str, content: bytes) -> None:
+    pytest.importorskip(EXTRAS[FORMATS.get(ending, "fbx")])
+    (tmp_path / f"a.{ending}").write_bytes(content)
+    says = r"not obj but fbx: rename it to \.fbx" if ending == "obj" else "export"
+    with pytest.raises((MeshFileError, EmptyMeshError), match=says) as said:
+        load_mesh(tmp_path / f"a.{ending}")
+    assert len(str(said.value).splitlines()) == 1
+
+
+STAND, BALL = CASES / "stand.step", CASES / "ball_inch.igs"
+"""A plate of 60 x 40 x 10 mm with two pins on it, and a ball whose file is in inches."""
+
+CAD = pytest.mark.skipif(find_spec("cascadio") is None, reason="the extra cad is not installed")
+
+
+@CAD
+def test_parts_of_an_assembly_are_nodes_in_metres(tmp_path: Path) -> None:
+    mesh = load_mesh(shutil.copy(STAND, tmp_path / "stand.STP"))
+    assert (mesh.up, mesh.metres, mesh.warnings) == ("z", 1.0, ())
+    parts = {node.name: mesh.of_node(index) for index, node in enumerate(mesh.nodes)}
+    solids = {name: trimesh.Trimesh(part.vertices, part.faces) for name, part in parts.items()}
+    assert sorted(solids) == ["pin_left", "pin_right", "plate"]
+    assert np.allclose(solids["plate"].bounds, [[0, 0, -0.01], [0.06, 0.04, 0]], atol=1e-8)
+    for name, x in (("pin_left", 0.01), ("pin_right", 0.05)):
+        assert np.allclose(solids[name].bounds.mean(axis=0), (x, 0.02, 0.01), atol=DEVIATION * 0.06)
+        assert solids[name].volume == pytest.approx(np.pi * 0.005**2 * 0.02, rel=0.01)
+
+
+@CAD
+def test_triangles_keep_to_the_surface_and_inches_are_converted() -> None:
+    mesh = load_mesh(BALL)
+    assert mesh.metres == 1.0
+    of_corners, of_middles = (
+        np.linalg.norm(p, axis=1) for p in (mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1))
+    )
+    assert np.allclose(of_corners, 0.03, atol=1e-6)
+    assert 0.03 - of_middles.min() < DEVIATION * 0.06
+
+
+@CAD
+def test_a_length_needs_no_unit_and_another_than_metres_is_warned_of(tmp_path: Path) -> None:
+    words = ["decompose", str(STAND), "-o", str(tmp_path / "out.glb"), "--quality", "fast", "--threshold", "1mm"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    run = CliRunner().invoke(app, [*words[:-1], "5%", "--unit", "mm"])
+    assert "warning: the unit of stand.step is 1 m, by its format or by what it says; --unit mm overrides" in run.stderr
+
+
+@CAD
+def test_parts_that_lie_in_other_files_are_missed(tmp_path: Path) -> None:
+    text, brep = STAND.read_text(), r"ADVANCED_BREP_SHAPE(_REPRESENTATION\('',\(#\d+),#\d+"
+    (tmp_path / "one.step").write_text(re.sub(brep, r"SHAPE\1", text, count=1))
+    (tmp_path / "all.step").write_text(re.sub(brep, r"SHAPE\1", text))
+    assert "left out: 1" in load_mesh(tmp_path / "one.step").warnings[0]
+    with pytest.raises(MeshFileError, match="export them all into one"):
+        load_mesh(tmp_path / "all.step")
