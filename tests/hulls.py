@@ -43,6 +43,12 @@ def moved(hull: trimesh.Trimesh, scale: float, shift: npt.ArrayLike) -> trimesh.
     return hull_of(hull.vertices * scale + np.asarray(shift))
 
 
+def assert_same_hulls(one: Iterable[trimesh.Trimesh], *others: Iterable[trimesh.Trimesh]) -> None:
+    """To the bit, in the same order."""
+    first, *rest = ([(hull.vertices.tobytes(), hull.faces.tobytes()) for hull in hulls] for hulls in (one, *others))
+    assert all(hulls == first for hulls in rest)
+
+
 def assert_convex_hull(mesh: trimesh.Trimesh) -> None:
     """Closed, outward oriented, no face degenerate, and no vertex above any face: in exact arithmetic."""
     edges = np.sort(mesh.edges, axis=1)
