@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -154,22 +154,27 @@ def test_time_may_run_out_before_pairs_are_looked_at() -> None:
     assert late.stopped_by == "timeout"
 
 
-def test_a_face_deep_in_a_hull_is_seen_without_its_corners() -> None:
+def grooved() -> Manifold:
     """A groove from end to end: its corners lie on the hull, its bottom deep inside; the hull is nowhere far away."""
-    ends = [(-0.04, 0.0), (0.04, 0.0), (0.0, -0.3)]
-    groove = Manifold.extrude(CrossSection([[ends[0], ends[2], ends[1]]]), 1).translate((0, 0, -0.5))
-    solid = Component(block(1, 1, 1, (0, -0.5, 0)) - groove)
-    assert solid.volume == pytest.approx(1 - 0.5 * 0.08 * 0.3)
-    for threshold in (0.05, 0.1, 0.29):
-        assert Concavity(threshold).screen.feasibility(solid.filling, solid.hull) is Feasibility.NEVER
-    assert Concavity(0.31).screen.feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
+    groove = CrossSection([[(-0.04, 0.0), (0.0, -0.3), (0.04, 0.0)]])
+    return block(1, 1, 1, (0, -0.5, 0)) - Manifold.extrude(groove, 1).translate((0, 0, -0.5))
 
 
-def test_a_window_in_a_wall_is_seen_between_the_points_first_looked_at() -> None:
-    wall = block(4, 4, 0.3) - block(0.3, 0.3, 1, (0.83, -1.41, 0))
-    solid = Component(wall)
-    assert Concavity(0.1).screen.feasibility(solid.filling, solid.hull) is not Feasibility.MAYBE
-    assert Concavity(0.2).screen.feasibility(solid.filling, solid.hull) is Feasibility.MAYBE
+@pytest.mark.parametrize(
+    ("solid", "too_deep", "deep_enough"),
+    [
+        (grooved, (0.05, 0.1, 0.29), 0.31),
+        (lambda: block(4, 4, 0.3) - block(0.3, 0.3, 1, (0.83, -1.41, 0)), (0.1,), 0.2),
+    ],
+    ids=["a face deep in a hull without its corners", "a window between the points first looked at"],
+)
+def test_what_is_deep_in_a_hull_is_seen(
+    solid: Callable[[], Manifold], too_deep: tuple[float, ...], deep_enough: float
+) -> None:
+    whole = Component(solid())
+    for threshold in too_deep:
+        assert Concavity(threshold).screen.feasibility(whole.filling, whole.hull) is Feasibility.NEVER
+    assert Concavity(deep_enough).screen.feasibility(whole.filling, whole.hull) is Feasibility.MAYBE
 
 
 def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:

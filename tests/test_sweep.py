@@ -93,7 +93,10 @@ def finned_tetrahedron() -> tuple[FloatArray, IntArray]:
     return vertices, np.array([*tetrahedron, *fin], dtype=np.int32)
 
 
-@pytest.mark.parametrize("solid", [crowded_pyramid(12), crowded_pyramid(40), finned_tetrahedron()])
+DEGENERATE = {"crowded 12": crowded_pyramid(12), "crowded 40": crowded_pyramid(40), "fin": finned_tetrahedron()}
+
+
+@pytest.mark.parametrize("solid", DEGENERATE.values(), ids=DEGENERATE)
 def test_corners_count_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray]) -> None:
     component = Component(solid)
     vertices, faces = solid
@@ -141,13 +144,6 @@ def test_planes_that_miss_or_shave_are_invalid() -> None:
     assert valid[2, 12]
 
 
-@pytest.mark.parametrize("offsets", [[0.5, 0.2], [0.2, np.nan], [np.inf, np.inf]])
-def test_offsets_have_to_be_finite_and_ascend(offsets: list[float]) -> None:
-    component = Component(Manifold.cube((1, 1, 1)))
-    with pytest.raises(ValueError, match="finite and ascend"):
-        _native.sweep(component.vertices, component.faces, np.eye(3)[:1], np.array([offsets]), 1)
-
-
 # --- the plane of least excess ----------------------------------------------------------------------------------------
 
 
@@ -172,21 +168,13 @@ def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
 
 
 @pytest.mark.parametrize("score", EXPONENTS)
-@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize("name", [*SOLIDS, *DEGENERATE])
 def test_it_is_the_plane_that_a_sweep_of_all_finds(name: str, score: str) -> None:
-    component = Component(SOLIDS[name]())
+    component = Component(SOLIDS[name]() if name in SOLIDS else DEGENERATE[name])
     sweeps = SweepCache()
     swept = sweeps.of(component)
     found = least_excess(component, sweeps.candidates(component), EXPONENTS[score])
     assert found == cheapest(swept, COSTS[score](swept))
-
-
-@pytest.mark.parametrize("solid", [crowded_pyramid(12), crowded_pyramid(40), finned_tetrahedron()])
-def test_it_is_so_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray]) -> None:
-    component = Component(solid)
-    candidates = axis_and_principal(component)
-    swept = sweep(component, candidates)
-    assert least_excess(component, candidates, EXPONENTS["excess_norm"]) == cheapest(swept, excess_norm(swept))
 
 
 @st.composite
@@ -248,25 +236,30 @@ def test_slivers_are_left_only_where_every_plane_leaves_one() -> None:
     assert least_excess(notched, Candidates(np.zeros((0, 3)), np.zeros((0, 1))), 1.0) is None
 
 
-def ask(vertices: FloatArray, offsets: list[float], exponent: float = 1.3, tie: float = 0.0) -> int:
-    faces = Component(gear()).faces
-    return _native.find_least_excess(
-        vertices, faces, np.eye(3)[:1], np.array([offsets]), exponent, tie, 1e-11, [SLIVER], 1
-    )
+@pytest.mark.parametrize(
+    ("offsets", "exponent", "tie", "says"),
+    [
+        ([0.5, 0.2], 1.3, 0.0, "finite and ascend"),
+        ([0.2, math.nan], 1.3, 0.0, "finite and ascend"),
+        ([math.inf, math.inf], 1.3, 0.0, "finite and ascend"),
+        ([0.2], 0.9, 0.0, "exponent"),
+        ([0.2], math.nan, 0.0, "exponent"),
+        ([0.2], 1.3, -1.0, "tie"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(offsets: list[float], exponent: float, tie: float, says: str) -> None:
+    component, planes = Component(gear()), (np.eye(3)[:1], np.array([offsets]))
+    with pytest.raises(ValueError, match=says):
+        _native.find_least_excess(component.vertices, component.faces, *planes, exponent, tie, 1e-11, [SLIVER], 1)
+    if says == "finite and ascend":
+        with pytest.raises(ValueError, match=says):
+            _native.sweep(component.vertices, component.faces, *planes, 1)
 
 
-def test_what_makes_no_sense_is_refused() -> None:
-    vertices = Component(gear()).vertices
-    assert ask(vertices, [0.1, 0.2]) in (0, 1)
-    with pytest.raises(ValueError, match="finite and ascend"):
-        ask(vertices, [0.5, 0.2])
-    with pytest.raises(ValueError, match="finite and ascend"):
-        ask(vertices, [0.2, math.nan])
-    with pytest.raises(ValueError, match="exponent"):
-        ask(vertices, [0.2], exponent=0.9)
-    with pytest.raises(ValueError, match="exponent"):
-        ask(vertices, [0.2], exponent=math.nan)
-    with pytest.raises(ValueError, match="tie"):
-        ask(vertices, [0.2], tie=-1.0)
+def test_corners_that_are_not_finite_are_refused() -> None:
+    component = Component(gear())
+    vertices = np.where(component.vertices == component.vertices.max(), np.nan, component.vertices)
     with pytest.raises(ValueError, match="not finite"):
-        ask(np.where(vertices == vertices.max(), np.nan, vertices), [0.2])
+        _native.find_least_excess(
+            vertices, component.faces, np.eye(3)[:1], np.array([[0.2]]), 1.3, 0, 1e-11, [SLIVER], 1
+        )

@@ -7,17 +7,16 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from manifold3d import Manifold, Mesh64, OpType
-from scipy.sparse import coo_array
+from manifold3d import Manifold, OpType
 from scipy.sparse.csgraph import connected_components
 
 from rlacd import _native
-from rlacd._native import components, face_areas, long_normals, signed_tetrahedra
+from rlacd._native import face_areas, long_normals, signed_tetrahedra
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.repair.union import unite, volume_of
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.topology import Edges, bodies_of, first_of_doubled, has_marked
+from rlacd.solid.topology import Edges, bodies_of
 
 
 def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:
@@ -58,53 +57,20 @@ def test_welding_keeps_first_places_and_one_of_equal_faces(seed: int, count: int
     assert [frozenset(face) in films for face in faces_found.tolist()] == is_film.tolist()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=50, deadline=None)
 @soups
-def test_edges_are_the_distinct_pairs_in_ascending_order(seed: int, count: int, faces: int) -> None:
+def test_edges_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) -> None:
+    """Edges are the distinct pairs in ascending order; bodies share them and are numbered by their first faces."""
     _, triangles = soup(seed, count, faces)
+    vertices, edges = np.random.default_rng(seed).normal(size=(count, 3)), Edges.of(triangles, count)
     pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     distinct, inverse, valence = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    edges = Edges.of(triangles, count)
     assert np.array_equal(edges.vertices, distinct)
     assert np.array_equal(edges.of_halfedge, inverse.reshape(-1))
     assert np.array_equal(edges.valence, valence)
-
-
-@settings(max_examples=200, deadline=None)
-@soups
-def test_doubled_faces_and_equal_places_are_found(seed: int, count: int, faces: int) -> None:
-    vertices, triangles = soup(seed, count, faces)
-    seen: set[tuple[int, ...]] = set()
-    expected = []
-    for corners in map(tuple, np.sort(triangles, axis=1).tolist()):
-        expected.append(corners not in seen)
-        seen.add(corners)
-    assert first_of_doubled(triangles, count).tolist() == expected
-    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
-    assert np.array_equal(_native.first_in_place(vertices), first[inverse.reshape(-1)])
-    marked = np.random.default_rng(seed).random(count) < 0.2
-    assert np.array_equal(has_marked(marked, triangles), marked[triangles].any(axis=1))
-
-
-@settings(max_examples=200, deadline=None)
-@soups
-def test_components_are_numbered_by_their_first_nodes(seed: int, count: int, faces: int) -> None:
-    a, b, _ = soup(seed, count, faces)[1].T
-    number, label = components(count, a, b)
-    expected, same = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)
-    assert number == expected
-    assert len(np.unique(np.stack([label, same]), axis=1).T) == number
-    assert np.array_equal(np.unique(label), np.arange(number))
-    assert (np.diff(np.unique(label, return_index=True)[1]) > 0).all()
-
-
-@settings(max_examples=50, deadline=None)
-@soups
-def test_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) -> None:
-    _, triangles = soup(seed, count, faces)
-    vertices = np.random.default_rng(seed).normal(size=(count, 3))
-    number, body = bodies_of(triangles, Edges.of(triangles, count))
-    edge = Edges.of(triangles, count).of_halfedge.reshape(-1, 3)
+    number, body = bodies_of(triangles, edges)
+    assert (np.diff(np.unique(body, return_index=True)[1]) > 0).all()
+    edge = edges.of_halfedge.reshape(-1, 3)
     shares = (edge[:, None, :, None] == edge[None, :, None, :]).any(axis=(2, 3))
     expected, same = connected_components(shares, directed=False)
     assert number == expected
@@ -114,8 +80,8 @@ def test_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) ->
     np.testing.assert_allclose(signed_tetrahedra(vertices, triangles), np.linalg.det(corners) / 6, atol=1e-14)
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     assert np.array_equal(long_normals(vertices, triangles), np.cross(along, across))
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
-    np.testing.assert_allclose(_native.longest_edges(vertices, triangles), edges, rtol=1e-14)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
+    np.testing.assert_allclose(_native.longest_edges(vertices, triangles), longest, rtol=1e-14)
 
 
 def test_indices_out_of_range_are_refused() -> None:
@@ -176,18 +142,6 @@ def test_a_mesh_that_manifold3d_would_change_is_left_to_it(sliver: float) -> Non
     solid = repair(InputMesh(vertices, np.asarray(ball.faces, dtype=np.int64), "ball", ()))
     assert isinstance(solid.shape, Manifold)
     assert solid.manifold.volume() == pytest.approx(_native.mesh_volume(vertices, np.asarray(ball.faces, np.int32)))
-
-
-def test_a_closed_mesh_is_sorted_along_a_curve_as_manifold3d_sorts() -> None:
-    rng = np.random.default_rng(0)
-    ball = trimesh.creation.icosphere(4)
-    place = rng.permutation(len(ball.vertices))
-    vertices = np.asarray(ball.vertices)[place] * [1.0, 0.7, 0.4]
-    faces = rng.permutation(np.argsort(place)[ball.faces]).astype(np.int32)
-    expected = Manifold(Mesh64(vertices, faces.astype(np.uint64))).to_mesh64()
-    sorted_vertices, sorted_faces = _native.along_a_curve(vertices, faces)
-    assert np.array_equal(sorted_vertices, expected.vert_properties[:, :3])
-    assert np.array_equal(sorted_faces, expected.tri_verts)
 
 
 def test_windings_decide_where_rounding_folds_a_closed_surface() -> None:
