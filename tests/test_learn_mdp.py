@@ -12,7 +12,6 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
-from rlacd.errors import TrainingError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.meshes import list_meshes
 from rlacd.learn.process import Cut, CutProcess, terminal_reward
@@ -53,7 +52,9 @@ def cut_greedily(cutting: CutProcess) -> list[Cut]:
     return earned
 
 
-def check_same_as_decompose(solid: Component) -> None:
+@pytest.mark.parametrize("name", small_solids())
+def test_the_same_policy_reaches_the_same_components_as_decompose(name: str) -> None:
+    solid = Component(small_solids()[name])
     with Run(1) as run:
         done, left = CutTree(solid, GreedyOverMask(), run).cut_until(CRITERION)
     cutting = CutProcess(solid, CRITERION)
@@ -65,17 +66,6 @@ def check_same_as_decompose(solid: Component) -> None:
     assert sum(cut.saved for cut in earned) * solid.hull.volume == pytest.approx(start - end, abs=1e-9)
     paid = terminal_reward(len(cutting.finished)) if earned and cutting.terminal else 0
     assert sum(cut.finishes for cut in earned) == paid
-
-
-@pytest.mark.parametrize("name", small_solids())
-def test_the_same_policy_reaches_the_same_components_as_decompose(name: str) -> None:
-    check_same_as_decompose(Component(small_solids()[name]))
-
-
-@pytest.mark.nightly
-def test_the_same_policy_reaches_the_same_components_of_real_meshes(corpus: Path) -> None:
-    for solid in real_solids(corpus, 6):
-        check_same_as_decompose(solid)
 
 
 def test_reward_of_an_angle_by_hand() -> None:
@@ -130,8 +120,3 @@ def test_unreadable_meshes_are_left_out_and_counted(meshes: Path) -> None:
     assert len(listed.validation) == 2
     assert "deeper/table.ply" in listed.training + listed.validation
     assert list_meshes(meshes, max_faces=12, validation=0, seed=0).training == ("box.ply",)
-
-
-def test_folders_without_anything_to_learn_are_one_clear_error(tmp_path: Path) -> None:
-    with pytest.raises(TrainingError, match="holds 0 meshes"):
-        list_meshes(tmp_path / "none", max_faces=1000, validation=0, seed=0)

@@ -158,17 +158,8 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     run(meshes, whole, iterations=400)
     given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "jobs": 2}.items()]
-    command = [
-        sys.executable,
-        "-c",
-        "from rlacd.cli.main import main; main()",
-        "train",
-        str(meshes),
-        "--run",
-        str(killed),
-    ]
-    command += ["--preset", "paper", "--encoder", "sweep"]  # the defaults of TrainOptions
-    process = subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL)
+    words = ["train", str(meshes), "--run", str(killed), "--preset", "paper", "--encoder", "sweep"]  # the defaults
+    process = subprocess.Popen([sys.executable, "-m", "rlacd", *words, *given], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while not (killed / "policy.npz").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -179,17 +170,7 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("jobs", [1, 3])
-def test_where_episodes_are_played_changes_nothing(meshes: Path, tmp_path: Path, jobs: int) -> None:
-    changes = {"environments": 4}
-    run(meshes, tmp_path / "alone", **changes)
-    with LocalPool(jobs) as pool:
-        run(meshes, tmp_path / "spread", pool=pool, **changes)
-    assert_same_run(tmp_path / "alone", tmp_path / "spread")
-
-
-@pytest.mark.nightly
-def test_a_worker_that_is_killed_changes_nothing(meshes: Path, tmp_path: Path) -> None:
+def test_where_episodes_are_played_and_a_worker_that_is_killed_change_nothing(meshes: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "alone")
     killed: list[psutil.Process] = []
 
