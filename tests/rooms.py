@@ -1,6 +1,6 @@
 """The rooms of the package, read from the table of docs/design.md, and the imports between them, read from the code.
 
-``python -m tests.rooms`` prints both, with the lines of each room, and draws docs/rooms.svg.
+``python -m tests.rooms`` draws docs/rooms.svg.
 """
 
 from __future__ import annotations
@@ -160,14 +160,4 @@ def picture(package: Path, rooms: list[Room]) -> str:
 
 
 if __name__ == "__main__":
-    package = ROOT / "src" / "rlacd"
-    rows = table()
-    PICTURE.write_text(picture(package, rows), encoding="utf-8")
-    home, arrows = homes(package, rows), imported_rooms(package, rows)
-    lengths: dict[str | None, int] = defaultdict(int)
-    for module, path in modules(package).items():
-        lengths[home[module]] += len(path.read_text(encoding="utf-8").splitlines())
-    for row in rows:
-        there = [other.name for other in rows if other.name in set(arrows[row.name]) - {NATIVE, SHARED}]
-        print(f"{row.name:16} {lengths[row.name]:6} lines; imports {', '.join(there) or '–'}")
-    print("from decompose: {} files in {} rooms, {} climbs".format(*walk(package, rows, "rlacd.decompose_mesh")))
+    PICTURE.write_text(picture(ROOT / "src" / "rlacd", table()), encoding="utf-8")

@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import inspect
 import re
-from collections.abc import Iterable
 from pathlib import Path
 
 import click
@@ -24,7 +23,9 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_the_sample_is_two_closed_bodies_of_a_few_thousand_triangles() -> None:
-    scene = script(ROOT / "examples" / "sample.py").sample()
+    sample = script(ROOT / "examples" / "sample.py").sample
+    scene = sample()
+    assert sample().export(file_type="glb") == scene.export(file_type="glb"), "it is the same every time"
     assert set(scene.geometry) == {"chair", "jug"}
     assert all(mesh.is_watertight and mesh.body_count == 1 for mesh in scene.geometry.values())
     assert scene.geometry["chair"].euler_number == 2 - 2 * 7, "a chair with seven windows to see through"
@@ -43,11 +44,6 @@ def test_the_script_that_trains_on_one_mesh_falls_from_random_planes_to_greedys(
     assert points[-1]["seconds"] < 300
 
 
-def test_the_sample_is_the_same_every_time() -> None:
-    sample = script(ROOT / "examples" / "sample.py").sample
-    assert sample().export(file_type="glb") == sample().export(file_type="glb")
-
-
 @functools.cache
 def gallery() -> dict[str, list[str]]:
     """The rows of the gallery's table, by the name of the object."""
@@ -56,26 +52,21 @@ def gallery() -> dict[str, list[str]]:
     return {row[0]: row[1:] for row in rows[1:]}
 
 
-def holds(corpus: Path, names: Iterable[str]) -> None:
+QUICK = ["vhacd/lamp.ply", "vhacd/horse_walk.ply", "vhacd/teddy.ply"]
+OBJECTS = re.findall(r'"(\w+/\S+\.ply)"', (ROOT / "examples" / "gallery.py").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in QUICK else pytest.mark.nightly) for n in OBJECTS]
+)
+def test_rows_of_the_gallery_are_what_the_objects_give(corpus: Path, name: str) -> None:
     pytest.importorskip("PIL", reason="the extra view is not installed")
-    for name in names:
-        result = rlacd.decompose(corpus / "test" / name)
-        cells = [f"{len(result.source.faces):,}", str(len(result)), f"{result.report['faces']:,}"]
-        stem = Path(name).stem.partition("-")[0].lower()
-        assert gallery()[stem] == [*cells, f"{result.report['hausdorff']['over']:.3f}"], stem
-        assert (ROOT / "docs" / "gallery_objects" / f"{stem}.webp").is_file()
-
-
-@pytest.mark.slow
-def test_some_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> None:
-    holds(corpus, ["vhacd/lamp.ply", "vhacd/horse_walk.ply", "vhacd/teddy.ply"])
-
-
-@pytest.mark.nightly
-def test_all_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> None:
-    objects = script(ROOT / "examples" / "gallery.py").OBJECTS
-    assert len(gallery()) == len(objects) == 12
-    holds(corpus, objects)
+    assert len(gallery()) == len(OBJECTS) == 12
+    result = rlacd.decompose(corpus / "test" / name)
+    cells = [f"{len(result.source.faces):,}", str(len(result)), f"{result.report['faces']:,}"]
+    stem = Path(name).stem.partition("-")[0].lower()
+    assert gallery()[stem] == [*cells, f"{result.report['hausdorff']['over']:.3f}"]
+    assert (ROOT / "docs" / "gallery_objects" / f"{stem}.webp").is_file()
 
 
 @pytest.mark.slow
@@ -127,7 +118,7 @@ def test_the_readme_works_outside_the_repository() -> None:
 
 
 @pytest.mark.promise("all-options")
-def test_the_table_names_every_option() -> None:
+def test_the_table_names_every_option_and_the_command_offers_every_argument() -> None:
     table = "".join(line.split("|")[1] for line in options_table().splitlines())
     command = app.get_command(click.Context(app), "decompose")
     options = {
@@ -139,6 +130,7 @@ def test_the_table_names_every_option() -> None:
     }
     assert {name for name in options if f"`{name}`" not in table and f"{name}/" not in table} == set()
     arguments = set(inspect.signature(rlacd.decompose).parameters) - {"mesh"}
+    assert arguments - {"progress", "volume_tolerance"} <= {parameter.name for parameter in command.params}
     assert {name for name in arguments if f"`{name}`" not in table} == set()
 
 
@@ -149,15 +141,6 @@ def test_the_function_has_the_options_as_they_are_stated_once() -> None:
         if field.name != "criterion":  # a class that has the criterion's own methods
             assert given[field.name].annotation == field.type
     assert set(given) == {field.name for field in dataclasses.fields(Options)} | {"mesh", "progress"}
-
-
-@pytest.mark.promise("all-options")
-def test_the_command_offers_every_argument_of_the_function() -> None:
-    command = app.get_command(click.Context(app), "decompose")
-    offered = {parameter.name for parameter in command.params}
-    assert (
-        set(inspect.signature(rlacd.decompose).parameters) - {"progress", "volume_tolerance"} <= offered
-    )  # --tolerance
 
 
 @pytest.mark.nightly

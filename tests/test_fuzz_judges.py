@@ -18,7 +18,7 @@ from fuzz.judges import Case, judge
 from fuzz.kernels import try_seed
 from fuzz.recipes import Shape, make_shape
 from rlacd.options import Options
-from tests.shapes import Closed, box, from_manifold, point_to_triangles
+from tests.shapes import Closed, box, from_manifold
 
 pytestmark = pytest.mark.slow
 
@@ -101,19 +101,19 @@ def test_what_is_wrong_with_a_hull_is_reported() -> None:
 def test_distances_are_those_of_the_brute_force_reference() -> None:
     random = np.random.default_rng(3)
     points = 2 * random.normal(size=(200, 3))
-    expected = point_to_triangles(points, ELL.vertices, ELL.faces)
+    _, expected, _ = trimesh.proximity.closest_point(trimesh.Trimesh(ELL.vertices, ELL.faces), points)
     np.testing.assert_allclose(distance_to_triangles(points, ELL.vertices[ELL.faces]), expected, atol=1e-12)
-    hulls = [Polytope(part.vertices, part.faces.astype(np.int64)) for part in (Closed(*cube) for cube in _cubes())]
-    inside = (hulls[0].height(points) <= 0) | (hulls[1].height(points) <= 0)
-    union = np.minimum(*(point_to_triangles(points, hull.vertices, hull.faces) for hull in hulls))
-    np.testing.assert_allclose(distance_to_union(points, hulls), np.where(inside, 0, union), atol=1e-12)
+    beyond = [np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=1) for low, high in CUBES]
+    hulls = [cube(bounds) for bounds in CUBES]
+    np.testing.assert_allclose(distance_to_union(points, hulls), np.minimum(*beyond), atol=1e-12)
 
 
-def _cubes() -> list[tuple[Any, Any]]:
-    return [
-        (solid.vertices, solid.faces)
-        for solid in map(from_manifold, (box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (3, 1, 1))))
-    ]
+CUBES = np.array([[(0, 0, 0), (1, 1, 1)], [(1, 0, 0), (3, 1, 1)]], dtype=float)
+
+
+def cube(bounds: Any) -> Polytope:
+    mesh = creation.box(bounds=bounds)
+    return Polytope(np.array(mesh.vertices), np.array(mesh.faces))
 
 
 def test_the_farthest_point_is_that_of_trying_all() -> None:
@@ -130,16 +130,12 @@ def test_the_farthest_point_is_that_of_trying_all() -> None:
 
 @pytest.mark.parametrize("step", [0, 1e-7, -1e-7])
 def test_a_seam_between_hulls_is_not_outer(step: float) -> None:
-    cubes = [
-        (np.add(vertices, [step * (i == 1), 0, 0]), faces.astype(np.int64))
-        for i, (vertices, faces) in enumerate(_cubes())
-    ]
-    hulls = [Polytope(*cube) for cube in cubes]
+    hulls = [cube(CUBES[0]), cube(CUBES[1] + [step, 0, 0])]
     points = outer_points(hulls, 20_000, np.random.default_rng(1))
     on_seam = (np.abs(points[:, 0] - 1) < 1e-5) & (np.abs(points[:, 1:] - 0.5) < 0.49).all(axis=1)
     assert len(points) > 10_000
     assert not on_seam.any()
-    apart = [hulls[0], Polytope(cubes[1][0] + [1e-3, 0, 0], cubes[1][1])]
+    apart = [hulls[0], cube(CUBES[1] + [step + 1e-3, 0, 0])]
     points = outer_points(apart, 20_000, np.random.default_rng(1))
     assert ((points[:, 0] == 1) & (np.abs(points[:, 1:] - 0.5) < 0.49).all(axis=1)).sum() > 100
 

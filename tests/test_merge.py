@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,12 +15,12 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import grow_cover, merge_parts
+from rlacd.merge.slivers import SLIVER_LOSS, drop_slivers, is_film, is_sliver
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part, Plane
-from tests.shapes import bent_bar, box, dense, from_manifold, own_volume, to_manifold, together
-from tests.test_redistribute import depth_outside
+from tests.shapes import bent_bar, box, dense, depth_outside, from_manifold, own_volume, to_manifold, together
 from tests.test_sweep import SOLIDS
 
 
@@ -48,31 +50,31 @@ def test_a_shattered_box_becomes_one_part(run) -> None:
     assert whole.hull.volume == pytest.approx(2)
 
 
-def test_parts_of_an_l_never_become_one(run) -> None:
-    shape = Manifold.cube((2, 1, 1)) + Manifold.cube((1, 2, 1))
-    parts = pieces_of(shape, along((0, 1, 0), 1.0), along((1, 0, 0), 0.5), along((0, 0, 1), 0.3))
-    assert len(merge_parts(parts, Concavity(0.05), run)) >= 2
+def sheets(gap: float) -> list[Component]:
+    return [Component(Manifold.cube((1, 1, 0.01)).translate((0, 0, i * (0.01 + gap)))) for i in range(2)]
 
 
-def test_the_inner_surface_of_a_tube_forbids_uniting_its_halves(run) -> None:
-    """Joint R_v is small for a thin bore, but its wall lies deep inside the joint hull: both ways have to be tested."""
-    tube = Manifold.cube((1, 1, 1), True) - Manifold.cylinder(2, 0.06, 0.06, 24, True)
-    parts = pieces_of(tube, along((1, 0, 0), 0.0))
-    assert len(merge_parts(parts, Concavity(0.05), run)) >= 2
+APART: dict[str, Callable[[], list[Component]]] = {
+    "an L": lambda: pieces_of(
+        Manifold.cube((2, 1, 1)) + Manifold.cube((1, 2, 1)), *(along(normal, 0.5) for normal in np.eye(3).tolist())
+    ),
+    # Joint R_v is small for a thin bore, but its wall lies deep inside the joint hull: both ways have to be tested.
+    "a tube": lambda: pieces_of(
+        Manifold.cube((1, 1, 1), True) - Manifold.cylinder(2, 0.06, 0.06, 24, True), along((1, 0, 0), 0.0)
+    ),
+    # The walls of the crack are surface of the union, and lie half a unit inside its hull.
+    "a deep crack": lambda: [Component(Manifold.cube((1, 1, 1)).translate((i * 1.001, 0, 0))) for i in range(2)],
+    "a gap deeper than the threshold": lambda: sheets(0.2),
+}
+
+
+@pytest.mark.parametrize("name", APART)
+def test_parts_stay_apart_where_their_joint_hull_is_not_tight(run, name: str) -> None:
+    assert len(merge_parts(APART[name](), Concavity(0.05), run)) >= 2
 
 
 def test_parts_apart_unite_where_the_gap_is_no_deeper_than_the_threshold(run) -> None:
-    def sheets(gap: float) -> list[Component]:
-        return [Component(Manifold.cube((1, 1, 0.01)).translate((0, 0, i * (0.01 + gap)))) for i in range(2)]
-
     assert len(merge_parts(sheets(0.015), Concavity(0.05), run)) == 1
-    assert len(merge_parts(sheets(0.2), Concavity(0.05), run)) == 2
-
-
-def test_a_deep_crack_keeps_parts_apart(run) -> None:
-    """The walls of the crack are surface of the union, and lie half a unit inside its hull."""
-    blocks = [Component(Manifold.cube((1, 1, 1)).translate((i * 1.001, 0, 0))) for i in range(2)]
-    assert len(merge_parts(blocks, Concavity(0.05), run)) == 2
 
 
 def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
@@ -138,6 +140,39 @@ def test_parts_that_are_all_film_keep_their_surfaces() -> None:
     above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
     glued = Part.glued(below, above)
     assert len(glued.faces) == len(below.faces) + len(above.faces)
+
+
+# --- slivers ----------------------------------------------------------------------------------------------------------
+
+
+def slab(height: float, z: float = 0.0) -> Component:
+    return Component(Manifold.cube((1, 1, height)).translate((0, 0, z)))
+
+
+def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
+    assert is_sliver(slab(0.01).hull)
+    assert not is_sliver(slab(0.03).hull)
+    assert not is_sliver(Component(Manifold.sphere(1, 32)).hull)
+    assert is_film(slab(1e-4))
+    assert not is_film(slab(2e-3))
+
+
+def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
+    solid, shaving, sheet = slab(1), slab(0.001, 1), slab(0.001, 3)
+    with Run(1) as run:
+        assert drop_slivers([solid, shaving, sheet], run) == [solid, sheet]
+        assert drop_slivers([solid, shaving], run, suspects=[solid]) == [solid, shaving]
+        assert drop_slivers([sheet], run) == [sheet]
+
+
+def test_of_a_stack_of_slivers_enough_stay_for_all_of_them() -> None:
+    stack = [slab(0.001 + 1e-6 * i, 0.0015 * i) for i in range(30)]
+    with Run(1) as run:
+        kept = drop_slivers(stack, run)
+    assert len(kept) < len(stack)
+    tops = np.array([part.vertices[:, 2].max() for part in kept])
+    for part in stack:
+        assert np.abs(tops - part.vertices[:, 2].max()).min() <= SLIVER_LOSS + 0.0015
 
 
 # --- growing ----------------------------------------------------------------------------------------------------------

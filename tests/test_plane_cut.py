@@ -134,6 +134,35 @@ def test_an_inner_shell_that_is_cut_becomes_a_dent() -> None:
     assert [piece.volume for piece in whole.pieces()] == pytest.approx([6.0])
 
 
+def test_cavities_stay_in_the_piece_around_them() -> None:
+    hollow = Manifold.sphere(1, 32) - Manifold.sphere(0.5, 32)
+    solid = Component(hollow + Manifold.cube((1, 1, 1)).translate((2, 0, 0)))
+    pieces = sorted(solid.pieces(), key=lambda piece: piece.volume)
+    assert len(pieces) == 2
+    assert pieces[1].volume == pytest.approx(hollow.volume())
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_cut_along_an_axis_is_exact(axis: int) -> None:
+    """Faces in the plane stay whole on their own side, whatever the last bits of its offset: no side keeps a film."""
+
+    def upright(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Manifold:
+        a, b = np.roll(lower, axis + 1), np.roll(upper, axis + 1)  # the last coordinate becomes number `axis`
+        corners = [np.where([i & 1, i & 2, i & 4], b, a) for i in range(8)]
+        return Manifold.hull_points(np.array(corners))
+
+    normal = tuple(np.eye(3)[axis].tolist())
+    for offset in np.linspace(-0.4, 0.6, 30):
+        slab, foot = upright((0, 0, -0.7), (1, 1, offset)), upright((0.2, 0.2, offset), (0.3, 0.3, 1))
+        overhang = upright((0.2, 0.2, offset), (1.5, 0.3, 1))
+        for upper in (foot, overhang):
+            below, above = Component(slab + upper).cut(Plane(normal, float(offset)))
+            assert below.box[1, axis] == offset == above.box[0, axis]
+            for side, solid in ((below, slab), (above, upper)):
+                assert side.volume == pytest.approx(solid.volume(), rel=1e-12)
+                assert side.hull.volume == pytest.approx(solid.volume(), rel=1e-12)
+
+
 def test_bad_meshes_are_refused() -> None:
     corner = np.eye(3)
     with pytest.raises(ValueError, match="out of range"):

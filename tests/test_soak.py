@@ -16,8 +16,7 @@ import pytest
 
 import fuzz.light
 import fuzz.warm
-from fuzz import soak
-from fuzz.cases import case_of, file_of, minimised, try_case
+from fuzz.cases import try_case
 from fuzz.faults import Fault, Run, complaints, left_behind
 from fuzz.light import READ, REFUSED, LightTrials, wrong_in
 from fuzz.mutations import Seed
@@ -56,42 +55,6 @@ def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) ->
     one, two = (laboratory.trial(number) for _ in range(2))
     assert one.is_well, one.said
     assert replace(one, cpu=0) == replace(two, cpu=0)
-
-
-def test_a_soak_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
-    made: list[int] = []
-
-    class Quick:
-        seed = 0
-
-        def __init__(self, *_: Any) -> None:
-            pass
-
-        def trial(self, number: int) -> Trial:
-            made.append(number)
-            if number == 130:
-                raise KeyboardInterrupt
-            end = "wrong" if number == 7 else "done"
-            return Trial(0, number, "fault", end, ["bad"] if end == "wrong" else [], counts=Counter(files=2), cpu=0.5)
-
-        def close(self) -> None:
-            pass
-
-    monkeypatch.setattr(soak, "Laboratory", Quick)
-    words = ["soak", "--folder", str(tmp_path), "--hours", "1"]
-    monkeypatch.setattr("sys.argv", words)
-    with pytest.raises(KeyboardInterrupt):
-        soak.main()
-    assert made == list(range(131))
-    with pytest.raises(KeyboardInterrupt):
-        soak.main()
-    assert made[131:] == list(range(100, 131)), "the chunk that was not finished is made again"
-    assert json.loads((tmp_path / "0-7.json").read_text())["said"] == ["bad"]
-    monkeypatch.setattr("sys.argv", [*words, "--totals"])
-    assert soak.main() == 0
-    said = capsys.readouterr().out
-    assert "| fault | 100 | 99 | 0 | 0 | 1 |" in said
-    assert "files 200" in said
 
 
 FULL = Fault("full disk", (0, 3))
@@ -231,20 +194,3 @@ def test_a_warm_process_that_dies_hangs_or_grows_is_replaced(monkeypatch: pytest
         assert warm.trial(numbers[0]).end == "memory"
     finally:
         warm.close()
-
-
-def test_a_damaged_file_is_a_case_that_is_made_small(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails_on_nan(path: Path) -> None:
-        if b"nan" in path.read_bytes():
-            raise KeyError("what a parser says")
-        raise fuzz.light.rlacd.MeshFileError("refused")
-
-    monkeypatch.setattr(fuzz.light, "load_mesh", fails_on_nan)
-    content = b"v 0 0 0\nv 1 0 0\nv 0 nan 0\n" + b"f 1 2 3\n" * 20
-    trial = light.reread(Trial(0, 5, "read"), "obj", Seed(content, {"a.bin": b"\0"}))
-    assert trial.end == "untyped"
-    laboratory: Any = light
-    case = json.loads(json.dumps(case_of(trial) | file_of("obj", Seed(content, {"a.bin": b"\0"}))))
-    assert try_case(laboratory, case).end == "untyped"
-    small = minimised(laboratory, case, 200)
-    assert small == {**case, "content": "bmFu"}, "only the letters nan are left"

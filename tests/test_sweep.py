@@ -13,9 +13,9 @@ from manifold3d import Manifold, Mesh64
 from scipy.spatial import ConvexHull, QhullError
 
 from rlacd import _native
-from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
 from rlacd.planes.sweep import SLIVER, SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep
-from rlacd.policies import SCORES
+from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import excess_norm, hull_sum
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
@@ -121,6 +121,28 @@ def _upright(normal: tuple[float, float, float]) -> tuple[float, float, float]:
     about_x = np.degrees(np.arctan2(y, z))
     about_y = -np.degrees(np.arctan2(x, np.hypot(y, z)))
     return (float(about_x), float(about_y), 0.0)
+
+
+def test_candidates_are_the_papers_150() -> None:
+    component = Component(Manifold.cube((3, 2, 1), True).rotate((10, 20, 30)))
+    candidates = axis_and_principal(component)
+    assert len(candidates) == 6 * OFFSETS_PER_AXIS == 150
+    for k, direction in enumerate(candidates.directions):
+        heights = component.vertices @ direction
+        steps = np.diff([heights.min(), *candidates.offsets[k], heights.max()])
+        assert steps == pytest.approx(np.full(26, np.ptp(heights) / 26))
+    plane = candidates.plane(25 * 4 + 7)
+    assert plane.normal == pytest.approx(candidates.directions[4])
+    assert plane.offset == candidates.offsets[4, 7]
+
+
+@pytest.mark.parametrize("score", SCORES)
+def test_greedy_cuts_a_dumbbell_at_its_bar(score: str) -> None:
+    balls = Manifold.sphere(0.5, 32).translate((-1, 0, 0)) + Manifold.sphere(0.5, 32).translate((1, 0, 0))
+    dumbbell = Component(balls + Manifold.cylinder(2, 0.1, 0.1, 16, True).rotate((0, 90, 0)))
+    plane = Greedy(score).choose(dumbbell)
+    assert abs(plane.normal[0]) > 0.99
+    assert abs(plane.offset) < 0.7
 
 
 def test_section_of_a_box() -> None:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import manifold3d
 import pytest
 import trimesh
-from click.testing import CliRunner
 
 import rlacd
-from rlacd.cli.main import app
 from rlacd.compat.vhacd import compute_vhacd
 from rlacd.errors import OptionError
 from tests.hulls import assert_convex_hull
@@ -65,17 +60,6 @@ def test_a_limit_on_hulls_may_exceed_the_share_and_says_by_how_much() -> None:
     assert len(result) <= 6
     assert result.report["volume"]["max"] > 0.01
     assert any("add more than 1 % of volume" in warning for warning in result.report["warnings"])
-
-
-def test_the_command_line_takes_a_share(tmp_path: Path) -> None:
-    mesh = tmp_path / "torus.ply"
-    torus().export(mesh)
-    args = [str(mesh), "-o", str(tmp_path / "o.glb"), "--criterion", "volume", "--tolerance", "10%", "--report", "-"]
-    run = CliRunner().invoke(app, ["decompose", *args])
-    assert run.exit_code == 0, run.output
-    said = json.loads(run.stdout)
-    assert said["options"]["volume_tolerance"] == pytest.approx(0.1)
-    assert said["volume"]["max"] <= 0.1
 
 
 @pytest.mark.parametrize(

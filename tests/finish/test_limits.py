@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from fuzz.geometry import why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.finish.limit import limit_part
@@ -39,11 +40,6 @@ def exactly_inside(point: np.ndarray, hull: Hull) -> bool:
     return True
 
 
-def exactly_convex(hull: Hull) -> bool:
-    """Whether every corner lies on or below the plane of every facet, in exact arithmetic."""
-    return all(exactly_inside(point, hull) for point in hull.vertices)
-
-
 def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = None) -> Hull:
     limited = limit_hull(hull, HullLimits(max_vertices, max_faces))
     assert len(limited.vertices) <= (max_vertices or len(hull.vertices))
@@ -68,7 +64,7 @@ def test_any_hull_within_any_limit(cloud: np.ndarray, most: int) -> None:
     hull = Hull.of(cloud)
     assume(hull is not None and hull.volume >= 1e-9)
     for limited in (check(hull, max_vertices=most), check(hull, max_faces=most)):
-        assert hull.volume < 1e-6 or exactly_convex(limited)
+        assert hull.volume < 1e-6 or why_not_convex(limited.vertices, limited.faces, exactly=True) is None
 
 
 @pytest.mark.parametrize("thickness", [1e-10, 1e-12, 1e-14])
@@ -79,7 +75,7 @@ def test_what_is_hardly_there_is_held(seed: int, plate: bool, thickness: float) 
     hull = Hull.of(random.uniform(-1, 1, (40, 3)) * [1, 0.8 if plate else thickness, thickness])
     limited = limit_hull(hull, HullLimits(int(random.integers(4, 13))))
     assert len(limited.vertices) <= 12
-    assert exactly_convex(limited)
+    assert why_not_convex(limited.vertices, limited.faces, exactly=True) is None
     middle = hull.vertices.mean(axis=0)
     assert all(exactly_inside(middle + (1 - 1e-9) * (p - middle), limited) for p in hull.vertices)
     assert np.ptp(limited.vertices[:, 2]) < 1e-7

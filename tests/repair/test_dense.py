@@ -9,8 +9,8 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
-from tests.noisy import noisy_copy
 from tests.repair.repaired import BOX, join, solid_of, volume, without
+from tests.scripts import script
 
 AS_SOLID = [
     "test/capod/class6__m64.ply",  # a hole in a hull whose wings touch along edges
@@ -19,6 +19,12 @@ AS_SOLID = [
     "train/kenney_cc0/furniture_pack__toilet.ply",  # rooms behind sheets, on a body
     "train/quaternius_cc0/ultimate_space_pack__Tree_Floating_2.ply",
 ]
+
+
+def noisy_copy(corpus, name):
+    """The mesh, and a copy of some 10,000 faces or more that is displaced by 0.001 of half the longest side."""
+    mesh = trimesh.load(corpus / name, force="mesh", process=False)
+    return mesh, script(corpus / "dense.py").densify(mesh.copy(), 10_000, 0.001)
 
 
 def finely(mesh, times, noise=0.0):

@@ -8,18 +8,14 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from rlacd import _native
 from rlacd.io.read.load import load_mesh
-from rlacd.repair.cracks import close_cracks, free_edges
 from rlacd.repair.distance import points_covering
 from rlacd.repair.holes import HOLE
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import Edges, IntArray
 from tests.repair.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
 
 
@@ -183,44 +179,3 @@ def test_points_cover_every_face_and_share_corners(spacing: float) -> None:
     np.testing.assert_allclose(trimesh.triangles.closest_point(vertices[faces[on]], points), points, atol=1e-12)
     if spacing == 1.0:
         assert len(points) < len(vertices) + 50
-
-
-TOLERANCES = (2e-5, 5e-4)
-
-
-def cracked(mesh: trimesh.Trimesh, seed: int, cut: float, missing: float) -> tuple[FloatArray, IntArray]:
-    """Some faces get corners of their own, a little away; some are split on one side only; some are missing."""
-    rng = np.random.default_rng(seed)
-    faces = np.array(mesh.faces, dtype=np.int64)
-    vertices = np.array(mesh.vertices)
-    apart = np.flatnonzero(rng.random(len(faces)) < cut)
-    own = vertices[faces[apart]].reshape(-1, 3)
-    own = own + rng.choice([0, 1e-5, 3e-4, 2e-3], (len(own), 1)) * rng.normal(size=own.shape)
-    faces[apart] = len(vertices) + np.arange(len(own)).reshape(-1, 3)
-    vertices = np.concatenate([vertices, own])
-    whole = np.flatnonzero(rng.random(len(faces)) < cut)
-    a, b, c = faces[whole].T
-    middle = len(vertices) + np.arange(len(whole))
-    vertices = np.concatenate([vertices, (vertices[a] + vertices[b]) / 2])
-    faces[whole] = np.stack([a, middle, c], axis=1)
-    faces = np.concatenate([faces, np.stack([middle, b, c], axis=1)])
-    faces = faces[rng.random(len(faces)) >= missing]
-    points, welded, _ = _native.weld(vertices, rng.permutation(faces))
-    return points, welded.astype(np.int64)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_cracks_are_closed(seed: int) -> None:
-    ball = trimesh.creation.icosphere(3)
-    vertices, faces = cracked(ball, seed, 0.05, 0.0)
-    before = len(free_edges(faces, Edges.of(faces, len(vertices))))
-    found, _ = close_cracks(vertices, faces, Edges.of(faces, len(vertices)), (*TOLERANCES, 2e-2))
-    left = len(free_edges(found, Edges.of(found, len(vertices))))
-    assert left < before / 4
-
-
-def test_a_body_that_crosses_itself_is_a_result():
-    twisted = SHAPES["ring"].copy()
-    twisted.vertices[:, 0] *= np.sign(twisted.vertices[:, 1]) * 0.9 + 0.1
-    solid = solid_of(twisted)
-    assert solid.manifold.num_tri() > 0

@@ -112,17 +112,12 @@ def with_leaves(count):
 
 
 @pytest.mark.slow
-def test_hundreds_of_leaves_are_one_crowd():
-    solid = solid_of(with_leaves(600))
-    assert set(steps(solid)) == {"wrapped"}
-    assert max(body.deviation for body in solid.bodies) < 2 * DEFAULT_GAP
-
-
-@pytest.mark.slow
-def test_a_crowd_leaves_no_leaf_outside():
-    vertices, faces = with_leaves(310)
+@pytest.mark.parametrize("count", [310, 600])
+def test_hundreds_of_leaves_are_one_crowd_that_leaves_none_outside(count):
+    vertices, faces = with_leaves(count)
     solid = solid_of((vertices, faces))
     assert set(steps(solid)) == {"wrapped"}
+    assert max(body.deviation for body in solid.bodies) < 2 * DEFAULT_GAP
     query, there = SurfaceQuery(*to_arrays(solid.shape)), solid.frame.to_frame(vertices)
     assert query.distance(there)[~query.inside(there)].max(initial=0) <= 2 * HALF_THICKNESS
 
