@@ -111,25 +111,6 @@ def imported_rooms(package: Path, rooms: list[Room]) -> dict[str, dict[str, list
     return found
 
 
-def walk(package: Path, rooms: list[Room], start: str) -> tuple[int, int, int]:
-    """The way of a mesh through the package: files that `start` imports, directly or not, their rooms, and climbs.
-
-    A climb is an import of a room further down the table. Imports inside functions and for type checkers count too.
-    """
-    home, order = homes(package, rooms), [room.name for room in rooms]
-    after: dict[str, set[str]] = defaultdict(set)
-    for each in imports(package):
-        after[each.module].add(each.imported)
-    seen, waiting = {start}, [start]
-    while waiting:
-        new = after[waiting.pop()] - seen
-        seen |= new
-        waiting += new
-    ways = {(home[here], home[there]) for here in seen for there in after[here] & seen}
-    climbs = sum(order.index(here) < order.index(there) for here, there in ways if here and there)
-    return len(seen), len({home[module] for module in seen}), climbs
-
-
 def picture(package: Path, rooms: list[Room]) -> str:
     """The rooms as an SVG, the ground at the bottom: imports of lower rooms to the right, climbs to the left in red."""
     arrows = imported_rooms(package, rooms)

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rlacd.solid.arrays import dots, heights, length
 from tests import bits
 from tests.hulls import hull_of
 from tests.shapes import component_of
@@ -72,14 +71,3 @@ def _moments(corners: np.ndarray) -> np.ndarray:
     middles = (corners + np.roll(corners, 1, axis=1)) / 2  # exact for polynomials of degree two
     middles -= np.average(corners.mean(axis=1), weights=area, axis=0)
     return np.einsum("f,fki,fkj->ij", area, middles, middles)
-
-
-def test_products_are_those_of_numpy() -> None:
-    draw = np.random.default_rng(1)
-    points, directions = draw.normal(size=(40, 3)), draw.normal(size=(7, 3))
-    assert heights(points, directions) == pytest.approx(points @ directions.T, abs=1e-14)
-    assert heights(points, directions[0]) == pytest.approx(points @ directions[0], abs=1e-14)
-    assert heights(points[:0], directions).shape == (0, 7)
-    assert dots(points, points[::-1]) == pytest.approx(np.einsum("ij,ij->i", points, points[::-1]), abs=1e-14)
-    assert dots(points, directions[0]) == pytest.approx(points @ directions[0], abs=1e-14)
-    assert length(points[0]) == pytest.approx(np.linalg.norm(points[0]))

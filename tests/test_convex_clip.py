@@ -7,8 +7,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold, Mesh64
 
-from rlacd.criteria import Concavity
-from rlacd.solid.component import Component, Part, Plane
+from rlacd.solid.component import Component, Plane
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
@@ -82,21 +81,6 @@ def test_a_surface_folded_by_noise_is_clipped_and_its_halves_add_up() -> None:
         whole, *halves = (solid.inside(one) for one in (hull, below.hull, above.hull))
         assert all(is_closed(part.faces) for part in (whole, *halves))
         assert whole.volume == pytest.approx(sum(half.volume for half in halves), rel=1e-3)
-
-
-@pytest.mark.parametrize("name", solids())
-def test_a_clipped_part_measures_alike_with_its_ready_tree_and_without(name: str) -> None:
-    mesh = solids()[name]
-    solid = component_of(mesh)
-    for hull in hulls(mesh, 5):
-        part = solid.inside(hull)
-        if not part.size:
-            continue
-        plain = Part(part.vertices, part.faces, part.volume, hull)
-        measured, again = (Concavity().measure(one, tolerance=1e-4) for one in (part, plain))
-        assert measured.value == pytest.approx(again.value, abs=1e-4)
-        for one, other in ((measured.hull_to_part, again.hull_to_part), (measured.part_to_hull, again.part_to_hull)):
-            assert max(one[0], other[0]) <= min(one[1], other[1])
 
 
 def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> None:

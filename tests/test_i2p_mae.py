@@ -136,18 +136,6 @@ def test_groups_without_members_are_not_seen() -> None:
             visible = {m for group in visible for m in scales[level].members[cloud, group].tolist()}
 
 
-def test_a_group_without_members_changes_nothing() -> None:
-    """A point that no group has among its nearest may move."""
-    encoder = tiny_encoder()
-    points = clouds(1, 400)
-    scales = encoder.h_encoder.pyramid(points)
-    used = set(scales[0].members.flatten().tolist())
-    unused = sorted(set(range(400)) - used)
-    moved = points.clone()
-    moved[0, unused[0]] += 1e-4
-    assert torch.equal(encoder.features(points), encoder.features(moved))
-
-
 # As an encoder of components
 
 

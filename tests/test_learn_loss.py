@@ -28,13 +28,6 @@ def test_soft_value_by_hand() -> None:
     assert soft_value(Q, MASK, 2.0).tolist() == pytest.approx(expected, rel=1e-6)
 
 
-@given(st.lists(st.floats(-1000, 1000), min_size=2, max_size=20), st.floats(0.01, 10))
-def test_soft_value_lies_between_the_maximum_and_the_maximum_plus_t_log_n(q: list[float], temperature: float) -> None:
-    mask = torch.ones(1, len(q), dtype=torch.bool)
-    value = soft_value(torch.tensor([q]), mask, temperature).item()
-    assert max(q) - 1e-2 <= value <= max(q) + temperature * math.log(len(q)) + 1e-2
-
-
 def test_dual_state_target_by_hand() -> None:
     # Three cuts: both sides unfinished, nothing left, and one side in three pieces.
     target = dual_state_target(

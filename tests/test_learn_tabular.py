@@ -130,31 +130,8 @@ def u_shape(tmp_path: Path, two_planes: None) -> Component:
     return saved(tmp_path / "meshes", "u.ply", solid)
 
 
-def cuts_of(node: Node, value: Any) -> int:
-    """Number of cuts if every component is cut by the plane of greatest value."""
-    if not node.outcomes:
-        return 0
-    return 1 + sum(cuts_of(child, value) for child in max(node.outcomes, key=value).children)
-
-
 def fewest(node: Node) -> int:
     return min((1 + sum(fewest(child) for child in o.children) for o in node.outcomes), default=0)
-
-
-def paid(outcome: Any) -> float:
-    """Value of a plane by eq. 8, with both rewards."""
-    below = zip(outcome.children, outcome.discounts, strict=True)
-    return float(outcome.saved + outcome.finished + sum(d * best(child, 1.0) for child, d in below))
-
-
-def test_the_papers_rewards_ask_for_more_cuts_than_are_needed(u_shape: Component) -> None:
-    [root] = grow(u_shape, LIMIT, TWO, depth=8)
-    assert len(all_nodes([root])) == 31
-    assert fewest(root) == 3
-    assert cuts_of(root, lambda o: -sum(1 + fewest(child) for child in o.children)) == 3
-    assert cuts_of(root, paid) == 4
-    assert cuts_of(root, lambda o: o.saved) == 5  # greedy
-    assert best(root, 1.0) == pytest.approx(1.0319, abs=1e-4)
 
 
 @pytest.mark.nightly

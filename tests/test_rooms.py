@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import runpy
 
-from tests.rooms import ANY, NATIVE, PICTURE, ROOT, SHARED, homes, imported_rooms, picture, table, walk
+from tests.rooms import ANY, NATIVE, PICTURE, ROOT, SHARED, homes, imported_rooms, picture, table
 
 PACKAGE = ROOT / "src" / "rlacd"
 
@@ -35,13 +35,6 @@ def test_a_room_imports_what_its_row_says() -> None:
         if room.imports != (ANY,):
             assert allowed == set(found[room.name]) - below, f"{room.name} no longer imports all that its row lists"
         above.append(room.name)
-
-
-def test_the_way_of_a_mesh_leads_down_only() -> None:
-    files, rooms, climbs = walk(PACKAGE, table(), "rlacd.decompose_mesh")
-    assert files > 50
-    assert rooms > 10
-    assert climbs == 0
 
 
 def test_the_picture_is_that_of_the_code() -> None:

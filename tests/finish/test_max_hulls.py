@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from rlacd.criteria import Concavity
 from rlacd.merge.merge import united_in_turn
 from rlacd.run import Run, Work
 from rlacd.solid.component import Component, Part
-from tests.shapes import box, from_manifold
+from tests.hulls import assert_same_hulls
+from tests.shapes import box, trimesh_of
 
 
 def cabinet() -> Manifold:
@@ -32,7 +34,6 @@ def mug() -> Manifold:
     return outside - Manifold.cylinder(10, 3.7, 3.7, 24).translate((0, 0, 0.4))
 
 
-SHAPES = [cabinet, drawer, mug]
 ACCURACY = 0.001
 """Of concavities above the threshold: a fiftieth of it."""
 
@@ -49,31 +50,25 @@ def error(result: rlacd.Decomposition, criterion: str) -> float:
     return float(entry["intrusion"]["max"] if criterion == "navigable" else entry["max"])
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(
+    ("shape", "most"),
+    [pytest.param(drawer, 8, marks=pytest.mark.slow)]
+    + [pytest.param(shape, 39, marks=pytest.mark.nightly) for shape in (cabinet, drawer, mug)],
+)
 @pytest.mark.parametrize(("criterion", "options"), CRITERIA)
-def test_more_hulls_never_fit_worse(shape, criterion: str, options: dict[str, Any]) -> None:
-    check_limits(shape(), range(1, 40), criterion, options)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("shape", "criterion", "options"), [(drawer, *each) for each in CRITERIA])
 @pytest.mark.promise("max-hulls")
-def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(shape, criterion: str, options: dict[str, Any]) -> None:
-    check_limits(shape(), range(1, 9), criterion, options)
-
-
-def check_limits(solid: Manifold, limits: range, criterion: str, options: dict[str, Any]) -> None:
-    closed = from_manifold(solid)
-    mesh = closed.vertices, closed.faces
+def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(
+    shape: Callable[[], Manifold], most: int, criterion: str, options: dict[str, Any]
+) -> None:
+    mesh = trimesh_of(shape())
     free = rlacd.decompose(mesh, **options)
     last = np.inf
-    for most in limits:
-        result = rlacd.decompose(mesh, max_hulls=most, **options)
-        assert len(result) <= most
+    for limit in range(1, most + 1):
+        result = rlacd.decompose(mesh, max_hulls=limit, **options)
+        assert len(result) <= limit
         assert result.report["hausdorff"]["under"] < 0.005
-        if most >= len(free):
-            assert [hull.vertices.tobytes() for hull in result] == [hull.vertices.tobytes() for hull in free]
+        if limit >= len(free):
+            assert_same_hulls(result, free)
             assert result.report["warnings"] == free.report["warnings"]
             break
         worst = error(result, criterion)
@@ -99,6 +94,5 @@ def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() ->
 
 def test_coarser_thresholds_are_tried_where_the_finest_has_used_up_its_account(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rlacd.find_parts.MOST_CUTTING", 3e4)
-    closed = from_manifold(mug())
-    result = rlacd.decompose((closed.vertices, closed.faces), max_hulls=4, quality="fast")
+    result = rlacd.decompose(trimesh_of(mug()), max_hulls=4, quality="fast")
     assert error(result, "concavity") < 0.5

@@ -112,56 +112,6 @@ def halves(height: float = 1.0) -> tuple[Component, list[Component]]:
     return box, [below, above]
 
 
-def flush_body(shape: Manifold) -> tuple[_native.FlushBody, Array]:
-    """The kernel's view of a convex solid, and its planes as rows (normal, offset)."""
-    mesh = trimesh_of(shape)
-    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
-    normals = mesh.face_normals
-    return _native.FlushBody(vertices, faces), np.column_stack([normals, (vertices @ normals.T).max(axis=0)])
-
-
-def test_a_layer_is_what_a_boolean_leaves_and_depths_are_those_under_planes() -> None:
-    """Random convex bodies that overlap; of the first, either no side moves or all do."""
-    random = np.random.default_rng(0)
-    filled = 0
-    for _ in range(40):
-        first, second = (
-            Manifold.hull_points(random.normal(size=(12, 3)) + shift) for shift in (np.zeros(3), random.normal(size=3))
-        )
-        (body, planes), (other, _) = flush_body(first), flush_body(second)
-        points = random.normal(size=(50, 3))
-        assert body.depths(points) == pytest.approx((planes[:, 3] - points @ planes[:, :3].T).min(axis=1), abs=1e-9)
-        everything = np.arange(first.num_tri(), dtype=np.int32)  # all sides are triangles
-        for sides, depth in ((everything[:0], 0.3), (everything, 0.3)):
-            reference = second
-            for normal, offset in zip(planes[:, :3], planes[:, 3] + depth * (len(sides) > 0), strict=True):
-                reference = reference.trim_by_plane(-normal, -offset)
-            layer = body.layer(other, sides, depth, 0.0)
-            volume = Manifold.hull_points(layer).volume() if len(layer) > 3 else 0.0
-            assert volume == pytest.approx(reference.volume(), rel=1e-5, abs=1e-6)
-            filled += volume > 0
-    assert filled > 30
-
-
-def test_a_contact_is_where_two_boxes_share_a_face() -> None:
-    below, above = Manifold.cube((2.0, 1.0, 1.0)), Manifold.cube((1.0, 3.0, 1.0)).translate((0.5, -1.0, 1.0))
-    (first, planes), (second, _) = flush_body(below), flush_body(above)
-    (side,), places = first.contact(second, 0.1, 1e-6)
-    assert 0 <= side < 6
-    assert len(planes) == 12
-    low, high = places.min(axis=0), places.max(axis=0)
-    assert (low >= (0.5, 0.0, 1.0 - 1e-6)).all()
-    assert (high <= (1.5, 1.0, 1.0 + 1e-6)).all()
-    assert (high - low)[:2] == pytest.approx((0.7, 0.7), abs=1e-5)  # moved inwards by 0.3 of the way to the middle
-    apart, _ = flush_body(above.translate((0.0, 0.0, 1e-3)))
-    assert len(first.contact(apart, 0.1, 1e-6)[0]) == 0
-    for wrong in (0.0, -1.0, float("nan")):
-        with pytest.raises(ValueError, match="depth"):
-            first.contact(second, wrong, 1e-6)
-    with pytest.raises(ValueError, match="out of range"):
-        first.layer(second, np.array([6], dtype=np.int32), 0.1, 0.0)
-
-
 @pytest.mark.parametrize("overlap", [0.001, 0.02, 0.3])
 def test_two_halves_of_a_box_overlap_by_exactly_that_much(overlap: float) -> None:
     box, parts = halves()

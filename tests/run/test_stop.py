@@ -226,8 +226,21 @@ def test_a_stop_ends_with_its_decomposition() -> None:
     assert _native.seconds_left() == float("inf")
 
 
-AT_WORK = 4.0
-"""CPU seconds after which the libraries are loaded and the mesh is read: these shapes take many more."""
+def interrupted(name: str, handler: str, seconds: float, times: int, *words: str, folder: Path) -> int:
+    """Exit code of the command that gets Ctrl-C so many times after so many CPU seconds."""
+    trimesh.Trimesh(*LARGE[name](), process=False).export(folder / "mesh.ply")
+    code = f"import signal; signal.signal(signal.SIGINT, signal.{handler}); from rlacd.cli.main import main; main()"
+    with subprocess.Popen([sys.executable, "-c", code, "decompose", "mesh.ply", *words], cwd=folder) as run:
+        try:
+            used = psutil.Process(run.pid).cpu_times
+            while run.poll() is None and used().user < seconds:
+                time.sleep(0.05)
+            for _ in range(times):
+                run.send_signal(signal.SIGINT)
+                time.sleep(0.2)
+            return run.wait(PATIENCE)
+        finally:
+            run.kill()
 
 
 @pytest.mark.slow
@@ -235,43 +248,19 @@ AT_WORK = 4.0
 @pytest.mark.parametrize("name", ["terrain", "boxes"])
 @pytest.mark.promise("ctrl-c")
 def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) -> None:
-    trimesh.Trimesh(*LARGE[name](), process=False).export(tmp_path / "mesh.ply")
-    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from rlacd.cli.main import main; main()"
-    run = subprocess.Popen(
-        [sys.executable, "-c", code, "decompose", str(tmp_path / "mesh.ply"), "-o", str(tmp_path / "hulls.glb")],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        used = psutil.Process(run.pid).cpu_times
-        while run.poll() is None and used().user < AT_WORK:
-            time.sleep(0.05)
-        run.send_signal(signal.SIGINT)
-        assert run.wait(PATIENCE) == 4
-        assert (tmp_path / "hulls.glb").exists()
-    finally:
-        run.kill()
+    """After 4 CPU seconds the libraries are loaded and the mesh is read: these shapes take many more."""
+    assert interrupted(name, "SIG_IGN", 4.0, 1, "-o", "hulls.glb", folder=tmp_path) == 4
+    assert (tmp_path / "hulls.glb").exists()
 
 
 @pytest.mark.nightly
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 @pytest.mark.parametrize("begun", [0.2, 1.2, 1.6, 2.0, 3.0, 5.0])  # CPU seconds
 def test_ctrl_c_twice_ends_the_command_at_any_moment(begun: float, tmp_path: Path) -> None:
-    trimesh.Trimesh(*LARGE["boxes"](), process=False).export(tmp_path / "mesh.ply")
-    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # ignored in a shell's background
-    command = [sys.executable, "-c", f"{heed}; from rlacd.cli.main import main; main()"]
-    run = subprocess.Popen([*command, "decompose", "mesh.ply", "--budget", "20"], cwd=tmp_path)
-    try:
-        used = psutil.Process(run.pid).cpu_times
-        while run.poll() is None and used().user < begun:
-            time.sleep(0.05)
-        for _ in range(2):
-            run.send_signal(signal.SIGINT)
-            time.sleep(0.2)
-        assert run.wait(2 + PATIENCE) in (4, 130, -signal.SIGINT)  # the last while Python starts
-        assert not list(tmp_path.glob(".*")), "no file is left half-written"
-    finally:
-        run.kill()
+    """A handler is set, because SIGINT is ignored in a shell's background."""
+    code = interrupted("boxes", "default_int_handler", begun, 2, "--budget", "20", folder=tmp_path)
+    assert code in (4, 130, -signal.SIGINT)  # the last while Python starts
+    assert not list(tmp_path.glob(".*")), "no file is left half-written"
 
 
 @pytest.mark.slow
