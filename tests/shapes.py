@@ -13,7 +13,7 @@ import trimesh
 from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, Mesh64
 
-from fuzz.geometry import distance_to_triangles
+from fuzz.geometry import Polytope, distance_to_triangles
 from rlacd import _native
 from rlacd.solid.component import Component, Part, reunite
 
@@ -91,12 +91,9 @@ def point_to_triangles(points: Floats, vertices: Floats, faces: Ints) -> Floats:
     return distance_to_triangles(np.asarray(points), np.asarray(vertices)[faces])
 
 
-def depth_in(hull: Closed, points: Floats) -> Floats:
-    """Distance [N] from points inside a convex polytope to its surface, by Qhull's facet equations."""
-    from scipy.spatial import ConvexHull
-
-    equations = ConvexHull(hull.vertices).equations
-    return np.asarray(-(points @ equations[:, :3].T + equations[:, 3])).min(axis=1)
+def depth_in(hull: Any, points: Floats) -> Floats:
+    """Distance [N] from points inside a convex polytope to its surface."""
+    return -Polytope(hull.vertices, hull.faces).height(points)
 
 
 def dense(mesh: Closed, count: int = 20_000) -> Floats:

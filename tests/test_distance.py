@@ -99,7 +99,7 @@ def test_unions_against_dense_sampling(points: list[list[tuple[float, float, flo
     # The exposed surface lies on facets, inside no hull; every sample of a facet that is inside none is covered by it.
     exposed, faces = hull_union(hulls).exposed()
     points = sampled(Closed(exposed, faces), 5000)
-    assert all(depth_in(Closed(hull.vertices, hull.faces), points).max() < 1e-5 for hull in hulls)
+    assert all(depth_in(hull, points).max() < 1e-5 for hull in hulls)
     over = _native.Surface(surface.vertices, surface.faces).distance(points).max()
     assert over <= found.over[1] + 1e-7
     assert found.over[0] <= over + 0.1
@@ -115,7 +115,7 @@ def sampled(mesh: Closed, count: int = 20_000) -> Floats:
 def of_facets(hull: Hull, others: list[Hull]) -> Floats:
     points = sampled(Closed(hull.vertices, hull.faces), 5000)
     for other in others:
-        points = points[depth_in(Closed(other.vertices, other.faces), points) < -1e-5]
+        points = points[depth_in(other, points) < -1e-5]
         if len(points) == 0:
             break
     return points
@@ -209,7 +209,7 @@ def test_places_of_the_greatest_distances(seed: int) -> None:
     each = [point_to_triangles(missed, hull.vertices, hull.faces)[0] for hull in hulls if hull]
     assert min(each) == pytest.approx(found.under[0], abs=1e-9)
     for hull in hulls:
-        depth = depth_in(Closed(hull.vertices, hull.faces), np.concatenate([out, missed]))
+        depth = depth_in(hull, np.concatenate([out, missed]))
         assert (depth < 1e-6).all(), "a place inside a hull"
     assert point_to_triangles(missed, surface.vertices, surface.faces) == pytest.approx(0, abs=1e-9)
     threaded = hull_distances([hull for hull in hulls if hull], surface.vertices, surface.faces, threads=4)

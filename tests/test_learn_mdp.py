@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 
@@ -12,14 +11,13 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
-from rlacd.io.read.load import load_mesh
 from rlacd.learn.meshes import list_meshes
 from rlacd.learn.process import Cut, CutProcess, terminal_reward
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
-from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
 from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
+from tests.test_sweep import SOLIDS
 
 CRITERION = Concavity(0.04)
 
@@ -27,12 +25,6 @@ CRITERION = Concavity(0.04)
 @pytest.fixture
 def meshes(tmp_path: Path) -> Path:
     return write_meshes(tmp_path / "meshes")
-
-
-def real_solids(corpus: Path, count: int) -> list[Component]:
-    with open(corpus / "index.csv", encoding="utf-8") as file:
-        small = [r["file"] for r in csv.DictReader(file) if r["split"] == "train" and 60 < int(r["faces"]) < 250]
-    return [Component(repair(load_mesh(corpus / name)).manifold) for name in small[:: len(small) // count][:count]]
 
 
 def volumes(components: list[Component]) -> list[tuple[float, float]]:
@@ -101,10 +93,10 @@ def test_terminal_reward_falls_with_the_number_of_parts() -> None:
     assert terminal_reward(11) == pytest.approx(1 / (1 + math.log(10)))
 
 
-def test_valid_planes_need_no_sweep_and_are_valid_by_it(corpus: Path) -> None:
+def test_valid_planes_need_no_sweep_and_are_valid_by_it() -> None:
     differ = total = 0
-    for solid in real_solids(corpus, 5):
-        for piece in solid.pieces():
+    for solid in SOLIDS.values():
+        for piece in Component(solid()).pieces():
             candidates = paper_planes(piece)
             cheap, exact = valid_planes(piece, candidates), sweep(piece, candidates).valid()
             assert not exact.any() or not (cheap & ~exact).any()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -269,26 +268,3 @@ def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Pat
         run(tmp_path / "empty", tmp_path / "other")
     with pytest.raises(TrainingError, match="there is no folder"):
         run(tmp_path / "nowhere", tmp_path / "another")
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    "name",
-    [
-        "kenney_cc0/castle_kit__flagBlue",
-        "kaykit_cc0/dungeon__candle_thin",
-        "quaternius_cc0/rpg_items_pack__Heart_Half",
-        "quaternius_cc0/platformer_game_pack__Heart_Outline",
-        "kenney_cc0/space_kit__robot",
-    ],
-)
-def test_alone_with_a_mesh_a_networks_own_planes_leave_no_more_parts_than_greedys(
-    corpus: Path, name: str, tmp_path: Path
-) -> None:
-    (tmp_path / "meshes").mkdir()
-    shutil.copy(corpus / "train" / f"{name}.ply", tmp_path / "meshes")
-    said: list[str] = []
-    run(tmp_path / "meshes", tmp_path / "run", say=said.append, **vars(TrainOptions.preset("one-mesh")))
-    points = [point for point in curves(tmp_path / "run") if "validation_own_plane" in point]
-    assert min(point["validation_own_plane"] for point in points) <= 1 < points[0]["validation_random"]
-    assert "Use it:" in said[-1]

@@ -18,6 +18,8 @@ from rlacd.policies import make_policy
 from rlacd.policies.network import KIND, QPolicy, best_planes, load_network
 from rlacd.policies.plane_features import FEATURES, PLANES, sweep_features
 from rlacd.solid.component import Component
+from tests.hulls import assert_same_hulls
+from tests.shapes import trimesh_of
 
 
 def chair() -> manifold3d.Manifold:
@@ -28,11 +30,6 @@ def chair() -> manifold3d.Manifold:
         for y in (0.0, 1.0):
             solid += cube((0.2, 0.2, 0.9)).translate((x, y, 0))
     return solid.translate((-0.5, -0.6, -0.9))
-
-
-def mesh() -> tuple[np.ndarray, np.ndarray]:
-    found = chair().to_mesh64()
-    return found.vert_properties[:, :3], found.tri_verts
 
 
 @pytest.fixture
@@ -80,10 +77,9 @@ def test_alone_the_greatest_value_decides_and_deployed_the_least_hulls_of_the_te
 
 
 def test_decompose_takes_a_network(network: Path) -> None:
-    one, two = (rlacd.decompose(mesh(), policy=str(network), threads=n, quality="fast") for n in (1, 2))
+    one, two = (rlacd.decompose(trimesh_of(chair()), policy=str(network), threads=n, quality="fast") for n in (1, 2))
     assert one.report["concavity"]["max"] <= 0.05
-    for a, b in zip(one.hulls, two.hulls, strict=True):
-        np.testing.assert_array_equal(a.vertices, b.vertices)
+    assert_same_hulls(one, two)
 
 
 def compressed(content: bytes) -> bytes:

@@ -21,7 +21,8 @@ from rlacd.policies import make_policy
 from rlacd.policies.greedy import RandomShortlist, excess_norm, hull_sum
 from rlacd.policies.learned import PROMISING
 from rlacd.policies.plane_features import FEATURES, plane_features
-from tests.shapes import table, to_manifold
+from tests.hulls import assert_same_hulls
+from tests.shapes import component_of, table, to_manifold, trimesh_of
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs" / "policies.md"
@@ -47,7 +48,7 @@ def test_policies_of_the_docs_decompose(name: str) -> None:
 
 def test_the_least_hull_sum_written_by_a_user_is_ours() -> None:
     ours = make_policy("greedy-hull-sum+edges")
-    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
+    root = component_of(table())
     chosen = [policy.choose(root) for policy in (of_the_docs("LeastHulls"), ours)]
     sums = [sum(side.hull.volume for side in root.cut(plane) if side is not None) for plane in chosen]
     assert sums[0] == pytest.approx(sums[1], rel=1e-9)
@@ -111,21 +112,19 @@ def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:
 @pytest.mark.parametrize("policy", LEARNED)
 @pytest.mark.parametrize("criterion", ["concavity", "navigable"])
 def test_decompose_takes_shipped_networks_with_any_criterion_and_number_of_threads(policy: str, criterion: str) -> None:
-    mesh = hollow_table().to_mesh64()
-    given = (mesh.vert_properties[:, :3], mesh.tri_verts)
+    given = trimesh_of(hollow_table())
     space = {"criterion": rlacd.NavigableSpace(radius=0.05)} if criterion == "navigable" else {"threshold": 0.02}
     one, two = (rlacd.decompose(given, policy=policy, quality="fast", threads=n, **space) for n in (1, 2))
     assert len(one) > 2
-    assert [hull.vertices.tobytes() for hull in one.hulls] == [hull.vertices.tobytes() for hull in two.hulls]
+    assert_same_hulls(one, two)
 
 
 def test_networks_choose_the_cuts_where_parts_are_not_merged() -> None:
-    mesh = hollow_table().to_mesh64()
-    given = (mesh.vert_properties[:, :3], mesh.tri_verts)
+    given = trimesh_of(hollow_table())
     for merge, policy in ((False, "learned"), (True, "greedy")):
         free, asked = (rlacd.decompose(given, merge=merge, quality="fast", **p) for p in ({}, {"policy": policy}))
         assert free.report["options"]["policy"] == policy
-        assert [hull.vertices.tobytes() for hull in free.hulls] == [hull.vertices.tobytes() for hull in asked.hulls]
+        assert_same_hulls(free, asked)
 
 
 def test_none_leaves_components_as_they_are() -> None:
@@ -150,7 +149,7 @@ def test_what_cannot_choose_is_no_policy(given: Any) -> None:
 
 @pytest.mark.parametrize("name", ["random-10+edges", "random-1+edges", "random-10"])
 def test_random_shortlists_cut_by_one_of_their_planes_whatever_was_cut_before(name: str) -> None:
-    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
+    root = component_of(table())
     plane = make_policy(name).choose(root)
     again = rlacd.Component((root.vertices, root.faces))
     policy = make_policy(name)
@@ -160,17 +159,10 @@ def test_random_shortlists_cut_by_one_of_their_planes_whatever_was_cut_before(na
     assert plane in [block.plane(i) for block in known for i in range(len(block))]
 
 
-def test_a_random_shortlist_of_all_planes_is_greedy() -> None:
-    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
-    for policy, greedy in (
-        (RandomShortlist(150), "greedy-hull-sum+edges"),
-        (RandomShortlist(150, concave_edges=0), "greedy-hull-sum"),
-    ):
-        planes = [policy.choose(root), make_policy(greedy).choose(root)]
+def test_a_random_shortlist_of_all_planes_is_greedy_and_seeds_draw_different_ones() -> None:
+    root = component_of(table())
+    for edges, greedy in ((4, "greedy-hull-sum+edges"), (0, "greedy-hull-sum")):
+        planes = [RandomShortlist(150, concave_edges=edges).choose(root), make_policy(greedy).choose(root)]
         sums = [sum(side.hull.volume for side in root.cut(plane) if side is not None) for plane in planes]
         assert sums[0] == pytest.approx(sums[1], rel=1e-9)
-
-
-def test_seeds_of_random_shortlists_draw_different_planes() -> None:
-    root = rlacd.Component((np.asarray(table().vertices), np.asarray(table().faces, dtype=np.int32)))
     assert len({RandomShortlist(1, concave_edges=0, seed=seed).choose(root) for seed in range(8)}) > 1

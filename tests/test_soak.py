@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +20,6 @@ from fuzz.light import READ, REFUSED, LightTrials, wrong_in
 from fuzz.mutations import Seed
 from fuzz.soak import reasons
 from fuzz.trials import Laboratory, Trial, seeds_from
-from fuzz.warm import WarmTrials
 from rlacd.solid.input_mesh import InputMesh
 
 CASES = sorted((Path(__file__).parent / "cases").glob("*.json"))
@@ -167,30 +164,3 @@ def test_a_mesh_that_is_none_is_seen() -> None:
     assert wrong_in(replace(good, faces=face + 1))
     assert wrong_in(replace(good, faces=face.astype(np.int32)))
     assert wrong_in(replace(good, node_of=np.array([0])))
-
-
-@pytest.mark.slow
-def test_a_warm_process_that_dies_hangs_or_grows_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
-    warm = WarmTrials(0, SEEDS)
-    numbers = [number for number in range(200) if warm.kind(number) == "read"][:4]
-    try:
-        first = [warm.trial(number) for number in numbers[:1]]
-        assert first[0].is_well
-        process = warm._process.pid
-        monkeypatch.setattr(fuzz.warm.LightTrials, "trial", lambda *_: None)  # only here: the process is another
-        os.kill(process, signal.SIGKILL)
-        ends = [warm.trial(number).end for number in range(numbers[0] + 1, numbers[0] + 3)]
-        assert set(ends) <= {"crash", "loaded", "refused", "done"}  # answers sent before it died still count
-        assert warm.trial(numbers[-1]).is_well
-        assert warm._process.pid != process
-        os.kill(warm._process.pid, signal.SIGSTOP)
-        monkeypatch.setattr(fuzz.warm, "PATIENCE", 0.1)
-        while (stopped := warm.trial(warm._next)).is_well:  # those it had finished before
-            time.sleep(0)
-        assert stopped.end == "hang"
-        monkeypatch.setattr(fuzz.warm, "PATIENCE", 600.0)
-        monkeypatch.setattr(fuzz.warm, "LOOK", 0.0)
-        monkeypatch.setattr(fuzz.warm, "MEMORY", 1)
-        assert warm.trial(numbers[0]).end == "memory"
-    finally:
-        warm.close()

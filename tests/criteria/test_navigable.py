@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import cKDTree
 
 import rlacd
+from fuzz.geometry import Polytope
 from rlacd import _native
 from rlacd.cli.main import app
 from rlacd.criteria.navigable import LEAST_RADIUS, Balls, Navigable, NavigableSpace
@@ -88,10 +89,9 @@ def inside_house(nav: Navigable, manifold: Any, turn: int) -> Floats:
 
 
 def depth_of(hull: Any, points: Floats) -> Floats:
-    """Signed distance to a hull, negative inside, by Qhull's planes and brute force."""
-    equations = ConvexHull(hull.vertices).equations
-    inner = (points @ equations[:, :3].T + equations[:, 3]).max(axis=1)
-    return np.where(inner <= 0, inner, point_to_triangles(points, hull.vertices, hull.faces))
+    """Signed distance to a hull, negative inside, by brute force."""
+    polytope = Polytope(np.asarray(hull.vertices), np.asarray(hull.faces))
+    return np.asarray(np.minimum(polytope.height(points), 0) + polytope.distance(points))
 
 
 SHAPES = {

@@ -10,22 +10,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from fuzz.geometry import why_not_convex
+from fuzz.geometry import Polytope, why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.finish.limit import limit_part
 from rlacd.options.presets import HullLimits
 from rlacd.solid.component import Part
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, Hull, limit_hull
-
-
-def excess(outer: Hull, inner: Hull) -> float:
-    """How far a corner of `inner` sticks out of `outer`, by planes pushed out to the outer's own corners."""
-    a, b, c = (outer.vertices[outer.faces[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1)
-    normals = normals[lengths > 0] / lengths[lengths > 0, None]
-    return float(((inner.vertices @ normals.T).max(axis=0) - (outer.vertices @ normals.T).max(axis=0)).max())
 
 
 def exactly_inside(point: np.ndarray, hull: Hull) -> bool:
@@ -45,7 +36,9 @@ def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = N
     assert len(limited.vertices) <= (max_vertices or len(hull.vertices))
     assert len(limited.faces) <= (max_faces or len(hull.faces))
     assert len(limited.faces) == 2 * len(limited.vertices) - 4
-    assert excess(limited, hull) < 1e-12 * max(1.0, float(np.abs(limited.vertices).max()))
+    assert Polytope(limited.vertices, limited.faces).height(hull.vertices).max() < 1e-12 * max(
+        1.0, float(np.abs(limited.vertices).max())
+    )
     assert limited.volume >= hull.volume * (1 - 1e-9)
     again = Hull.of(limited.vertices)
     assert len(again.vertices) == len(limited.vertices)

@@ -12,6 +12,7 @@ import trimesh
 from manifold3d import Manifold
 
 import rlacd
+from fuzz.geometry import Polytope
 from rlacd import _native
 from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd
@@ -42,12 +43,8 @@ def stool() -> trimesh.Trimesh:
 
 
 def depths(hulls: list[trimesh.Trimesh], points: Array) -> Array:
-    """How deep points lie in each hull [H, N], from the planes of its triangles."""
-    each = []
-    for hull in hulls:
-        normals = hull.face_normals[hull.area_faces > 1e-12 * hull.area]  # slivers have no direction
-        each.append(((hull.vertices @ normals.T).max(axis=0) - points @ normals.T).min(axis=1))
-    return np.array(each)
+    """How deep points lie in each hull [H, N]."""
+    return np.array([-Polytope(np.array(hull.vertices), np.array(hull.faces)).height(points) for hull in hulls])
 
 
 def needles(mesh: trimesh.Trimesh, hulls: list[trimesh.Trimesh], far: float) -> tuple[Array, Array]:

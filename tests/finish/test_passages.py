@@ -10,6 +10,7 @@ import trimesh
 from manifold3d import Manifold
 
 import rlacd
+from fuzz.geometry import Polytope, distance_to_union
 from rlacd import _native
 from rlacd.cli.options import decompose_options
 from rlacd.errors import OptionError
@@ -31,13 +32,7 @@ def plate(*bores: Manifold) -> Manifold:
 
 def clearance(hulls: list[trimesh.Trimesh], points: Floats) -> Floats:
     """Distance of each point from the nearest hull, 0 inside, by all its triangles and planes."""
-    least = np.full(len(points), np.inf)
-    for hull in hulls:
-        away = point_to_triangles(points, np.asarray(hull.vertices), np.asarray(hull.faces))
-        a, b, c = (np.asarray(hull.vertices)[hull.faces[:, i]] for i in range(3))
-        outside = (np.einsum("pfi,fi->pf", points[:, None] - a, np.cross(b - a, c - a)) > 0).any(axis=1)
-        least = np.minimum(least, np.where(outside, away, 0.0))
-    return least
+    return distance_to_union(points, [Polytope(np.array(hull.vertices), np.array(hull.faces)) for hull in hulls])
 
 
 def axis(x: float, y: float) -> Floats:
