@@ -1,16 +1,30 @@
-"""How many threads run: as many as were asked for, in whichever thread or process they start."""
+"""A run: its threads, its account of work, which is the same for any number of them, and `RLACD_TRACE`."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import pytest
+import trimesh
+from benchmarks.replay import Cost, Step, replayed, steps_of
+from hypothesis import given
+from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
 
-from rlacd.run import Run, available_cpus
+import rlacd
+from rlacd import cut_and_merge
+from rlacd.run import Run, Work, available_cpus
+from tests.hulls import assert_same_hulls
+from tests.shapes import box, trimesh_of
+from tests.shapes_large import screws, sponge
 
 ON_LINUX = sys.platform.startswith("linux")
 
@@ -69,3 +83,92 @@ def test_one_thread_does_what_was_begun_when_it_is_asked_for() -> None:
         run.result(second)
         run.drop([first])
     assert done == [1]
+
+
+PRICES = st.lists(st.floats(0, 50), max_size=40)
+
+
+@given(st.floats(0, 200), PRICES)
+def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> None:
+    work = Work(most)
+    paid = [price for price in prices if work.pay(price)]
+    assert sum(paid) <= work.done <= most
+    assert work.is_spent == (len(paid) < len(prices))
+    assert paid == prices[: len(paid)]  # once something was refused, so is all that follows
+
+
+@given(st.floats(0, 200), st.floats(0, 200), PRICES)
+def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: list[float]) -> None:
+    run = Run(1).alone(most)
+    with run.limited(units, cuts="cut"):
+        for price in prices:
+            run.work.pay(price)
+        spent, used_up = run.work.done, run.work.is_spent
+        assert spent <= units
+    assert run.work.done == spent <= most
+    assert not run.work.is_spent
+    assert run.cut_short == ({"cut"} if used_up else set())
+
+
+def crossing() -> Any:
+    return screws(60, sides=6)
+
+
+def grate() -> trimesh.Trimesh:
+    holes = [box((i, j, -1), (i + 0.7, j + 0.7, 1)) for i in range(6) for j in range(6)]
+    return trimesh_of(box((-0.3, -0.3, 0), (6, 6, 0.2)) - Manifold.batch_boolean(holes, OpType.Add))
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [pytest.param(grate, marks=pytest.mark.slow), pytest.param(lambda: sponge(2), marks=pytest.mark.slow), crossing],
+)
+@pytest.mark.promise("bounded")
+def test_the_default_stays_within_its_account(shape: Callable[[], Any]) -> None:
+    solid = shape()
+    one, three = (rlacd.decompose(solid, threads=threads) for threads in (1, 3))
+    fast = rlacd.decompose(solid, quality="fast")
+    search = one.report["search"]
+    assert 0 < search["work"] <= search["allowed"]
+    assert search["work"] == three.report["search"]["work"]
+    assert len(one) <= len(fast)
+    assert_same_hulls(one, three)
+
+
+@pytest.mark.slow
+def test_a_pass_whose_merging_is_cut_short_meets_the_threshold_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    solid = sponge(2)
+    whole = rlacd.decompose(solid, quality="fast")
+    monkeypatch.setattr(cut_and_merge, "MOST_MERGING", 1e5)
+    short = rlacd.decompose(solid, quality="fast")
+    assert len(short) > len(whole)
+    assert short.report["concavity"]["max"] <= 0.05
+    for result, expected in ((whole, False), (short, True)):
+        assert any("merging stopped" in warning for warning in result.report["warnings"]) == expected
+
+
+def tasks(count: int, locked: float, unlocked: float) -> list[Step]:
+    return [Step("map", [Cost(locked, unlocked, 0.0, 0.0, 50)] * count)]
+
+
+@pytest.mark.parametrize(("threads", "seconds"), [(1, 8.0), (2, 4.0), (8, 1.0), (16, 1.0)])
+def test_what_needs_no_lock_is_divided_among_the_cores(threads: int, seconds: float) -> None:
+    assert replayed(tasks(8, 0.0, 1.0), threads) == pytest.approx(seconds, rel=0.01)
+
+
+def test_a_trace_holds_the_work_of_all_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    torus = trimesh.creation.torus(1.0, 0.4, major_sections=24, minor_sections=12)
+    monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "missing" / "torus.json"))
+    with pytest.raises(rlacd.OutputError, match="correct RLACD_TRACE"):
+        rlacd.decompose(torus, progress=lambda _: pytest.fail("work was begun"))
+    monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "torus.json"))
+    rlacd.decompose(torus, threads=2)
+    spans = json.loads((tmp_path / "torus.json").read_text())["traceEvents"]
+    (whole,) = (span for span in spans if span["cat"] == "run")
+    assert {"repair", "cut", "merge", "search", "measure"} <= {s["name"] for s in spans if s["cat"] == "stage"}
+    assert all(whole["ts"] <= s["ts"] and s["ts"] + s["dur"] <= whole["ts"] + whole["dur"] + 1 for s in spans)
+    assert len({span["tid"] for span in spans}) in (2, 3)
+    steps = list(steps_of(spans))
+    used = sum(c.locked + c.unlocked - c.in_loops + c.of_loops for step in steps for c in step.costs)
+    assert replayed(steps, 1) == pytest.approx(used, rel=0.1)
+    assert used / 2 <= replayed(steps, 2) < used
