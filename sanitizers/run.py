@@ -24,7 +24,7 @@ ADDR_NO_RANDOMIZE = 0x0040000
 NATIVE_TESTS = (
     *("hull", "sweep", "distance", "concavity", "concave_edges", "limits", "metrics"),
     *("plane_cut", "bridges", "overlap", "frame", "fuzz_found"),
-    *("convex_clip", "proxy", "topology", "stop"),
+    *("proxy", "stop"),
     *("navigable", "merge", "decompose", "search", "networks", "bad_input"),
 )
 """Files of tests/ that reach the kernels."""

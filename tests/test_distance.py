@@ -161,25 +161,6 @@ def of_hull(hull: Hull) -> tuple[Floats, Floats]:
     return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def test_some_of_the_hulls_are_as_if_they_were_alone() -> None:
-    rng = np.random.default_rng(3)
-    hulls = [h for c in rng.uniform(-1, 1, (9, 3)) if (h := Hull.of(c + rng.normal(scale=0.4, size=(12, 3))))]
-    some = [7, 0, 4]
-    whole = hull_union(hulls)
-    shared, alone = whole.only(np.array(some, dtype=np.int32)), hull_union([hulls[i] for i in some])
-    points = rng.uniform(-2, 2, (500, 3))
-    assert np.array_equal(shared.distance(points), alone.distance(points))
-    assert not np.array_equal(shared.distance(points), whole.distance(points))
-    surface = from_manifold(box((-1, -1, -1), (1, 1, 1)))
-    assert shared.under(surface.vertices, surface.faces, 1e-3) == alone.under(surface.vertices, surface.faces, 1e-3)
-    for a, b in zip(shared.exposed(), alone.exposed(), strict=True):
-        assert np.array_equal(a, b)
-    del whole
-    assert np.array_equal(shared.distance(points), alone.distance(points))
-    with pytest.raises(IndexError):
-        alone.only(np.array([3], dtype=np.int32))
-
-
 @pytest.mark.parametrize("squeezed", [(1, 1, 1e-10), (1, 1, 1e-7), (1, 1e-6, 1e-6), (1, 1e-4, 1e-10), (1, 1e-8, 1e-8)])
 def test_nothing_beyond_the_rim_of_a_flat_hull_or_the_tip_of_a_needle_is_inside(squeezed: tuple[float, ...]) -> None:
     random = np.random.default_rng(4)

@@ -11,13 +11,11 @@ import trimesh
 from trimesh import creation
 
 import rlacd
-from fuzz.choices import draw_options
 from fuzz.eye import farthest_from_triangles, outer_points
 from fuzz.geometry import Polytope, distance_to_triangles, distance_to_union, why_not_convex
 from fuzz.judges import Case, judge
 from fuzz.kernels import try_seed
-from fuzz.recipes import Shape, make_shape
-from rlacd.options import Options
+from fuzz.recipes import Shape
 from tests.shapes import Closed, box, from_manifold
 
 pytestmark = pytest.mark.slow
@@ -126,16 +124,6 @@ def test_a_seam_between_hulls_is_not_outer(step: float) -> None:
     apart = [hulls[0], cube(CUBES[1] + [step + 1e-3, 0, 0])]
     points = outer_points(apart, 20_000, np.random.default_rng(1))
     assert ((points[:, 0] == 1) & (np.abs(points[:, 1:] - 0.5) < 0.49).all(axis=1)).sum() > 100
-
-
-def test_a_seed_is_the_same_shape_and_options_every_time() -> None:
-    for seed in range(40):
-        one, two = make_shape(seed), make_shape(seed)
-        assert one.steps == two.steps
-        assert one.vertices.tobytes() == two.vertices.tobytes()
-        assert one.faces.tobytes() == two.faces.tobytes()
-        assert draw_options(seed) == draw_options(seed)
-        Options(**draw_options(seed))
 
 
 @pytest.mark.parametrize("seed", [*range(40), 1047])

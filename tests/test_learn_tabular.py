@@ -61,24 +61,16 @@ def root_values(roots: list[Node], finish_reward: float) -> list[float]:
     return [float(values[order.index(root)]) for root in roots]
 
 
-def volume_worth(node: Node, unit: float, discounted: bool = True) -> float:
-    """Value of a component where only volume is rewarded, relative to a unit: by eq. 7 and 8, or the most there is."""
+def volume_worth(node: Node, unit: float) -> float:
+    """Value of a component where only volume is rewarded, by eq. 7 and 8."""
     return max(
         (
             o.saved * node.hull_volume / unit
-            + sum(
-                (d if discounted else 1) * volume_worth(c, unit, discounted)
-                for c, d in zip(o.children, o.discounts, strict=True)
-            )
+            + sum(d * volume_worth(c, unit) for c, d in zip(o.children, o.discounts, strict=True))
             for o in node.outcomes
         ),
         default=0.0,
     )
-
-
-def test_shares_of_the_hull_make_the_return_the_volume_saved(roots: list[Node]) -> None:
-    expected = [volume_worth(root, root.hull_volume, discounted=False) for root in roots]
-    assert root_values(roots, 0.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("finish_reward", [0.0, 1.0])

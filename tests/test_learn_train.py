@@ -25,7 +25,7 @@ from rlacd.learn.options import PRESETS, TrainOptions
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 from rlacd.pool.local import InProcessPool, LocalPool
 from tests.learning import write_meshes
-from tests.pool.processes import pool_processes
+from tests.pool.obedient import pool_processes
 
 TINY: dict[str, Any] = {
     "iterations": 120,

@@ -87,29 +87,6 @@ def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
     assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
 
 
-@pytest.mark.parametrize("across", [False, True])
-def test_pairs_of_nearby_boxes(across: bool) -> None:
-    random = np.random.default_rng(0)
-    for count in (1, 2, 30):
-        lower = random.uniform(0, 4, (count, 3))
-        parts = {7 * i: Component(box(tuple(at), tuple(at + random.uniform(0.1, 1, 3)))) for i, at in enumerate(lower)}
-        corners = {i: part.box for i, part in parts.items()}
-
-        def near(i: int, j: int, corners=corners) -> bool:
-            gap = np.maximum(np.maximum(corners[i][0] - corners[j][1], corners[j][0] - corners[i][1]), 0)
-            return bool(np.linalg.norm(gap) <= 0.2)
-
-        new = [7 * i for i in range(0, count, 3)]
-        expected = {
-            (min(i, j), max(i, j))
-            for i in new
-            for j in parts
-            if i != j and (near(i, j) or (across and any(near(i, k) and near(k, j) for k in parts)))
-        }
-        boxes = _native.Boxes([part.hull.corners for part in parts.values()], list(parts))
-        assert boxes.pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]
-
-
 @pytest.mark.parametrize("name", SOLIDS)
 @pytest.mark.parametrize("seed", range(5))
 def test_gluing_undoes_a_cut(name: str, seed: int) -> None:

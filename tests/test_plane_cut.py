@@ -1,4 +1,4 @@
-"""Cutting by a plane: both sides closed, nothing lost, no triangles piling up, whatever touches the plane."""
+"""Cutting by a plane and clipping to a hull: closed, nothing lost, no triangles piling up, whatever touches it."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from manifold3d import CrossSection, Manifold, OpType
+from manifold3d import CrossSection, Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
 from tests.hulls import hull_of
 from tests.shapes import block, component_of, is_closed
@@ -226,3 +227,80 @@ def test_films_that_coincide_are_closed(offset, shift) -> None:
     assert all(is_closed(side.faces) for side in (below, above) if side is not None)
     assert volume(below) == pytest.approx(2 * offset, abs=1e-9)
     assert volume(above) == pytest.approx(2 - 2 * offset, abs=1e-9)
+
+
+def solids() -> dict[str, trimesh.Trimesh]:
+    bumpy = trimesh.creation.icosphere(subdivisions=4)
+    bumpy.vertices *= 1 + 0.1 * np.random.default_rng(0).normal(size=(len(bumpy.vertices), 1))
+    return {
+        "box": trimesh.creation.box((1, 2, 3)),
+        "ring": trimesh.creation.torus(1.0, 0.3, 64, 32),
+        "bumpy ball": bumpy,
+        "hollow box": trimesh.creation.box((2, 2, 2)) + inverted(trimesh.creation.box((1.5, 1.5, 1.5))),
+        "two boxes": trimesh.creation.box((1, 1, 1)) + trimesh.creation.box((1, 1, 1)).apply_translation((2, 0, 0)),
+    }
+
+
+def inverted(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    mesh.invert()
+    return mesh
+
+
+def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
+    """Hulls of corners of the solid, whose faces touch the facets, of grid points, and of any points."""
+    rng = np.random.default_rng(1)
+    found = []
+    for size in rng.integers(4, 40, size=count).tolist():
+        near = mesh.vertices[rng.integers(len(mesh.vertices))]
+        for points in (
+            mesh.vertices[rng.integers(len(mesh.vertices), size=size)],
+            rng.integers(-4, 5, size=(size, 3)) / 2,
+            near + 0.3 * rng.normal(size=(size, 3)),
+        ):
+            hull = Hull.of(np.array(points, dtype=np.float64))
+            if hull is not None:
+                found.append(hull)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", solids())
+def test_clipping_agrees_with_a_boolean(name: str) -> None:
+    mesh = solids()[name]
+    solid = component_of(mesh)
+    whole = to_manifold(solid.vertices, solid.faces)
+    for hull in hulls(mesh):
+        part = solid.inside(hull)
+        vertices, faces = part.vertices, part.faces
+        assert is_closed(faces)
+        boolean = whole ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
+        assert part.volume == pytest.approx(boolean.volume(), abs=1e-6)
+        if len(faces):
+            planes = hull.vertices[hull.faces]
+            normals = np.cross(planes[:, 1] - planes[:, 0], planes[:, 2] - planes[:, 0])
+            large = np.linalg.norm(normals, axis=1) > 1e-6
+            normals = normals[large] / np.linalg.norm(normals[large], axis=1)[:, None]
+            heights = np.einsum("vfk,fk->vf", vertices[:, None] - planes[None, large, 0], normals)
+            assert heights[np.unique(faces)].max() < 1e-6
+
+
+def test_a_surface_folded_by_noise_is_clipped_and_its_halves_add_up() -> None:
+    """Some hulls have corners where the folded surface holds them twice, or turns inside out."""
+    crumpled = trimesh.creation.icosphere(subdivisions=4)
+    crumpled.vertices += np.random.default_rng(0).uniform(-0.1, 0.1, crumpled.vertices.shape)
+    solid = component_of(crumpled)
+    rng = np.random.default_rng(2)
+    for _ in range(60):
+        hull = Hull.of(crumpled.vertices[rng.integers(len(crumpled.vertices), size=12)] * 0.985)
+        below, above = Component((hull.vertices, hull.faces)).cut(Plane((0.0, 0.6, 0.8), 0.1))
+        whole, *halves = (solid.inside(one) for one in (hull, below.hull, above.hull))
+        assert all(is_closed(part.faces) for part in (whole, *halves))
+        assert whole.volume == pytest.approx(sum(half.volume for half in halves), rel=1e-3)
+
+
+def test_a_hull_around_everything_changes_nothing_and_one_inside_is_filled() -> None:
+    ball = component_of(solids()["bumpy ball"])
+    around = Hull.of(3 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
+    inside = Hull.of(0.5 * np.array(trimesh.creation.box((1, 1, 1)).vertices))
+    assert ball.inside(around).size == len(ball.faces)
+    assert ball.inside(inside).volume == pytest.approx(inside.volume, abs=1e-6)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,9 @@ from manifold3d import Manifold
 
 import rlacd
 from rlacd.options.names import LEARNED
-from rlacd.planes.candidates import axis_and_principal
-from rlacd.planes.sweep import sweep
 from rlacd.policies import make_policy
 from rlacd.policies.greedy import RandomShortlist, excess_norm, hull_sum
 from rlacd.policies.learned import PROMISING
-from rlacd.policies.plane_features import FEATURES, plane_features
 from tests.hulls import assert_same_hulls
 from tests.shapes import component_of, table, to_manifold, trimesh_of
 
@@ -80,22 +76,6 @@ def test_the_shipped_policy_takes_one_of_greedys_best_planes_and_ignores_what_wa
     policy = make_policy("learned", scale=0.01)
     policy.choose(component.cut(chosen)[0])
     assert policy.choose(rlacd.Component(hollow_table())) == chosen
-
-
-def test_networks_without_hulls_see_the_same_whatever_the_hulls() -> None:
-    pytest.importorskip("torch")
-    from benchmarks.learned.fit import WITHOUT_HULLS
-
-    component = rlacd.Component(hollow_table())
-    scored = sweep(component, axis_and_principal(component))
-    other = replace(scored, hull_below=2 * scored.hull_below, hull_above=3 * scored.hull_above)
-    box = np.ptp(component.box, axis=0)
-    seen, without = (
-        plane_features(s, scored.valid(), times * component.hull.volume, component.volume, box, 0.05)
-        for s, times in ((scored, 1), (other, 2))
-    )
-    changed = np.flatnonzero(~np.isclose(seen, without).all(axis=0))
-    assert set(changed) == set(range(FEATURES)) - set(WITHOUT_HULLS)
 
 
 def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:

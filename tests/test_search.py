@@ -174,20 +174,6 @@ def test_reuniting_again_and_again_leaves_no_crumbs() -> None:
     assert len(again.faces) < 12 * len(solid.faces)  # 160 times as many without cleaning up
 
 
-def test_what_is_all_there_of_a_component_is_put_together_without_a_boolean() -> None:
-    bar = Component(Manifold.cube((3, 1, 1), True))
-    low, high = (side for side in bar.cut(Plane((1, 0, 0), -0.3)) if side is not None)
-    left, right = (side for side in high.cut(Plane((0, 1, 0), 0.1)) if side is not None)
-    near, far = (side for side in high.cut(Plane((0, 0, 1), 0.2)) if side is not None)
-    assert reunite([right, low, left]) is bar
-    assert reunite([far, near]) is high
-    for some, volume in (([low, left], low.volume + left.volume), ([low, near], low.volume + near.volume)):
-        united = reunite(some)
-        assert united is not None
-        assert united is not bar
-        assert united.volume == pytest.approx(volume, rel=1e-6)
-
-
 def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     bar = Component(Manifold.cube((3, 1, 1), True))
     pieces: list[Component] = [bar]

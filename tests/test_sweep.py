@@ -63,7 +63,8 @@ def test_sweep_equals_real_cuts(name: str) -> None:
             assert solid[index] == pytest.approx(side.volume(), abs=1e-9 * total)
             points = np.asarray(side.to_mesh64().vert_properties[:, :3])
             assert hull[index] == pytest.approx(hull_volume(points), rel=1e-9, abs=1e-12)
-        section = whole.rotate(_upright(plane.normal)).slice(plane.offset)
+        flat = trimesh.geometry.plane_transform(plane.offset * np.array(plane.normal), plane.normal)
+        section = whole.transform(flat[:3]).slice(0)
         assert scored.section_area[index] == pytest.approx(section.area(), abs=1e-6)
 
 
@@ -111,14 +112,6 @@ def test_corners_count_where_the_mesh_is_degenerate(solid: tuple[FloatArray, Int
         for side, hull in ((height <= 0, scored.hull_below), (height >= 0, scored.hull_above)):
             expected = hull_volume(np.concatenate([vertices[side], crossing]))
             assert hull[index] == pytest.approx(expected, rel=1e-9, abs=1e-12)
-
-
-def _upright(normal: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Euler angles (degrees, x then y then z) that turn the normal to +z."""
-    x, y, z = normal
-    about_x = np.degrees(np.arctan2(y, z))
-    about_y = -np.degrees(np.arctan2(x, np.hypot(y, z)))
-    return (float(about_x), float(about_y), 0.0)
 
 
 def test_candidates_are_the_papers_150() -> None:

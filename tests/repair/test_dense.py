@@ -5,20 +5,10 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.io.read.load import load_mesh
 from rlacd.repair.distance import SurfaceQuery
-from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from tests.repair.repaired import BOX, join, solid_of, volume, without
 from tests.scripts import script
-
-AS_SOLID = [
-    "test/capod/class6__m64.ply",  # a hole in a hull whose wings touch along edges
-    "test/ikea_assembled/bookcase_expedit_0385.ply",  # boards that meet at edges
-    "test/ikea_assembled/table_bjorkudden_0206.ply",
-    "train/kenney_cc0/furniture_pack__toilet.ply",  # rooms behind sheets, on a body
-    "train/quaternius_cc0/ultimate_space_pack__Tree_Floating_2.ply",
-]
 
 
 def noisy_copy(corpus, name):
@@ -70,17 +60,6 @@ def test_a_capped_body_whose_faces_cross_at_an_edge_is_solid(times):
     far = int(np.argmax(closed.triangles_center @ (1, 0, 0)))
     solid = solid_of(without(closed, far))
     assert volume(solid) == pytest.approx(np.sin(np.radians(30)), rel=0.02)
-
-
-def solid_as_read(mesh):
-    return repair(load_mesh(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)))
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", AS_SOLID)
-def test_noisy_copies_of_real_meshes_are_as_solid(corpus, name):
-    before, after = map(solid_as_read, noisy_copy(corpus, name))
-    assert volume(after) == pytest.approx(volume(before), rel=0.1)
 
 
 LOST = [
