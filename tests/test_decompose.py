@@ -120,7 +120,6 @@ FAST: list[dict[str, Any]] = [
     {"keep_open": 0.9},
     {"max_hulls": 4, "max_vertices": 12},
     {"policy": "learned", "merge": False},
-    {"quality": "best", "search_steps": 8, "seed": 5},
 ]
 
 

@@ -33,7 +33,8 @@ from rlacd.search.recut import Exchange, recut
 from rlacd.search.redistribute import redistribute
 from rlacd.search.search import BOUNDED_PATIENCE, search
 from rlacd.solid.component import Component, Part, Plane, reunite, touch
-from tests.shapes import bent_bar, box, depth_outside, from_manifold, own_volume, stacks, strangers, together
+from tests.hulls import assert_same_hulls
+from tests.shapes import bent_bar, box, depth_outside, own_volume, stacks, strangers, together, trimesh_of
 
 SHAPES = ("test/coacd_examples/SnowFlake.ply", "test/vhacd/ob_chess_table.ply", "test/capod/class8__m85.ply")
 CRITERION = Concavity(0.05)
@@ -42,6 +43,11 @@ CRITERION = Concavity(0.05)
 def frame() -> Any:
     """A picture frame, turned so that no face lies along an axis."""
     return (box((-1, -1, -0.3), (1, 1, 0.3)) - box((-0.5, -0.5, -1), (0.5, 0.5, 1))).rotate([20, 30, 10])
+
+
+def crossed() -> Any:
+    """Two of them, where what the search finds depends on what it draws."""
+    return frame() + frame().rotate([0, 90, 0])
 
 
 def solid_of(mesh: Path) -> Component:
@@ -238,13 +244,26 @@ def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
         assert [p.volume for p in once.into] == [p.volume for p in again.into]
 
 
+@pytest.mark.promise("same-bytes")
+@pytest.mark.parametrize("options", [{}, {"quality": "best", "search_steps": 8}], ids=str)
+def test_a_seed_makes_the_same_search_on_any_number_of_threads_and_another_seed_another(
+    options: dict[str, Any],
+) -> None:
+    mesh = trimesh_of(crossed())
+    first, again, threaded, other = (
+        rlacd.decompose(mesh, seed=seed, threads=threads, **options)
+        for seed, threads in ((0, 1), (0, 1), (0, 4), (1, 1))
+    )
+    assert_same_hulls(first, again, threaded)
+    assert [hull.vertices.tobytes() for hull in first] != [hull.vertices.tobytes() for hull in other]
+
+
 @pytest.mark.slow
 @pytest.mark.promise("levels")
 def test_no_level_makes_more_hulls_than_the_one_before() -> None:
-    for solid in (frame(), frame() + frame().rotate([0, 90, 0])):
-        shape = from_manifold(solid)
+    for solid in (frame(), crossed()):
         fast, balanced, best = (
-            rlacd.decompose((shape.vertices, shape.faces), threads=1, **options)
+            rlacd.decompose(trimesh_of(solid), threads=1, **options)
             for options in ({"quality": "fast"}, {}, {"quality": "best", "search_steps": 16})
         )
         assert len(best) <= len(fast) >= len(balanced)

@@ -19,7 +19,7 @@ from rlacd.repair.repair import repair
 from rlacd.repair.union import unite, volume_of
 from rlacd.repair.voxels import _grown
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.topology import Edges, bodies_of
+from rlacd.solid.topology import Edges, bodies_of, first_of_doubled
 
 BALL = trimesh.creation.icosphere(3)
 VERTICES, FACES = np.array(BALL.vertices), np.array(BALL.faces, dtype=np.int64)
@@ -131,6 +131,8 @@ def test_edges_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: i
     assert np.array_equal(edges.vertices, distinct)
     assert np.array_equal(edges.of_halfedge, inverse.reshape(-1))
     assert np.array_equal(edges.valence, valence)
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    assert np.array_equal(np.flatnonzero(first_of_doubled(triangles, count)), np.sort(first))
     number, body = bodies_of(triangles, edges)
     assert (np.diff(np.unique(body, return_index=True)[1]) > 0).all()
     edge = edges.of_halfedge.reshape(-1, 3)
