@@ -23,9 +23,9 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 NATIVE_TESTS = (
     *("hull", "sweep", "distance", "concavity", "concave_edges", "limits", "metrics"),
-    *("plane_cut", "bridges", "overlap", "frame", "fuzz_found"),
+    *("plane_cut", "overlap", "decomposition", "fuzz_found"),
     *("proxy", "stop"),
-    *("navigable", "merge", "decompose", "search", "networks", "bad_input"),
+    *("navigable", "merge", "decompose", "search", "policies", "bad_input"),
 )
 """Files of tests/ that reach the kernels."""
 

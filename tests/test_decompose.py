@@ -85,15 +85,6 @@ def test_input_frame_and_unit_are_kept() -> None:
     assert joint.max(axis=0) == pytest.approx(placed.bounds[1], abs=slack)
 
 
-def test_threshold_in_the_unit_of_the_input() -> None:
-    mesh = table()
-    mesh.apply_scale(50)  # longest side 100: one unit is 0.02 in the frame
-    metric = rlacd.decompose(mesh, threshold_abs=2.5)
-    assert metric.report["options"]["threshold"] == pytest.approx(0.05)
-    with pytest.raises(rlacd.OptionError, match="threshold_abs"):
-        rlacd.decompose(mesh, threshold_abs=1e-6)
-
-
 @pytest.mark.parametrize("source", ["path", "trimesh", "scene", "arrays", "lists"])
 def test_every_kind_of_input_gives_the_same(source: str, tmp_path) -> None:
     mesh = table()

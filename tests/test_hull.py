@@ -111,18 +111,6 @@ def test_points_one_ulp_off_a_plane_are_seen() -> None:
     assert rank == 3
 
 
-def test_joint_hull_volumes() -> None:
-    rng = np.random.default_rng(1)
-    groups = [rng.normal(size=(n, 3)) for n in (5, 20, 9)]
-    pairs = np.array([[0, 1], [1, 2], [2, 0]], dtype=np.int32)
-    hulls = [_native.HullCorners(group) for group in groups]
-    volumes = _native.joint_hull_volumes(hulls, pairs, 2)
-    expected = [ConvexHull(np.concatenate([groups[i], groups[j]])).volume for i, j in pairs]
-    assert volumes == pytest.approx(expected, rel=1e-9)
-    with pytest.raises(ValueError, match="range"):
-        _native.joint_hull_volumes(hulls, np.array([[0, 3]], dtype=np.int32), 1)
-
-
 @pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
 def test_points_that_are_not_finite_are_refused(bad: float) -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, bad]], dtype=float)

@@ -14,6 +14,7 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 import rlacd
 from fuzz.geometry import Polytope
@@ -24,7 +25,6 @@ from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part
-from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 from tests.hulls import assert_convex_hull
@@ -36,21 +36,19 @@ R, T = 2 * RADIUS, 2 * TOLERANCE
 
 
 def solid_of(manifold: Any) -> Solid:
-    """As repair would hand it over, cavities kept; the frame is that of the points."""
-    mesh = from_manifold(manifold)
-    frame = Frame.of(mesh.vertices)
-    there = manifold.translate(tuple(-frame.center)).scale((frame.scale,) * 3)
-    mesh = from_manifold(there)
-    return Solid(there, (mesh.vertices, mesh.faces), frame, (), ())
+    return repair(load_mesh(trimesh_of(manifold)), keep_cavities=True, threads=1)
 
 
 def prepare(manifold: Any, radius: float = RADIUS, tolerance: float = TOLERANCE, **options: Any) -> Navigable:
     return Navigable.of(NavigableSpace(radius, tolerance, **options), solid_of(manifold), threads=1)
 
 
+TURNS = [(0, 0, 0), (31, 17, 53), (45, 45, 0), (10, 80, 33)]
+"""As it is, and turned by angles that nothing is aligned with."""
+
+
 def turned(manifold: Any, turn: int) -> Any:
-    """Four orientations: as it is, and turned by angles that nothing is aligned with."""
-    return manifold.rotate([(0, 0, 0), (31, 17, 53), (45, 45, 0), (10, 80, 33)][turn])
+    return manifold.rotate(TURNS[turn])
 
 
 def torus(hole: float, tube: float = 0.3) -> Any:
@@ -76,10 +74,7 @@ def house(door: float | None, wall: float = 0.06, height: float = 1.2) -> Any:
 
 def upright(points: Floats, turn: int) -> Floats:
     """Points of a turned shape, turned back."""
-    images = [
-        from_manifold(turned(manifold3d.Manifold.cube((1, 1, 1), True).translate(axis), turn)) for axis in np.eye(3)
-    ]
-    return points @ np.stack([image.vertices.mean(axis=0) for image in images]).T
+    return Rotation.from_euler("xyz", TURNS[turn], degrees=True).inv().apply(points)
 
 
 def inside_house(nav: Navigable, manifold: Any, turn: int) -> Floats:

@@ -188,11 +188,11 @@ def error(result: rlacd.Decomposition, criterion: str) -> float:
     return float(entry["intrusion"]["max"] if criterion == "navigable" else entry["max"])
 
 
-@pytest.mark.parametrize(
-    ("shape", "most"),
-    [pytest.param(drawer, 8, marks=pytest.mark.slow)]
-    + [pytest.param(shape, 39, marks=pytest.mark.nightly) for shape in (cabinet, drawer, mug)],
-)
+CASES = [pytest.param(drawer, 8, marks=pytest.mark.slow)]
+CASES += [pytest.param(shape, 39, marks=pytest.mark.nightly) for shape in (cabinet, drawer, mug)]
+
+
+@pytest.mark.parametrize(("shape", "most"), CASES)
 @pytest.mark.parametrize(("criterion", "options"), CRITERIA)
 @pytest.mark.promise("max-hulls")
 def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(

@@ -72,16 +72,6 @@ def test_points_in_a_ball(seed: int, count: int, radius: float) -> None:
     assert found.tolist() == [int(i) for own in expected for i in own]
 
 
-def test_a_search_for_points_ends_at_its_limit() -> None:
-    points = np.zeros((100, 3))
-    _, found = _native.PointTree(points).within(points, np.ones(100), 250)
-    assert len(found) == 300
-    with pytest.raises(ValueError, match="not finite"):
-        _native.PointTree(np.full((1, 3), np.inf))
-    with pytest.raises(ValueError, match="one radius"):
-        _native.PointTree(points).within(points, np.ones(3))
-
-
 def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:
     """Points, many of them equal, with zeros of both signs; faces, many of them equal or degenerate."""
     rng = np.random.default_rng(seed)

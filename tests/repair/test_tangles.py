@@ -65,15 +65,14 @@ def enclosed(mesh: Mesh, cells: int = 40) -> tuple[npt.NDArray[np.float64], npt.
     """Points that faces shut in, and points that they do not, found on a grid; none near the faces."""
     vertices, faces = mesh
     surface = trimesh.sample.sample_surface(trimesh.Trimesh(vertices, faces, process=False), 40_000, seed=0)[0]
-    axes = [np.linspace(low - 0.1, high + 0.1, cells) for low, high in zip(*_box(vertices), strict=True)]
+    axes = [
+        np.linspace(low - 0.1, high + 0.1, cells)
+        for low, high in zip(vertices.min(axis=0), vertices.max(axis=0), strict=True)
+    ]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     free = (cKDTree(surface).query(grid.reshape(-1, 3))[0] > 0.06).reshape(grid.shape[:3])
     rooms, _ = ndimage.label(free)
     return grid[free & (rooms != rooms[0, 0, 0])], grid[rooms == rooms[0, 0, 0]]
-
-
-def _box(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    return points.min(axis=0), points.max(axis=0)
 
 
 @pytest.mark.parametrize("seed", range(4))
