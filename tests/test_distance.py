@@ -197,16 +197,6 @@ def test_places_of_the_greatest_distances(seed: int) -> None:
     assert threaded == found
 
 
-def test_hausdorff_is_found_between_the_corners() -> None:
-    # A plate above a groove: the farthest point is in the middle of the plate, at none of its corners.
-    plate = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 2, 0]])
-    rails = np.array([[-1.0, -3, 0], [-1, 3, 0], [-2, 0, 0], [1, -3, 0], [1, 3, 0], [2, 0, 0]])
-    surface = _native.Surface(rails, np.array([[0, 1, 2], [3, 4, 5]], dtype=np.int32))
-    lower, upper = _native.directed_hausdorff(plate, np.array([[0, 1, 2]], dtype=np.int32), surface, 1e-6)
-    assert lower == pytest.approx(1, abs=1e-6)
-    assert upper == pytest.approx(1, abs=1e-6)
-
-
 def test_trees_made_by_several_threads_are_the_same() -> None:
     ball = trimesh.creation.icosphere(6)
     ball.vertices *= 1 + 0.01 * np.random.default_rng(0).normal(size=(len(ball.vertices), 1))

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 from manifold3d import Manifold
 
 pytest.importorskip("torch", reason="needs the extra train")
@@ -28,7 +27,7 @@ from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy
 from rlacd.solid.component import Component
 from tests.learning import small_solids
-from tests.shapes import box, from_manifold
+from tests.shapes import box, trimesh_of
 
 CRITERION = Concavity(0.02)
 
@@ -108,8 +107,7 @@ def two_planes(monkeypatch: pytest.MonkeyPatch) -> None:
 def saved(folder: Path, name: str, solid: Manifold) -> Component:
     """Write a solid to a folder and read it as training does."""
     folder.mkdir(exist_ok=True)
-    mesh = from_manifold(solid)
-    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / name)
+    trimesh_of(solid).export(folder / name)
     read = Solids(folder, folder / "solids").get(name)
     assert read is not None
     return read

@@ -256,11 +256,6 @@ def test_what_workflows_run_and_the_metadata_name_exists() -> None:
     assert re.findall(r"Python :: (3\.\d+)", text("pyproject.toml")) == re.findall(r"[\d.]+", tested)
 
 
-def test_the_module_runs_as_the_command() -> None:
-    run = subprocess.run([sys.executable, "-m", "rlacd", "--version"], capture_output=True, text=True, timeout=120)
-    assert run.stdout == f"rlacd {rlacd.__version__}\n"
-
-
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete(shell: str) -> None:
     program = f"import os; os.environ['_RLACD_COMPLETE'] = '{shell}_source'; from rlacd.cli.main import main; main()"

@@ -76,11 +76,6 @@ def test_twisted_bands_become_slabs(twists):
     assert solid.bodies[0].deviation < 3 * HALF_THICKNESS
 
 
-def test_a_klein_bottle_is_a_result():
-    solid = solid_of(klein_bottle())
-    assert max(body.deviation for body in solid.bodies) < 2 * DEFAULT_GAP
-
-
 @pytest.mark.parametrize(
     ("points", "faces"),
     [
