@@ -126,12 +126,9 @@ Q = torch.tensor([[1.0, 2.0, 3.0], [4.0, 0.0, -1.0]])
 MASK = torch.tensor([[True, True, False], [True, True, True]])
 
 
-def test_value_is_the_greatest_valid_q_at_temperature_zero() -> None:
-    assert soft_value(Q, MASK, 0).tolist() == [2.0, 4.0]
-
-
 def test_soft_value_by_hand() -> None:
     expected = [2 * math.log(math.exp(0.5) + math.exp(1.0)), 2 * math.log(math.exp(2) + 1 + math.exp(-0.5))]
+    assert soft_value(Q, MASK, 0).tolist() == [2.0, 4.0], "the greatest valid value"
     assert soft_value(Q, MASK, 2.0).tolist() == pytest.approx(expected, rel=1e-6)
 
 

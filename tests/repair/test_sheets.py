@@ -117,14 +117,6 @@ def test_hundreds_of_leaves_are_one_crowd_that_leaves_none_outside(count):
     assert query.distance(there)[~query.inside(there)].max(initial=0) <= 2 * HALF_THICKNESS
 
 
-def test_a_sheet_attached_to_a_solid_stays():
-    fin = [[1, -1, 1], [1, 1, 1], [1, 1, 1.1], [1, -1, 1.1]]
-    solid = solid_of(join(BOX, trimesh.Trimesh(fin, [[0, 1, 2], [0, 2, 3]], process=False)))
-    assert volume(solid) == pytest.approx(8, rel=5e-3)
-    vertices, _ = to_arrays(solid.manifold)
-    assert solid.frame.to_input(vertices)[:, 2].max() == pytest.approx(1.1, abs=1e-2)
-
-
 def test_a_solid_with_a_bent_fin_is_not_called_a_shell():
     fin = [[1, -1, 1], [1, 1, 1], [2, 1, 1], [2, -1, 1], [2, 1, 2], [2, -1, 2]]
     faces = [[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]]
