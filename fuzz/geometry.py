@@ -110,10 +110,11 @@ def winding_number(points: Floats, corners: Floats) -> Floats:
     return total / (2 * np.pi)
 
 
-def why_not_convex(vertices: Floats, faces: Ints) -> str | None:
+def why_not_convex(vertices: Floats, faces: Ints, exactly: bool = False) -> str | None:
     """Explain what is wrong with a hull; None if it is closed, outward oriented and convex.
 
-    Small hulls are judged in rational arithmetic; the volume of large ones is compared with that of Qhull's hull.
+    Small hulls are judged in rational arithmetic; the volume of large ones is compared with that of Qhull's hull,
+    unless they have to be judged exactly, too.
     """
     edges = [(int(f[i]), int(f[(i + 1) % 3])) for f in faces for i in range(3)]
     directed = set(edges)
@@ -125,7 +126,7 @@ def why_not_convex(vertices: Floats, faces: Ints) -> str | None:
         return "it is no sphere"
     if not np.isfinite(vertices).all():
         return "a vertex is not finite"
-    if len(vertices) * len(faces) <= 2500:
+    if exactly or len(vertices) * len(faces) <= 2500:
         return _why_not_convex_exactly(vertices, faces)
     size = np.ptp(vertices, axis=0)
     if not (size > 0).all():

@@ -22,10 +22,10 @@ HERE = Path(__file__).resolve().parent
 ADDR_NO_RANDOMIZE = 0x0040000
 
 NATIVE_TESTS = (
-    *("hull", "sweep", "distance", "concavity", "concave_edges", "limits", "component", "metrics"),
-    *("plane_cut", "bridges", "overlap", "redistribute", "frame", "fuzz_found"),
-    *("convex_clip", "proxy", "topology", "stop"),
-    *("navigable", "merge", "decompose", "search", "networks", "fuzz", "bad_input"),
+    *("hull", "sweep", "distance", "concavity", "concave_edges", "limits", "metrics"),
+    *("plane_cut", "overlap", "decomposition", "fuzz_found"),
+    *("proxy", "stop"),
+    *("navigable", "merge", "decompose", "search", "policies", "bad_input"),
 )
 """Files of tests/ that reach the kernels."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
 
+from fuzz.geometry import why_not_convex
 from rlacd._native import convex_hull
 from rlacd.decomposition import Decomposition
 from rlacd.solid.distance import hull_distances
@@ -43,22 +43,15 @@ def moved(hull: trimesh.Trimesh, scale: float, shift: npt.ArrayLike) -> trimesh.
     return hull_of(hull.vertices * scale + np.asarray(shift))
 
 
+def assert_same_hulls(one: Iterable[trimesh.Trimesh], *others: Iterable[trimesh.Trimesh]) -> None:
+    """To the bit, in the same order."""
+    first, *rest = ([(hull.vertices.tobytes(), hull.faces.tobytes()) for hull in hulls] for hulls in (one, *others))
+    assert all(hulls == first for hulls in rest)
+
+
 def assert_convex_hull(mesh: trimesh.Trimesh) -> None:
     """Closed, outward oriented, no face degenerate, and no vertex above any face: in exact arithmetic."""
-    edges = np.sort(mesh.edges, axis=1)
-    forward = {tuple(edge) for edge in mesh.edges.tolist()}
-    assert len(forward) == len(mesh.edges), "an edge is used twice in one direction"
-    assert all((b, a) in forward for a, b in forward), "an edge has no twin"
-    assert len(mesh.vertices) - len(np.unique(edges, axis=0)) + len(mesh.faces) == 2
-    points = [tuple(map(Fraction, vertex)) for vertex in mesh.vertices.tolist()]
-    for face in mesh.faces.tolist():
-        a, b, c = (points[corner] for corner in face)
-        u, v = _minus(b, a), _minus(c, a)
-        normal = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
-        assert any(normal), "a face has no area"
-        heights = [sum(n * x for n, x in zip(normal, _minus(p, a), strict=True)) for p in points]
-        assert max(heights) == 0, "a vertex lies above a face"
-        assert min(heights) < 0, "the mesh is flat"
+    assert why_not_convex(np.asarray(mesh.vertices), np.asarray(mesh.faces), exactly=True) is None
 
 
 def assert_covers(
@@ -73,7 +66,3 @@ def assert_covers(
     assert valid
     longest = np.ptp(points, axis=0).max()
     assert hull_distances(valid, points, triangles, tolerance=1e-3 * longest).under[0] <= within * longest / 2
-
-
-def _minus(p: tuple[Fraction, ...], q: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
-    return tuple(x - y for x, y in zip(p, q, strict=True))

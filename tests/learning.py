@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from manifold3d import Manifold
 
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.solid.component import Component, Plane
-from tests.shapes import box, from_manifold
+from tests.shapes import box, trimesh_of
 
 
 def small_solids() -> dict[str, Manifold]:
@@ -32,9 +31,8 @@ def write_meshes(folder: Path) -> Path:
     """Write them, and a file that is no mesh."""
     (folder / "deeper").mkdir(parents=True)
     for name, solid in small_solids().items():
-        mesh = from_manifold(solid)
         place = folder / "deeper" if name == "table" else folder
-        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(place / f"{name}.ply")
+        trimesh_of(solid).export(place / f"{name}.ply")
     (folder / "broken.ply").write_bytes(b"ply\nnothing of the kind")
     return folder
 

@@ -13,6 +13,7 @@ import trimesh
 from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, Mesh64
 
+from fuzz.geometry import Polytope, distance_to_triangles
 from rlacd import _native
 from rlacd.solid.component import Component, Part, reunite
 
@@ -86,29 +87,13 @@ def trimesh_of(solid: Any) -> trimesh.Trimesh:
 
 
 def point_to_triangles(points: Floats, vertices: Floats, faces: Ints) -> Floats:
-    """Distances [N] by brute force: the plane where the projection falls inside, the three edges always."""
-    best = np.full(len(points), np.inf)
-    for a, b, c in vertices[faces]:
-        for start, end in ((a, b), (b, c), (c, a)):
-            along = end - start
-            t = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0, 1)
-            best = np.minimum(best, np.linalg.norm(points - start - t[:, None] * along, axis=1))
-        normal = np.cross(b - a, c - a)
-        if (length := np.linalg.norm(normal)) > 0:
-            normal = normal / length
-            inside = np.ones(len(points), dtype=bool)
-            for start, end in ((a, b), (b, c), (c, a)):
-                inside &= (points - start) @ np.cross(normal, end - start) >= 0
-            best = np.where(inside, np.minimum(best, np.abs((points - a) @ normal)), best)
-    return best
+    """Distances [N] by brute force."""
+    return distance_to_triangles(np.asarray(points), np.asarray(vertices)[faces])
 
 
-def depth_in(hull: Closed, points: Floats) -> Floats:
-    """Distance [N] from points inside a convex polytope to its surface, by Qhull's facet equations."""
-    from scipy.spatial import ConvexHull
-
-    equations = ConvexHull(hull.vertices).equations
-    return np.asarray(-(points @ equations[:, :3].T + equations[:, 3])).min(axis=1)
+def depth_in(hull: Any, points: Floats) -> Floats:
+    """Distance [N] from points inside a convex polytope to its surface."""
+    return -Polytope(hull.vertices, hull.faces).height(points)
 
 
 def dense(mesh: Closed, count: int = 20_000) -> Floats:
@@ -154,3 +139,13 @@ def together(parts: Sequence[Part]) -> Component:
 def own_volume(parts: Sequence[Part]) -> float:
     """Without what a part has in common with others."""
     return sum(member.volume for part in parts for member in part.members)
+
+
+def depth_outside(points: np.ndarray, parts: Sequence[Part]) -> float:
+    """How far the outermost of some points is from the nearest hull."""
+    distance = np.full(len(points), np.inf)
+    for part in parts:
+        surface = _native.Surface(part.hull.vertices, part.hull.faces)
+        away = np.where(surface.winding(points, 2.0, 1) > 0.5, 0.0, surface.distance(points, 1))
+        distance = np.minimum(distance, away)
+    return float(distance.max())

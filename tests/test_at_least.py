@@ -16,7 +16,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.search.at_least import UNCOVERED, at_least
-from rlacd.solid.component import Component
+from rlacd.solid.component import Component, Plane
 from tests.shapes import Closed, Floats, box, depth_in, trimesh_of
 
 REACH = 0.05
@@ -44,6 +44,12 @@ def points_of(solid: Component, count: int = 120) -> Floats:
 def test_a_comb_needs_a_hull_for_every_tooth(teeth: int) -> None:
     result = rlacd.decompose(trimesh_of(comb(teeth)), threads=1)
     assert teeth <= result.report["at_least"] <= len(result)
+    solid, slices = Component(comb(teeth)), []
+    for x in np.linspace(-0.8, 0.8, 15).tolist():
+        below, solid = solid.cut(Plane((1.0, 0.0, 0.0), x))
+        slices.append(below)
+    proved = at_least(Component(comb(teeth)), [*slices, solid], REACH, Run(threads=1))
+    assert teeth <= proved <= len(result), "however many parts it begins with"
 
 
 def test_convex_solids_and_criteria_without_a_distance_prove_nothing() -> None:

@@ -1,21 +1,26 @@
-"""Same input, options and seed: the same bytes, in every process, on any number of threads, alone or in a batch."""
+"""Same input, options and seed: the same bytes, in every process, on any number of threads, on any processor."""
 
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
+from unittest import mock
 
+import numpy as np
 import pytest
 
 from rlacd import decompose
 from rlacd.batch import Batch, JobSpec
 from rlacd.pool.local import InProcessPool
+from tests import bits
 from tests.batch.test_batch import TIMES
 from tests.batch.trouble import tree
+from tests.hulls import hull_of
+from tests.shapes import component_of
 
 MESHES = [
     "test/vhacd/lamp.ply",
@@ -30,32 +35,6 @@ FORMATS = [("glb", "glb"), ("mjcf", "xml"), ("usd", "usd")]
 """As a batch is told, and the ending of the file."""
 
 
-def rlacd(*commands: Sequence[object], hash_seed: int) -> None:
-    """Run commands, each in a new process, in which sets and dicts have an order of their own."""
-    environment = {**os.environ, "PYTHONHASHSEED": str(hash_seed)}
-    for command in commands:
-        words = [sys.executable, "-m", "rlacd", *(str(word) for word in command)]
-        done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=1800)
-        assert done.returncode == 0, done.stderr
-
-
-def copied(corpus: Path, names: Sequence[str], folder: Path) -> Path:
-    """Put meshes side by side."""
-    folder.mkdir()
-    for name in names:
-        shutil.copy(corpus / name, folder)
-    return folder
-
-
-def watch_nothing() -> object:
-    class Nothing:
-        def begin(self, *_: object) -> None: ...
-
-        passed_over = started = finished = begin
-
-    return Nothing()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("file_format", "ending"), FORMATS)
 @pytest.mark.promise("batch-bytes")
@@ -64,11 +43,14 @@ def test_a_batch_of_real_meshes_writes_what_decompose_writes(
 ) -> None:
     if file_format == "usd":
         pytest.importorskip("pxr", reason="the extra usd is not installed")
-    assets, alone = copied(corpus, SMALL, tmp_path / "assets"), tmp_path / "alone"
+    assets, alone = tmp_path / "assets", tmp_path / "alone"
+    assets.mkdir()
+    alone.mkdir()
+    for name in SMALL:
+        shutil.copy(corpus / name, assets)
     order = JobSpec.of({"quality": "fast", "threads": 1}, file_format=file_format)
     with InProcessPool() as pool:
-        Batch(assets, str(tmp_path / "out"), order).run(pool, watch_nothing())  # type: ignore[arg-type]
-    alone.mkdir()
+        Batch(assets, str(tmp_path / "out"), order).run(pool, mock.Mock())
     for mesh in assets.iterdir():
         decompose(mesh, quality="fast", threads=3).save(alone / f"{mesh.stem}.{ending}", up="z")
     assert tree(alone) == tree(tmp_path / "out", TIMES, "manifest.jsonl", ".rlacd/lock")
@@ -78,33 +60,67 @@ def test_a_batch_of_real_meshes_writes_what_decompose_writes(
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.promise("same-bytes")
 def test_the_same_bytes_in_every_process_and_for_any_number_of_threads(name: str, corpus: Path, tmp_path: Path) -> None:
-    digits = set()
-    for seed, threads in enumerate((1, 5)):
-        out = tmp_path / f"{seed}.ply"
-        rlacd(["decompose", corpus / name, "-o", out, "-q", "--threads", threads], hash_seed=seed)
-        digits.add(out.read_bytes())
-    assert len(digits) == 1
+    """Each in a new process, in which sets and dicts have an order of their own."""
+    for seed, threads in enumerate("15"):
+        words = ["rlacd", "decompose", str(corpus / name), "-o", f"{tmp_path}/{seed}.ply", "-q", "--threads", threads]
+        environment = {**os.environ, "PYTHONHASHSEED": str(seed)}
+        subprocess.run([sys.executable, "-m", *words], env=environment, check=True, timeout=1800)
+    assert (tmp_path / "0.ply").read_bytes() == (tmp_path / "1.ply").read_bytes()
 
 
-def compare(meshes: Path, tmp_path: Path, file_format: str, ending: str, *words: str) -> None:
-    """Two batches and two times every mesh by itself, each in new processes and on another number of threads."""
-    batches, alone = (tmp_path / "b1", tmp_path / "b2"), (tmp_path / "a1", tmp_path / "a2")
-    for number, (out, jobs, threads) in enumerate(zip(batches, (2, 1), (1, 3), strict=True)):
-        how = ["--format", file_format, "--jobs", jobs, "--threads", threads, "-q"]
-        rlacd(["batch", meshes, "-o", out, *how, *words], hash_seed=10 + number)
-    for number, (out, threads) in enumerate(zip(alone, (1, 2), strict=True)):
-        out.mkdir()
-        each = [["decompose", mesh, "-o", out / f"{mesh.stem}.{ending}"] for mesh in sorted(meshes.iterdir())]
-        rlacd(*([*one, "--threads", threads, "-q", *words] for one in each), hash_seed=20 + number)
-    expected = tree(alone[0])
-    assert len(expected) >= len(list(meshes.iterdir()))
-    assert tree(alone[1]) == expected
-    assert tree(batches[0], TIMES) == tree(batches[1], TIMES), "the manifest, too"
-    assert tree(batches[0], TIMES, "manifest.jsonl", ".rlacd/lock") == expected
+ROOT = Path(__file__).resolve().parents[1]
 
 
-@pytest.mark.nightly
-def test_the_same_files_for_a_cross_section_of_real_meshes(corpus: Path, tmp_path: Path) -> None:
-    names = (corpus / "quick.txt").read_text().split()
-    assert len(names) == 25
-    compare(copied(corpus, names, tmp_path / "assets"), tmp_path, "glb", "glb", "--quality", "fast")
+def older_processor() -> dict[str, str]:
+    """Variables that keep numpy, OpenBLAS and the C library to what a processor of 2006 could do: no FMA, no AVX."""
+    extra = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    return {
+        "OPENBLAS_CORETYPE": "Prescott",
+        "NPY_DISABLE_CPU_FEATURES": " ".join(extra),
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4,-AVX512F,-AVX2_Usable,-FMA_Usable,-AVX512F_Usable",
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the variables are those of x86")
+@pytest.mark.promise("processor")
+def test_an_older_processor_makes_the_same_hulls() -> None:
+    command = [sys.executable, "-m", "tests.bits"]
+    runs = [
+        subprocess.run(command, cwd=ROOT, env={**os.environ, **more}, capture_output=True, text=True, timeout=600)
+        for more in ({}, older_processor())
+    ]
+    assert runs[1].returncode == 0, runs[1].stderr
+    assert runs[0].stdout == runs[1].stdout
+    assert len(runs[0].stdout.splitlines()) == len(bits.CASES)
+
+
+def test_axes_are_eigenvectors_of_the_moments() -> None:
+    """Against LAPACK, on random boxes turned at random."""
+    draw = np.random.default_rng(0)
+    for _ in range(50):
+        corners = draw.normal(size=(20, 3)) * draw.uniform(0.2, 2, 3)
+        rotation, _ = np.linalg.qr(draw.normal(size=(3, 3)))
+        component = component_of(hull_of(corners @ rotation))
+        axes = component.principal_axes
+        moments = _moments(component.vertices[component.faces])
+        values, vectors = np.linalg.eigh(moments)
+        assert np.abs((axes * vectors.T[::-1]).sum(axis=1)) == pytest.approx(np.ones(3), abs=1e-9)
+        assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-14)
+        assert np.diag(axes @ moments @ axes.T) == pytest.approx(values[::-1])
+        assert (axes[range(3), np.abs(axes).argmax(axis=1)] > 0).all()
+
+
+def test_a_cube_keeps_the_axes_of_its_space() -> None:
+    """All directions are principal; rounding must not choose some."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 3 + 0.1
+    axes = component_of(hull_of(corners)).principal_axes
+    assert sorted(axes.tolist()) == [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
+
+
+def _moments(corners: np.ndarray) -> np.ndarray:
+    """Second moments [3, 3] of triangles [F, 3, 3] about their joint centroid, by quadrature at the edges' middles."""
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    middles = (corners + np.roll(corners, 1, axis=1)) / 2  # exact for polynomials of degree two
+    middles -= np.average(corners.mean(axis=1), weights=area, axis=0)
+    return np.einsum("f,fki,fkj->ij", area, middles, middles)

@@ -1,4 +1,4 @@
-"""What the README shows: the sample is what it says, and the table names every option there is."""
+"""What README, examples and pages show works as written, and the tables of options and objects are complete."""
 
 from __future__ import annotations
 
@@ -6,17 +6,24 @@ import dataclasses
 import functools
 import inspect
 import re
-from collections.abc import Iterable
+import shlex
+import sys
+from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 import pytest
+import trimesh
 from click.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app
+from rlacd.compat import coacd
 from rlacd.options import Options
+from rlacd.view import viewer
 from tests.option_table import PAGE, options_table
 from tests.scripts import script
 
@@ -24,7 +31,9 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_the_sample_is_two_closed_bodies_of_a_few_thousand_triangles() -> None:
-    scene = script(ROOT / "examples" / "sample.py").sample()
+    sample = script(ROOT / "examples" / "sample.py").sample
+    scene = sample()
+    assert sample().export(file_type="glb") == scene.export(file_type="glb"), "it is the same every time"
     assert set(scene.geometry) == {"chair", "jug"}
     assert all(mesh.is_watertight and mesh.body_count == 1 for mesh in scene.geometry.values())
     assert scene.geometry["chair"].euler_number == 2 - 2 * 7, "a chair with seven windows to see through"
@@ -43,11 +52,6 @@ def test_the_script_that_trains_on_one_mesh_falls_from_random_planes_to_greedys(
     assert points[-1]["seconds"] < 300
 
 
-def test_the_sample_is_the_same_every_time() -> None:
-    sample = script(ROOT / "examples" / "sample.py").sample
-    assert sample().export(file_type="glb") == sample().export(file_type="glb")
-
-
 @functools.cache
 def gallery() -> dict[str, list[str]]:
     """The rows of the gallery's table, by the name of the object."""
@@ -56,26 +60,21 @@ def gallery() -> dict[str, list[str]]:
     return {row[0]: row[1:] for row in rows[1:]}
 
 
-def holds(corpus: Path, names: Iterable[str]) -> None:
+QUICK = ["vhacd/lamp.ply", "vhacd/horse_walk.ply", "vhacd/teddy.ply"]
+OBJECTS = re.findall(r'"(\w+/\S+\.ply)"', (ROOT / "examples" / "gallery.py").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in QUICK else pytest.mark.nightly) for n in OBJECTS]
+)
+def test_rows_of_the_gallery_are_what_the_objects_give(corpus: Path, name: str) -> None:
     pytest.importorskip("PIL", reason="the extra view is not installed")
-    for name in names:
-        result = rlacd.decompose(corpus / "test" / name)
-        cells = [f"{len(result.source.faces):,}", str(len(result)), f"{result.report['faces']:,}"]
-        stem = Path(name).stem.partition("-")[0].lower()
-        assert gallery()[stem] == [*cells, f"{result.report['hausdorff']['over']:.3f}"], stem
-        assert (ROOT / "docs" / "gallery_objects" / f"{stem}.webp").is_file()
-
-
-@pytest.mark.slow
-def test_some_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> None:
-    holds(corpus, ["vhacd/lamp.ply", "vhacd/horse_walk.ply", "vhacd/teddy.ply"])
-
-
-@pytest.mark.nightly
-def test_all_rows_of_the_gallery_are_what_the_objects_give(corpus: Path) -> None:
-    objects = script(ROOT / "examples" / "gallery.py").OBJECTS
-    assert len(gallery()) == len(objects) == 12
-    holds(corpus, objects)
+    assert len(gallery()) == len(OBJECTS) == 12
+    result = rlacd.decompose(corpus / "test" / name)
+    cells = [f"{len(result.source.faces):,}", str(len(result)), f"{result.report['faces']:,}"]
+    stem = Path(name).stem.partition("-")[0].lower()
+    assert gallery()[stem] == [*cells, f"{result.report['hausdorff']['over']:.3f}"]
+    assert (ROOT / "docs" / "gallery_objects" / f"{stem}.webp").is_file()
 
 
 @pytest.mark.slow
@@ -127,7 +126,7 @@ def test_the_readme_works_outside_the_repository() -> None:
 
 
 @pytest.mark.promise("all-options")
-def test_the_table_names_every_option() -> None:
+def test_the_table_names_every_option_and_the_command_offers_every_argument() -> None:
     table = "".join(line.split("|")[1] for line in options_table().splitlines())
     command = app.get_command(click.Context(app), "decompose")
     options = {
@@ -139,6 +138,7 @@ def test_the_table_names_every_option() -> None:
     }
     assert {name for name in options if f"`{name}`" not in table and f"{name}/" not in table} == set()
     arguments = set(inspect.signature(rlacd.decompose).parameters) - {"mesh"}
+    assert arguments - {"progress", "volume_tolerance"} <= {parameter.name for parameter in command.params}
     assert {name for name in arguments if f"`{name}`" not in table} == set()
 
 
@@ -149,15 +149,6 @@ def test_the_function_has_the_options_as_they_are_stated_once() -> None:
         if field.name != "criterion":  # a class that has the criterion's own methods
             assert given[field.name].annotation == field.type
     assert set(given) == {field.name for field in dataclasses.fields(Options)} | {"mesh", "progress"}
-
-
-@pytest.mark.promise("all-options")
-def test_the_command_offers_every_argument_of_the_function() -> None:
-    command = app.get_command(click.Context(app), "decompose")
-    offered = {parameter.name for parameter in command.params}
-    assert (
-        set(inspect.signature(rlacd.decompose).parameters) - {"progress", "volume_tolerance"} <= offered
-    )  # --tolerance
 
 
 @pytest.mark.nightly
@@ -171,3 +162,78 @@ def test_the_guide_to_tight_fits_shows_the_numbers_that_its_script_prints(
     rows += re.findall(r"keep_open=(\S+): (\d+) hulls, clear radius (\S+ mm)$", printed, re.MULTILINE)
     assert len(rows) == 7
     assert all(f"| {' | '.join(row)} |" in page.replace("| 1 mm", "| 1.0 mm") for row in rows)
+
+
+SNIPPET = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SHELL = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BEFORE = re.compile(r"^.*# before.*\n", re.MULTILINE)
+"""What a reader is told to replace, which needs the other tool."""
+
+PAGES_OF_TEXT = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+PAGES = {
+    str(page.relative_to(ROOT)): found
+    for page in PAGES_OF_TEXT
+    if page.name != "simulators.md" and (found := SNIPPET.findall(page.read_text(encoding="utf-8")))
+}
+"""But for the recipes for simulators: tests/engines/test_recipes.py."""
+
+COMMAND = re.compile(r"^ *(?:rlacd|python -m) ([a-z].*)$", re.MULTILINE)
+COMMANDS = sorted(
+    {
+        line
+        for page in PAGES_OF_TEXT
+        for block in SHELL.findall(page.read_text(encoding="utf-8"))
+        for line in COMMAND.findall(block)
+        if not line.startswith(("fuzz", "tests", "pip"))
+    }
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the files that pages name; nothing waits for Ctrl-C, or changes other packages for later tests."""
+    post = trimesh.creation.box((1, 1, 3))
+    seat = trimesh.creation.box((3, 1, 1), trimesh.transformations.translation_matrix((1, 0, -1)))
+    ell = trimesh.boolean.union([post, seat])
+    for name in ("chair.glb", "house.glb", "link.obj", "block.stl"):
+        ell.export(tmp_path / name)
+    (tmp_path / "robot.urdf").write_text(
+        '<robot name="r"><link name="l"><collision><geometry><mesh filename="link.obj"/></geometry></collision></link>'
+        "</robot>"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(viewer.ViewServer, "wait", lambda self: None)
+    monkeypatch.setitem(sys.modules, "coacd", coacd)
+    monkeypatch.setattr(trimesh.decomposition, "convex_decomposition", trimesh.decomposition.convex_decomposition)
+    return tmp_path
+
+
+def test_the_readme_and_the_first_pages_have_snippets() -> None:
+    assert {"README.md", "docs/index.md", "docs/start.md", "docs/coming_from.md", "docs/policies.md"} <= set(PAGES)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_snippets_run_as_written(folder: Path, page: str) -> None:
+    mesh = trimesh.load_mesh(folder / "link.obj")
+    known: dict[str, Any] = {"rlacd": rlacd, "np": np, "mesh": mesh}
+    known |= {"vertices": mesh.vertices, "points": mesh.vertices, "faces": mesh.faces}
+    for snippet in PAGES[page]:
+        exec(compile(BEFORE.sub("", snippet), page, "exec"), known)
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_commands_have_the_options_that_pages_use(line: str) -> None:
+    words = list(
+        takewhile(lambda word: word not in {"|", ">", "&&", ";"}, shlex.split(line.replace("SEED", "1"), comments=True))
+    )
+    at: Any = app
+    if words[0] == "benchmarks.learned.compare":
+        assert import_module(words[0]).parser().parse_args(words[1:]).policies
+        return
+    if words[0] == "benchmarks":
+        _, name, *words = words
+        at = import_module(f"benchmarks.{name.replace('-', '_')}").app
+    while hasattr(at, "resolve_command"):
+        _, at, words = at.resolve_command(at.context_class(at), words)
+    at.make_context("rlacd", words)

@@ -1,6 +1,8 @@
-"""What fuzzing and the sanitizers have found, each by the smallest input that shows it."""
+"""What fuzzing and the sanitizers have found, each by the smallest input that shows it; and random shapes, judged."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,8 @@ import trimesh
 
 import rlacd
 from fuzz.recipes import make_shape
+from fuzz.shapes import run_seed
+from fuzz.worker import InProcess
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
@@ -113,3 +117,11 @@ def test_a_needle_of_inverted_shells_has_a_mass() -> None:
     shape = make_shape(500635)
     for keep in (True, False):
         assert repair(load_mesh((shape.vertices, shape.faces)), keep_cavities=keep).manifold.volume() > 0
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", range(3, 40))
+@pytest.mark.promise("any-mesh", "covered", "report-true")
+def test_promises_hold_for_any_soup_and_any_options(seed: int, tmp_path: Path) -> None:
+    row = run_seed(seed, InProcess(), tmp_path)
+    assert row.status in ("done", "refused"), row.said

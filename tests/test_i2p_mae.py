@@ -1,11 +1,14 @@
-"""The I2P-MAE encoder: the official features to the digit, and clear words about unusable files."""
+"""The I2P-MAE encoder: the official features to the digit, clear words about unusable files, and training with it."""
 
 from __future__ import annotations
 
 import json
 import os
 import pickle
+import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,12 +27,46 @@ import torch
 from rlacd.learn.encoders import PublishedEncoder
 from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, Sizes, seen_below
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
+from rlacd.learn.options import TrainOptions
+from rlacd.learn.q_network import QNetwork, load_policy
+from rlacd.learn.train import train
+from rlacd.policies.plane_features import PLANES
 from rlacd.solid.component import Component
-from tests.encoding import TINY, clouds, tiny_encoder
 from tests.learning import small_solids, write_meshes
 from tests.scripts import script
+from tests.test_learn_train import TINY as TINY_RUN
+from tests.test_learn_train import weights as whole_state
 
 pytestmark = pytest.mark.slow
+
+
+TINY = Sizes((32, 16, 8), (8, 4, 4), (12, 24, 48), depth=1, heads=2, embedding=16)
+
+
+def clouds(count: int, points: int = 128, seed: int = 0) -> torch.Tensor:
+    """Clouds [count, points, 3] in the unit ball, each of another shape."""
+    rng = np.random.default_rng(seed)
+    found = rng.standard_normal((count, points, 3)) * rng.uniform(0.2, 1, (count, 1, 3))
+    found /= np.linalg.norm(found, axis=2).max(axis=1)[:, None, None]
+    return torch.from_numpy(found.astype(np.float32))
+
+
+def tiny_encoder(seed: int = 0) -> I2PMAEEncoder:
+    """An encoder of the least size whose batch norms are no identities."""
+    torch.manual_seed(seed)
+    encoder = I2PMAEEncoder(TINY)
+    for name, value in encoder.state_dict().items():
+        if name.endswith("running_var"):
+            value.uniform_(0.5, 1.5)
+        elif name.endswith("running_mean"):
+            value.normal_(0, 0.1)
+    return encoder
+
+
+def write_tiny_weights(path: Path, seed: int = 0) -> Path:
+    """Its weights as a file."""
+    torch.save(tiny_encoder(seed).state_dict(), path)
+    return path
 
 
 @pytest.fixture(scope="session")
@@ -76,7 +113,6 @@ def test_names_and_shapes_are_the_published_ones(stand_in: dict[str, torch.Tenso
     assert not any(p.requires_grad for p in official.parameters())
 
 
-@pytest.mark.slow
 def test_features_are_those_of_the_official_code(
     official: I2PMAEEncoder, features: tuple[torch.Tensor, np.ndarray]
 ) -> None:
@@ -128,18 +164,6 @@ def test_groups_without_members_are_not_seen() -> None:
             visible = {m for group in visible for m in scales[level].members[cloud, group].tolist()}
 
 
-def test_a_group_without_members_changes_nothing() -> None:
-    """A point that no group has among its nearest may move."""
-    encoder = tiny_encoder()
-    points = clouds(1, 400)
-    scales = encoder.h_encoder.pyramid(points)
-    used = set(scales[0].members.flatten().tolist())
-    unused = sorted(set(range(400)) - used)
-    moved = points.clone()
-    moved[0, unused[0]] += 1e-4
-    assert torch.equal(encoder.features(points), encoder.features(moved))
-
-
 # As an encoder of components
 
 
@@ -154,49 +178,40 @@ def test_features_ignore_size_and_place_and_are_the_same_each_time() -> None:
     assert np.array_equal(encoder.describe(Component(solid)), one)
 
 
-def test_too_few_points_are_reported() -> None:
-    with pytest.raises(OptionError, match="16 points; this encoder needs at least 32"):
-        tiny_encoder().features(clouds(1, 16))
-
-
 # Files
 
 
-def test_the_first_missing_parameter_is_named(tmp_path: Path) -> None:
-    state = dict(I2PMAEEncoder(Sizes()).state_dict())
-    names = list(state)
-    for name in names[40:43]:
-        del state[name]
-    with pytest.raises(WeightsError, match=f"{names[40]} is missing"):
-        I2PMAEEncoder.from_checkpoint(published(state, tmp_path / "less.pth"))
-    with pytest.raises(WeightsError, match=f"{names[0]} is missing"):
-        I2PMAEEncoder.from_checkpoint(published({}, tmp_path / "none.pth"))
+def test_parameters_that_are_missing_of_another_size_or_not_finite_are_named(tmp_path: Path) -> None:
+    full = dict(I2PMAEEncoder(Sizes()).state_dict())
+    names = list(full)
+    nan = {**full, names[40]: full[names[40]] + torch.nan}
+    for state, says in (
+        ({name: full[name] for name in names[:40] + names[43:]}, f"{names[40]} is missing"),
+        ({}, f"{names[0]} is missing"),
+        (dict(tiny_encoder().state_dict()), r"first_conv\.0\.weight has shape \[8, 3, 1\], not \[128, 3, 1\]"),
+        (nan, f"{names[40]} holds values that are not finite"),
+    ):
+        with pytest.raises(WeightsError, match=says):
+            I2PMAEEncoder.from_checkpoint(published(state, tmp_path / "weights.pth"))
 
 
-def test_weights_of_another_size_or_not_finite_are_reported(tmp_path: Path) -> None:
-    with pytest.raises(WeightsError, match=r"first_conv\.0\.weight has shape \[8, 3, 1\], not \[128, 3, 1\]"):
-        I2PMAEEncoder.from_checkpoint(published(dict(tiny_encoder().state_dict()), tmp_path / "other.pth"))
-    state = {k: v.clone() for k, v in I2PMAEEncoder(Sizes()).state_dict().items()}
-    state["h_encoder.encoder_norms.2.bias"][3] = torch.nan
-    with pytest.raises(WeightsError, match=r"encoder_norms\.2\.bias holds values that are not finite"):
-        I2PMAEEncoder.from_checkpoint(published(state, tmp_path / "nan.pth"))
-
-
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
-def test_files_cut_short_are_one_error_that_names_the_first_parameter(tmp_path: Path, share: float) -> None:
-    path = published(dict(tiny_encoder().state_dict()), tmp_path / "weights.pth")
-    whole = path.read_bytes()
-    path.write_bytes(whole[: int(share * len(whole))])
-    with pytest.raises(WeightsError, match=r"h_encoder\.token_embed\.0\.first_conv\.0\.weight"):
-        I2PMAEEncoder.from_checkpoint(path)
+FIRST = r"h_encoder\.token_embed\.0\.first_conv\.0\.weight"
+UNUSABLE: list[tuple[Callable[[bytes], bytes], str]] = [
+    *((lambda whole, share=share: whole[: int(share * len(whole))], FIRST) for share in (0.0, 0.001, 0.5, 0.999)),
+    *((lambda _, content=content: content, "not a file of weights") for content in (b"hello", b"\x80\x04N.")),
+    (lambda _: pickle.dumps([1, 2]), "not a file of weights"),
+    (lambda _: b"PK\x05\x06" + 18 * b"\0", "not a file of weights"),
+]
 
 
 @pytest.mark.filterwarnings("ignore:Detected pickle protocol")
-@pytest.mark.parametrize("content", [b"hello", b"\x80\x04N.", pickle.dumps([1, 2]), b"PK\x05\x06" + 18 * b"\0"])
-def test_files_of_something_else_are_reported(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "weights.pth"
-    path.write_bytes(content)
-    with pytest.raises(WeightsError, match="not a file of weights"):
+@pytest.mark.parametrize(("change", "says"), UNUSABLE)
+def test_files_cut_short_and_those_of_something_else_are_one_error(
+    tmp_path: Path, change: Callable[[bytes], bytes], says: str
+) -> None:
+    path = published(dict(tiny_encoder().state_dict()), tmp_path / "weights.pth")
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(WeightsError, match=says):
         I2PMAEEncoder.from_checkpoint(path)
     with pytest.raises(WeightsError, match="there is no file"):
         I2PMAEEncoder.from_checkpoint(tmp_path / "nowhere.pth")
@@ -221,8 +236,7 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
     assert not (tmp_path / "ran").exists()
 
 
-def test_without_weights_the_error_says_where_to_get_them(tmp_path: Path) -> None:
-    meshes = write_meshes(tmp_path / "meshes")
+def test_without_weights_the_error_says_where_to_get_them(meshes: Path, tmp_path: Path) -> None:
     for asked in (["--encoder", "i2p-mae", "--validation", "2"], ["--preset", "paper", "--validation", "2"]):
         shown = CliRunner().invoke(app, ["train", str(meshes), "--run", str(tmp_path / "run"), *asked])
         assert shown.exit_code == 2
@@ -230,3 +244,68 @@ def test_without_weights_the_error_says_where_to_get_them(tmp_path: Path) -> Non
             assert word in shown.output
         assert "Traceback" not in shown.output
         assert not (tmp_path / "run" / "checkpoint.npz").exists()
+
+
+# Training: from a file of weights to a policy
+
+
+SHORT: dict[str, Any] = {
+    **TINY_RUN,
+    "encoder": "i2p-mae",
+    "iterations": 60,
+    "warmup": 20,
+    "points": 64,
+    "validate_every": 30,
+}
+
+
+@pytest.fixture
+def meshes(tmp_path: Path) -> Path:
+    return write_meshes(tmp_path / "meshes")
+
+
+@pytest.fixture
+def weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr("rlacd.learn.encoders.i2p_mae.Sizes", lambda: TINY)
+    return write_tiny_weights(tmp_path / "tiny.pth")
+
+
+def run(meshes: Path, folder: Path, weights: Path, resume: bool = False, **changes: Any) -> Path:
+    options = TrainOptions(**{**SHORT, "encoder_weights": str(weights), **changes})
+    return train(meshes, folder, options, resume=resume, say=lambda line: None)
+
+
+def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "whole", weights)
+    run(meshes, tmp_path / "halves", weights, iterations=34)
+    elsewhere = shutil.copy(weights, tmp_path / "the_same.pth")
+    run(meshes, tmp_path / "halves", elsewhere, resume=True)
+    assert whole_state(tmp_path / "whole") == whole_state(tmp_path / "halves")
+    assert load_policy(tmp_path / "halves").choose(Component(small_solids()["angle"])) is not None
+
+
+def test_other_weights_do_not_go_on_with_a_run(meshes: Path, weights: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "run", weights, iterations=30, validation=0)
+    other = write_tiny_weights(tmp_path / "other.pth", seed=1)
+    with pytest.raises(OptionError, match=r"other\.pth holds other weights than the run began with"):
+        run(meshes, tmp_path / "run", other, resume=True, validation=0)
+
+
+def test_too_few_points_and_unusable_files_are_reported_before_a_run_begins(
+    meshes: Path, weights: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(OptionError, match="16 points; this encoder needs at least 32"):
+        run(meshes, tmp_path / "run", weights, points=16)
+    weights.write_bytes(weights.read_bytes()[:500])
+    with pytest.raises(WeightsError, match="damaged"):
+        run(meshes, tmp_path / "run", weights)
+    assert not (tmp_path / "run" / "checkpoint.npz").exists()
+
+
+def test_the_paper_preset_sees_what_the_paper_sees() -> None:
+    paper = TrainOptions.preset("paper")
+    assert (paper.encoder, paper.points) == ("i2p-mae", 2048)
+    network = QNetwork(I2PMAEEncoder().dim, PLANES)
+    widths = [layer.out_features for layer in network.layers if isinstance(layer, torch.nn.Linear)]
+    assert widths == [1024, 512, 256, 128, 150]
+    assert network.layers[0].in_features == 384 + 384

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 from manifold3d import Manifold
 
 pytest.importorskip("torch", reason="needs the extra train")
@@ -17,8 +15,6 @@ pytest.importorskip("torch", reason="needs the extra train")
 from benchmarks.tabular import Node, all_nodes, grow, middle_planes, process_of, q_learning
 
 from rlacd.criteria import Concavity
-from rlacd.errors import RlacdError
-from rlacd.io.read.load import load_mesh
 from rlacd.learn.encoders import make_encoder
 from rlacd.learn.episodes import Player
 from rlacd.learn.meshes import Solids
@@ -29,10 +25,9 @@ from rlacd.learn.replay import Children, Replay
 from rlacd.learn.train import train
 from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy
-from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from tests.learning import small_solids
-from tests.shapes import box, from_manifold
+from tests.shapes import box, trimesh_of
 
 CRITERION = Concavity(0.02)
 
@@ -41,18 +36,6 @@ CRITERION = Concavity(0.02)
 def roots() -> list[Node]:
     solids = [Component(solid) for name, solid in small_solids().items() if name in ("angle", "table", "cross")]
     return [node for solid in solids for node in grow(solid, CRITERION, middle_planes(), depth=3)]
-
-
-@pytest.fixture(scope="module")
-def real_roots(corpus: Path) -> list[Node]:
-    found: list[Node] = []
-    names = sorted(p for p in (corpus / "train").rglob("*.ply") if p.stat().st_size < 8_000)
-    for path in names[:: len(names) // 12]:
-        try:
-            found += grow(Component(repair(load_mesh(path)).manifold), CRITERION, middle_planes(), depth=3)
-        except (RlacdError, ValueError):  # flat
-            continue
-    return [node for node in found if node.outcomes]
 
 
 def best(node: Node, finish_reward: float) -> float:
@@ -68,13 +51,6 @@ def best(node: Node, finish_reward: float) -> float:
     )
 
 
-def most_saved(node: Node) -> float:
-    """The most hull volume that any way through the tree saves, in the solid's own unit: no discounts at all."""
-    return max(
-        (o.saved * node.hull_volume + sum(most_saved(c) for c in o.children) for o in node.outcomes), default=0.0
-    )
-
-
 def root_values(roots: list[Node], finish_reward: float) -> list[float]:
     process = process_of(roots, alike=False, finish_reward=finish_reward)
     exact = process.solve()
@@ -84,14 +60,21 @@ def root_values(roots: list[Node], finish_reward: float) -> list[float]:
     return [float(values[order.index(root)]) for root in roots]
 
 
+def volume_worth(node: Node, unit: float) -> float:
+    """Value of a component where only volume is rewarded, by eq. 7 and 8."""
+    return max(
+        (
+            o.saved * node.hull_volume / unit
+            + sum(d * volume_worth(c, unit) for c, d in zip(o.children, o.discounts, strict=True))
+            for o in node.outcomes
+        ),
+        default=0.0,
+    )
+
+
 @pytest.mark.parametrize("finish_reward", [0.0, 1.0])
 def test_dynamic_programming_agrees_with_recursion_over_the_tree(roots: list[Node], finish_reward: float) -> None:
     assert root_values(roots, finish_reward) == pytest.approx([best(root, finish_reward) for root in roots])
-
-
-def test_shares_of_the_hull_make_the_return_the_volume_saved(roots: list[Node]) -> None:
-    expected = [most_saved(root) / root.hull_volume for root in roots]
-    assert root_values(roots, 0.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("static_discount", [None, 0.99])
@@ -102,33 +85,6 @@ def test_q_learning_converges_to_dynamic_programming_on_trees(roots: list[Node],
     # Every sample is certain, so steps of size 1 are allowed and the answer is exact.
     learned = q_learning(process, 60 * len(process.pair), np.random.default_rng(0), rate=0.0)[-1]
     assert learned[process.possible] == pytest.approx(exact[process.possible], abs=1e-12)
-
-
-def error(process: object, exact: np.ndarray, q: np.ndarray) -> float:
-    return float(np.abs(q - exact)[process.possible].max())  # type: ignore[attr-defined]
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("static_discount", [None, 0.4])
-def test_with_loops_q_learning_converges_where_discounts_add_up_to_less_than_one(
-    real_roots: list[Node], static_discount: float | None
-) -> None:
-    process = process_of(real_roots, alike=True, static_discount=static_discount)
-    exact = process.solve()
-    assert exact is not None
-    history = q_learning(process, 300_000, np.random.default_rng(0), every=1000)
-    assert error(process, exact, history[-1]) < 0.05 * np.abs(exact).max()
-    assert error(process, exact, history[-1]) < 0.2 * error(process, exact, history[1])
-
-
-@pytest.mark.nightly
-def test_with_loops_q_learning_diverges_where_discounts_add_up_to_more_than_one(real_roots: list[Node]) -> None:
-    process = process_of(real_roots, alike=True, static_discount=0.9)
-    assert process.solve() is None
-    sizes = [np.abs(q).max() for q in q_learning(process, 100_000, np.random.default_rng(0), every=10_000)]
-    bound = 2 / (1 - 0.9)  # of any return, were there but one side
-    assert sizes[-1] > 100 * bound
-    assert all(later > earlier for earlier, later in itertools.pairwise(sizes))
 
 
 TWO = middle_planes((0, 2))
@@ -151,8 +107,7 @@ def two_planes(monkeypatch: pytest.MonkeyPatch) -> None:
 def saved(folder: Path, name: str, solid: Manifold) -> Component:
     """Write a solid to a folder and read it as training does."""
     folder.mkdir(exist_ok=True)
-    mesh = from_manifold(solid)
-    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / name)
+    trimesh_of(solid).export(folder / name)
     read = Solids(folder, folder / "solids").get(name)
     assert read is not None
     return read
@@ -165,43 +120,8 @@ def u_shape(tmp_path: Path, two_planes: None) -> Component:
     return saved(tmp_path / "meshes", "u.ply", solid)
 
 
-def cuts_of(node: Node, value: Any) -> int:
-    """Number of cuts if every component is cut by the plane of greatest value."""
-    if not node.outcomes:
-        return 0
-    return 1 + sum(cuts_of(child, value) for child in max(node.outcomes, key=value).children)
-
-
 def fewest(node: Node) -> int:
     return min((1 + sum(fewest(child) for child in o.children) for o in node.outcomes), default=0)
-
-
-def paid(outcome: Any) -> float:
-    """Value of a plane by eq. 8, with both rewards."""
-    below = zip(outcome.children, outcome.discounts, strict=True)
-    return float(outcome.saved + outcome.finished + sum(d * best(child, 1.0) for child, d in below))
-
-
-def test_the_papers_rewards_ask_for_more_cuts_than_are_needed(u_shape: Component) -> None:
-    [root] = grow(u_shape, LIMIT, TWO, depth=8)
-    assert len(all_nodes([root])) == 31
-    assert fewest(root) == 3
-    assert cuts_of(root, lambda o: -sum(1 + fewest(child) for child in o.children)) == 3
-    assert cuts_of(root, paid) == 4
-    assert cuts_of(root, lambda o: o.saved) == 5  # greedy
-    assert best(root, 1.0) == pytest.approx(1.0319, abs=1e-4)
-
-
-def volume_worth(node: Node, unit: float) -> float:
-    """Value of a component by eq. 7 and 8, where only volume is rewarded, relative to the whole solid's hull."""
-    return max(
-        (
-            o.saved * node.hull_volume / unit
-            + sum(d * volume_worth(c, unit) for c, d in zip(o.children, o.discounts, strict=True))
-            for o in node.outcomes
-        ),
-        default=0.0,
-    )
 
 
 @pytest.mark.nightly

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -26,7 +25,7 @@ from rlacd.learn.options import PRESETS, TrainOptions
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 from rlacd.pool.local import InProcessPool, LocalPool
 from tests.learning import write_meshes
-from tests.pool.processes import pool_processes
+from tests.pool.obedient import pool_processes
 
 TINY: dict[str, Any] = {
     "iterations": 120,
@@ -158,17 +157,8 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     run(meshes, whole, iterations=400)
     given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "jobs": 2}.items()]
-    command = [
-        sys.executable,
-        "-c",
-        "from rlacd.cli.main import main; main()",
-        "train",
-        str(meshes),
-        "--run",
-        str(killed),
-    ]
-    command += ["--preset", "paper", "--encoder", "sweep"]  # the defaults of TrainOptions
-    process = subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL)
+    words = ["train", str(meshes), "--run", str(killed), "--preset", "paper", "--encoder", "sweep"]  # the defaults
+    process = subprocess.Popen([sys.executable, "-m", "rlacd", *words, *given], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while not (killed / "policy.npz").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -179,17 +169,7 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("jobs", [1, 3])
-def test_where_episodes_are_played_changes_nothing(meshes: Path, tmp_path: Path, jobs: int) -> None:
-    changes = {"environments": 4}
-    run(meshes, tmp_path / "alone", **changes)
-    with LocalPool(jobs) as pool:
-        run(meshes, tmp_path / "spread", pool=pool, **changes)
-    assert_same_run(tmp_path / "alone", tmp_path / "spread")
-
-
-@pytest.mark.nightly
-def test_a_worker_that_is_killed_changes_nothing(meshes: Path, tmp_path: Path) -> None:
+def test_where_episodes_are_played_and_a_worker_that_is_killed_change_nothing(meshes: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "alone")
     killed: list[psutil.Process] = []
 
@@ -288,26 +268,3 @@ def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Pat
         run(tmp_path / "empty", tmp_path / "other")
     with pytest.raises(TrainingError, match="there is no folder"):
         run(tmp_path / "nowhere", tmp_path / "another")
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    "name",
-    [
-        "kenney_cc0/castle_kit__flagBlue",
-        "kaykit_cc0/dungeon__candle_thin",
-        "quaternius_cc0/rpg_items_pack__Heart_Half",
-        "quaternius_cc0/platformer_game_pack__Heart_Outline",
-        "kenney_cc0/space_kit__robot",
-    ],
-)
-def test_alone_with_a_mesh_a_networks_own_planes_leave_no_more_parts_than_greedys(
-    corpus: Path, name: str, tmp_path: Path
-) -> None:
-    (tmp_path / "meshes").mkdir()
-    shutil.copy(corpus / "train" / f"{name}.ply", tmp_path / "meshes")
-    said: list[str] = []
-    run(tmp_path / "meshes", tmp_path / "run", say=said.append, **vars(TrainOptions.preset("one-mesh")))
-    points = [point for point in curves(tmp_path / "run") if "validation_own_plane" in point]
-    assert min(point["validation_own_plane"] for point in points) <= 1 < points[0]["validation_random"]
-    assert "Use it:" in said[-1]

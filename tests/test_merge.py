@@ -1,24 +1,43 @@
-"""Merging: what may be united is, what may not stays, judged on the glued union."""
+"""Merging: what may be united is, also across what lies between, and what may not stays; bars that cross; slivers."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from manifold3d import Manifold, OpType
+from manifold3d import CrossSection, Manifold, Mesh64, OpType
 
+import rlacd
 from rlacd import _native
 from rlacd.criteria import Concavity
+from rlacd.criteria.criterion import Feasibility
+from rlacd.criteria.navigable import Navigable
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import grow_cover, merge_parts
+from rlacd.merge.merge import united_in_turn
+from rlacd.merge.slivers import SLIVER_LOSS, drop_slivers, is_film, is_sliver
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
-from rlacd.run import Run
-from rlacd.solid.component import Component, Part, Plane
-from tests.shapes import bent_bar, box, dense, from_manifold, own_volume, to_manifold, together
-from tests.test_redistribute import depth_outside
+from rlacd.run import Run, Work
+from rlacd.solid.component import ClippedPart, Component, Part, Plane, reunite
+from rlacd.solid.hull import Hull
+from rlacd.solid.primitive import Balls
+from tests.shapes import (
+    bent_bar,
+    block,
+    box,
+    dense,
+    depth_outside,
+    from_manifold,
+    own_volume,
+    strangers,
+    to_manifold,
+    together,
+)
 from tests.test_sweep import SOLIDS
 
 
@@ -48,31 +67,31 @@ def test_a_shattered_box_becomes_one_part(run) -> None:
     assert whole.hull.volume == pytest.approx(2)
 
 
-def test_parts_of_an_l_never_become_one(run) -> None:
-    shape = Manifold.cube((2, 1, 1)) + Manifold.cube((1, 2, 1))
-    parts = pieces_of(shape, along((0, 1, 0), 1.0), along((1, 0, 0), 0.5), along((0, 0, 1), 0.3))
-    assert len(merge_parts(parts, Concavity(0.05), run)) >= 2
+def sheets(gap: float) -> list[Component]:
+    return [Component(Manifold.cube((1, 1, 0.01)).translate((0, 0, i * (0.01 + gap)))) for i in range(2)]
 
 
-def test_the_inner_surface_of_a_tube_forbids_uniting_its_halves(run) -> None:
-    """Joint R_v is small for a thin bore, but its wall lies deep inside the joint hull: both ways have to be tested."""
-    tube = Manifold.cube((1, 1, 1), True) - Manifold.cylinder(2, 0.06, 0.06, 24, True)
-    parts = pieces_of(tube, along((1, 0, 0), 0.0))
-    assert len(merge_parts(parts, Concavity(0.05), run)) >= 2
+APART: dict[str, Callable[[], list[Component]]] = {
+    "an L": lambda: pieces_of(
+        Manifold.cube((2, 1, 1)) + Manifold.cube((1, 2, 1)), *(along(normal, 0.5) for normal in np.eye(3).tolist())
+    ),
+    # Joint R_v is small for a thin bore, but its wall lies deep inside the joint hull: both ways have to be tested.
+    "a tube": lambda: pieces_of(
+        Manifold.cube((1, 1, 1), True) - Manifold.cylinder(2, 0.06, 0.06, 24, True), along((1, 0, 0), 0.0)
+    ),
+    # The walls of the crack are surface of the union, and lie half a unit inside its hull.
+    "a deep crack": lambda: [Component(Manifold.cube((1, 1, 1)).translate((i * 1.001, 0, 0))) for i in range(2)],
+    "a gap deeper than the threshold": lambda: sheets(0.2),
+}
+
+
+@pytest.mark.parametrize("name", APART)
+def test_parts_stay_apart_where_their_joint_hull_is_not_tight(run, name: str) -> None:
+    assert len(merge_parts(APART[name](), Concavity(0.05), run)) >= 2
 
 
 def test_parts_apart_unite_where_the_gap_is_no_deeper_than_the_threshold(run) -> None:
-    def sheets(gap: float) -> list[Component]:
-        return [Component(Manifold.cube((1, 1, 0.01)).translate((0, 0, i * (0.01 + gap)))) for i in range(2)]
-
     assert len(merge_parts(sheets(0.015), Concavity(0.05), run)) == 1
-    assert len(merge_parts(sheets(0.2), Concavity(0.05), run)) == 2
-
-
-def test_a_deep_crack_keeps_parts_apart(run) -> None:
-    """The walls of the crack are surface of the union, and lie half a unit inside its hull."""
-    blocks = [Component(Manifold.cube((1, 1, 1)).translate((i * 1.001, 0, 0))) for i in range(2)]
-    assert len(merge_parts(blocks, Concavity(0.05), run)) == 2
 
 
 def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
@@ -83,29 +102,6 @@ def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
     assert len(merged) < len(parts)
     assert all(criterion.is_met(part) for part in merged)
     assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
-
-
-@pytest.mark.parametrize("across", [False, True])
-def test_pairs_of_nearby_boxes(across: bool) -> None:
-    random = np.random.default_rng(0)
-    for count in (1, 2, 30):
-        lower = random.uniform(0, 4, (count, 3))
-        parts = {7 * i: Component(box(tuple(at), tuple(at + random.uniform(0.1, 1, 3)))) for i, at in enumerate(lower)}
-        corners = {i: part.box for i, part in parts.items()}
-
-        def near(i: int, j: int, corners=corners) -> bool:
-            gap = np.maximum(np.maximum(corners[i][0] - corners[j][1], corners[j][0] - corners[i][1]), 0)
-            return bool(np.linalg.norm(gap) <= 0.2)
-
-        new = [7 * i for i in range(0, count, 3)]
-        expected = {
-            (min(i, j), max(i, j))
-            for i in new
-            for j in parts
-            if i != j and (near(i, j) or (across and any(near(i, k) and near(k, j) for k in parts)))
-        }
-        boxes = _native.Boxes([part.hull.corners for part in parts.values()], list(parts))
-        assert boxes.pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]
 
 
 @pytest.mark.parametrize("name", SOLIDS)
@@ -138,6 +134,39 @@ def test_parts_that_are_all_film_keep_their_surfaces() -> None:
     above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
     glued = Part.glued(below, above)
     assert len(glued.faces) == len(below.faces) + len(above.faces)
+
+
+# --- slivers ----------------------------------------------------------------------------------------------------------
+
+
+def slab(height: float, z: float = 0.0) -> Component:
+    return Component(Manifold.cube((1, 1, height)).translate((0, 0, z)))
+
+
+def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
+    assert is_sliver(slab(0.01).hull)
+    assert not is_sliver(slab(0.03).hull)
+    assert not is_sliver(Component(Manifold.sphere(1, 32)).hull)
+    assert is_film(slab(1e-4))
+    assert not is_film(slab(2e-3))
+
+
+def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
+    solid, shaving, sheet = slab(1), slab(0.001, 1), slab(0.001, 3)
+    with Run(1) as run:
+        assert drop_slivers([solid, shaving, sheet], run) == [solid, sheet]
+        assert drop_slivers([solid, shaving], run, suspects=[solid]) == [solid, shaving]
+        assert drop_slivers([sheet], run) == [sheet]
+
+
+def test_of_a_stack_of_slivers_enough_stay_for_all_of_them() -> None:
+    stack = [slab(0.001 + 1e-6 * i, 0.0015 * i) for i in range(30)]
+    with Run(1) as run:
+        kept = drop_slivers(stack, run)
+    assert len(kept) < len(stack)
+    tops = np.array([part.vertices[:, 2].max() for part in kept])
+    for part in stack:
+        assert np.abs(tops - part.vertices[:, 2].max()).min() <= SLIVER_LOSS + 0.0015
 
 
 # --- growing ----------------------------------------------------------------------------------------------------------
@@ -208,3 +237,156 @@ def test_without_enough_work_the_merged_parts_stay(units: int) -> None:
         with run.limited(units):
             assert grow_cover(parts, CRITERION, run, solid) is parts
         assert run.stopped_by is None
+
+
+TIGHT = Concavity(0.02)
+
+
+CROSS = block(2, 0.3, 0.3) + block(0.3, 2, 0.3)
+
+
+def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
+    """The solid, and what lies left of x = -0.15, right of x = 0.15 and between."""
+    root = Component(solid)
+    left, rest = root.cut(Plane((1.0, 0.0, 0.0), -0.15))
+    middle, right = rest.cut(Plane((1.0, 0.0, 0.0), 0.15))
+    return root, [left, middle, right]
+
+
+def test_a_beam_is_one_part_although_another_crosses_it(run: Run) -> None:
+    root, parts = arms_and_beam(CROSS)
+    assert len(merge_parts(parts, TIGHT, run)) == 3
+    merged = merge_parts(parts, TIGHT, run, solid=root)
+    assert sorted(part.hull.volume for part in merged) == pytest.approx([2 * 0.09, 2 * 0.09])
+    assert all(part.volume == pytest.approx(2 * 0.09) for part in merged)  # the crossing belongs to both
+    (beam,) = (part for part in merged if isinstance(part, ClippedPart))
+    assert set(beam.members) == {parts[0], parts[2]}
+    assert TIGHT.error(beam) < 1e-3
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        block(2, 0.3, 0.3) - block(0.3, 0.3, 0.2) + block(0.3, 2, 0.1, (0, 0, -0.1)),  # air between
+        CROSS - block(0.2, 0.2, 2),  # a bore through the crossing
+        CROSS - block(0.2, 0.2, 0.2),  # a bubble inside it
+        block(0.85, 0.3, 0.3, (-0.575, 0, 0)) + block(0.85, 0.3, 0.3, (0.575, 0, 0.25)) + block(0.3, 2, 1),  # beside
+    ],
+)
+def test_arms_stay_apart_where_something_is_missing_between(run: Run, solid: Manifold) -> None:
+    root, parts = arms_and_beam(solid)
+    merged = merge_parts(parts, TIGHT, run, solid=root)
+    assert not any({parts[0], parts[2]} <= set(part.members) for part in merged)
+
+
+def test_hulls_of_crossing_beams_cover_them_and_no_more() -> None:
+    bars = [block(2, 0.2, 0.2, (0, y, 0)) for y in (-0.5, 0.5)] + [block(0.2, 2, 0.2, (x, 0, 0)) for x in (-0.5, 0.5)]
+    window = Manifold.batch_boolean(bars, OpType.Add)
+    mesh = window.to_mesh64()
+    found = rlacd.decompose((mesh.vert_properties[:, :3], mesh.tri_verts), threshold=0.02, quality="fast", threads=1)
+    assert len(found) == 4
+    hulls = [Manifold(Mesh64(np.array(h.vertices), np.array(h.faces, dtype=np.uint64))) for h in found]
+    assert (window - Manifold.batch_boolean(hulls, OpType.Add)).volume() == pytest.approx(0, abs=1e-9)
+    assert all((hull - window).volume() == pytest.approx(0, abs=1e-9) for hull in hulls)
+    assert found.report["concavity"]["max"] < 1e-3
+
+
+def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:
+    """Gluing would count what two of them have in common twice."""
+    root, parts = arms_and_beam(CROSS)
+    merged = merge_parts(parts, TIGHT, run, solid=root)
+    *_, ((whole,), _) = united_in_turn(merged, Part.glued, TIGHT, Work(), run)
+    assert isinstance(whole, ClippedPart)
+    assert whole.volume == pytest.approx(CROSS.volume())
+    united = reunite(strangers(whole.members))
+    assert united.volume == pytest.approx(CROSS.volume())
+
+
+def heap_of_blocks(random: np.random.Generator) -> tuple[Component, list[Manifold]]:
+    """The union of four blocks that may overlap, and the blocks."""
+    sizes, places = random.uniform(0.1, 1, (4, 3)), random.uniform(-0.4, 0.4, (4, 3))
+    blocks = [block(*s, tuple(p)) for s, p in zip(sizes, places, strict=True)]
+    return Component(Manifold.batch_boolean(blocks, OpType.Add)), blocks
+
+
+def share_fits(solid: Component, hull: Hull, threshold: float) -> bool | None:
+    """Whether what the solid fills of a hull meets the strict test; None where it is empty."""
+    share = to_manifold(solid.vertices, solid.faces) ^ Manifold(Mesh64(hull.vertices + 0, hull.faces.astype(np.uint64)))
+    mesh = share.to_mesh64()
+    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3])
+    if len(vertices) == 0:
+        return None
+    return _native.meets_concavity(
+        vertices, mesh.tri_verts.astype(np.int32), hull.vertices, hull.faces, share.volume(), hull.volume, threshold
+    )
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.floats(0.01, 0.5))
+def test_a_quick_no_about_a_hull_or_a_pair_is_never_wrong(seed: int, threshold: float) -> None:
+    """Held against the strict test of the share itself, for joint hulls of random blocks that the solid fills.
+
+    Nor does anything get lost by leaving out the facets of the two hulls.
+    """
+    random = np.random.default_rng(seed)
+    solid, blocks = heap_of_blocks(random)
+    hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
+    pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
+    screen = Concavity(threshold).screen
+    _, feasibilities = screen.feasibilities(solid.filling, [hull.corners for hull in hulls], pairs, 1)
+    for (i, j), feasibility in zip(pairs, feasibilities, strict=True):
+        joint = Hull.around(hulls[i], hulls[j])
+        alone = screen.feasibility(solid.filling, joint)
+        assert (feasibility == Feasibility.MAYBE) <= (alone is Feasibility.MAYBE)
+        assert (feasibility == Feasibility.NEVER) <= (alone is Feasibility.NEVER)
+        assert not (share_fits(solid, joint, threshold) and Feasibility.MAYBE not in (feasibility, alone))
+        assert screen.forbids(solid.filling, joint) == (alone is Feasibility.NEVER)
+        if alone is Feasibility.NEVER:
+            larger = Hull.of(np.concatenate([joint.vertices, random.uniform(-1, 1, (3, 3))]))
+            tighter = Concavity(threshold * (1 - 1e-9)).screen
+            assert tighter.feasibility(solid.filling, larger) is Feasibility.NEVER
+
+
+def test_time_may_run_out_before_pairs_are_looked_at() -> None:
+    root, parts = arms_and_beam(CROSS)
+    late = Run(1, timeout=-1.0)
+    assert len(merge_parts(parts, TIGHT, late, solid=root)) == len(parts)
+    assert late.stopped_by == "timeout"
+
+
+def grooved() -> Manifold:
+    """A groove from end to end: its corners lie on the hull, its bottom deep inside; the hull is nowhere far away."""
+    groove = CrossSection([[(-0.04, 0.0), (0.0, -0.3), (0.04, 0.0)]])
+    return block(1, 1, 1, (0, -0.5, 0)) - Manifold.extrude(groove, 1).translate((0, 0, -0.5))
+
+
+@pytest.mark.parametrize(
+    ("solid", "too_deep", "deep_enough"),
+    [
+        (grooved, (0.05, 0.1, 0.29), 0.31),
+        (lambda: block(4, 4, 0.3) - block(0.3, 0.3, 1, (0.83, -1.41, 0)), (0.1,), 0.2),
+    ],
+    ids=["a face deep in a hull without its corners", "a window between the points first looked at"],
+)
+def test_what_is_deep_in_a_hull_is_seen(
+    solid: Callable[[], Manifold], too_deep: tuple[float, ...], deep_enough: float
+) -> None:
+    whole = Component(solid())
+    for threshold in too_deep:
+        assert Concavity(threshold).screen.feasibility(whole.filling, whole.hull) is Feasibility.NEVER
+    assert Concavity(deep_enough).screen.feasibility(whole.filling, whole.hull) is Feasibility.MAYBE
+
+
+def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:
+    """Volumes of its pieces count twice what overlaps; that is no loss."""
+    folded = Manifold.compose([block(2, 0.5, 0.5), block(0.5, 2, 0.02, (0.3, 0, 0))])
+    pieces = [Component(piece) for piece in folded.split_by_plane((1, 0.2, 0.1), 0.1)]
+    united = reunite(pieces)
+    assert united.volume == pytest.approx((block(2, 0.5, 0.5) + block(0.5, 2, 0.02, (0.3, 0, 0))).volume(), rel=1e-6)
+
+
+def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
+    component = Component(CROSS)
+    space = Navigable(0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
+    assert space.screen.feasibility(component.filling, component.hull) is Feasibility.NEVER
+    assert not space.screen.forbids(component.filling, component.hull)

@@ -96,12 +96,6 @@ def test_a_missing_simulator_is_named_before_any_work(tmp_path: Path, monkeypatc
     assert not (tmp_path / "run").exists()
 
 
-def test_the_mug_is_one_closed_body_with_one_handle() -> None:
-    mug = script(ROOT / "examples" / "mug.py").mug()
-    assert mug.is_watertight
-    assert (mug.body_count, mug.euler_number) == (1, 0), "a cup with a handle is a torus to a topologist"
-
-
 @pytest.mark.nightly
 def test_the_mug_hangs_by_its_handle_and_its_one_hull_falls(tmp_path: Path) -> None:
     hulls, one = script(ROOT / "examples" / "mug.py").main(tmp_path, threads=1)

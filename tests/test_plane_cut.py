@@ -1,4 +1,4 @@
-"""Cutting by a plane: both sides closed, nothing lost, no triangles piling up, whatever touches the plane."""
+"""Cutting by a plane and clipping to a hull: closed, nothing lost, no triangles piling up, whatever touches it."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from manifold3d import CrossSection, Manifold, OpType
+from manifold3d import CrossSection, Manifold, Mesh64, OpType
 
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
-from tests.shapes import block, is_closed
+from tests.hulls import hull_of
+from tests.shapes import block, component_of, is_closed
 
 LAST_BITS = 1e-12
 
@@ -134,6 +135,35 @@ def test_an_inner_shell_that_is_cut_becomes_a_dent() -> None:
     assert [piece.volume for piece in whole.pieces()] == pytest.approx([6.0])
 
 
+def test_cavities_stay_in_the_piece_around_them() -> None:
+    hollow = Manifold.sphere(1, 32) - Manifold.sphere(0.5, 32)
+    solid = Component(hollow + Manifold.cube((1, 1, 1)).translate((2, 0, 0)))
+    pieces = sorted(solid.pieces(), key=lambda piece: piece.volume)
+    assert len(pieces) == 2
+    assert pieces[1].volume == pytest.approx(hollow.volume())
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_cut_along_an_axis_is_exact(axis: int) -> None:
+    """Faces in the plane stay whole on their own side, whatever the last bits of its offset: no side keeps a film."""
+
+    def upright(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Manifold:
+        a, b = np.roll(lower, axis + 1), np.roll(upper, axis + 1)  # the last coordinate becomes number `axis`
+        corners = [np.where([i & 1, i & 2, i & 4], b, a) for i in range(8)]
+        return Manifold.hull_points(np.array(corners))
+
+    normal = tuple(np.eye(3)[axis].tolist())
+    for offset in np.linspace(-0.4, 0.6, 30):
+        slab, foot = upright((0, 0, -0.7), (1, 1, offset)), upright((0.2, 0.2, offset), (0.3, 0.3, 1))
+        overhang = upright((0.2, 0.2, offset), (1.5, 0.3, 1))
+        for upper in (foot, overhang):
+            below, above = Component(slab + upper).cut(Plane(normal, float(offset)))
+            assert below.box[1, axis] == offset == above.box[0, axis]
+            for side, solid in ((below, slab), (above, upper)):
+                assert side.volume == pytest.approx(solid.volume(), rel=1e-12)
+                assert side.hull.volume == pytest.approx(solid.volume(), rel=1e-12)
+
+
 def test_bad_meshes_are_refused() -> None:
     corner = np.eye(3)
     with pytest.raises(ValueError, match="out of range"):
@@ -142,83 +172,127 @@ def test_bad_meshes_are_refused() -> None:
         _native.cut(corner * np.nan, np.array([(0, 1, 2)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5, 0.0)
 
 
-Surface = tuple[FloatArray, IntArray]
-NOTHING = np.empty((0, 3)), np.empty((0, 3), np.int32)
-
-
-def cut(surface: Surface, normal: tuple[float, float, float], offset: float) -> list[Surface]:
-    return [NOTHING if side is None else side[:2] for side in _native.cut(*surface, *normal, offset, -np.inf)]
-
-
-def together(*solids: Surface) -> Surface:
-    """Several solids as one surface; where they overlap it runs around the points more than once."""
-    first = np.cumsum([0, *(len(vertices) for vertices, _ in solids[:-1])])
-    faces = np.concatenate([own + start for (_, own), start in zip(solids, first, strict=True)])
-    return np.concatenate([vertices for vertices, _ in solids]), faces.astype(np.int32)
-
-
-def blob(seed: int) -> Surface:
+def blob(seed: int) -> trimesh.Trimesh:
     """The hull of random points."""
     random = np.random.default_rng(seed)
-    hull = Hull.of(random.normal(size=(12, 3)) * 0.3 + random.uniform(-0.2, 0.2, 3))
-    return hull.vertices, hull.faces
+    return hull_of(random.normal(size=(12, 3)) * 0.3 + random.uniform(-0.2, 0.2, 3))
 
 
-def volume(surface: Surface) -> float:
-    return _native.mesh_volume(*surface) if len(surface[1]) else 0.0
+def plane_at(offset: float, random: np.random.Generator) -> Plane:
+    normal = random.normal(size=3)
+    return Plane((*(normal / np.linalg.norm(normal)).tolist(),), offset)
 
 
-def caps_of(side: Surface, normal: tuple[float, float, float], offset: float) -> np.ndarray:
-    """Corners [T, 3, 3] of the triangles in a plane."""
-    corners = side[0][side[1]]
-    return corners[(np.abs(corners @ normal - offset) < 1e-12).all(axis=1)]
+def volume(side: Component | None) -> float:
+    return 0.0 if side is None else side.volume
 
 
 @given(seed=st.integers(0, 10**6), number=st.integers(2, 5), inside_out=st.booleans())
 def test_a_solid_that_overlaps_itself_is_cut_like_its_bodies_one_by_one(seed, number, inside_out) -> None:
     bodies = [blob(seed + i) for i in range(number)]
     if inside_out:
-        bodies[0] = bodies[0][0], np.ascontiguousarray(bodies[0][1][:, ::-1])
-    normal = tuple(np.random.default_rng(seed).normal(size=3).tolist())
-    normal = tuple(c / np.linalg.norm(normal) for c in normal)
-    whole = together(*bodies)
-    original = _native.Surface(*whole)
-    for k, side in enumerate(cut(whole, normal, 0.05)):
-        own = [volume(cut(body, normal, 0.05)[k]) for body in bodies]
+        bodies[0].invert()
+    whole, plane = component_of(trimesh.util.concatenate(bodies)), plane_at(0.05, np.random.default_rng(seed))
+    original = _native.Surface(whole.vertices, whole.faces)
+    for k, side in enumerate(whole.cut(plane, -np.inf)):
+        own = [volume(component_of(body).cut(plane, -np.inf)[k]) for body in bodies]
         assert volume(side) == pytest.approx(sum(own), abs=1e-9)
-        if not len(side[1]):
-            continue
-        assert is_closed(side[1])
-        a, b, c = np.moveaxis(caps_of(side, normal, 0.05), 1, 0)
-        sizeable = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-6
-        if sizeable.any():
-            winding = original.winding(((a + b + c) / 3)[sizeable])
-            assert (np.abs(winding) > 0.5).all()  # no cap outside
+        if side is not None:
+            assert is_closed(side.faces)
+            caps = side.vertices[side.faces]
+            caps = caps[(np.abs(caps @ plane.normal - plane.offset) < 1e-12).all(axis=1)]
+            caps = caps[trimesh.triangles.area(caps) > 1e-6]
+            if len(caps):
+                assert (np.abs(original.winding(caps.mean(axis=1))) > 0.5).all(), "no cap outside"
 
 
 @given(seed=st.integers(0, 10**6))
 def test_cuts_follow_cuts_without_piling_up_vertices(seed) -> None:
     """Caps lie on each other where a solid overlaps itself; the next plane cuts all of them at the same points."""
-    surface = together(*(blob(seed + i) for i in range(3)))
-    random = np.random.default_rng(seed)
-    size = len(surface[1])
+    surface = component_of(trimesh.util.concatenate([blob(seed + i) for i in range(3)]))
+    random, size = np.random.default_rng(seed), len(surface.faces)
     for _ in range(8):
-        normal = random.normal(size=3)
-        normal /= np.linalg.norm(normal)
-        surface = cut(surface, tuple(normal.tolist()), 0.25)[0]
-        assert is_closed(surface[1])
-    assert len(surface[1]) < 10 * size
+        surface, _ = surface.cut(plane_at(0.25, random), -np.inf)
+        assert is_closed(surface.faces)
+    assert len(surface.faces) < 10 * size
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.25, 0.5, 1.0])
-def test_films_that_coincide_are_closed(offset) -> None:
+@pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.25, 0.5, 0.0)])
+def test_films_that_coincide_are_closed(offset, shift) -> None:
     """Two boxes that share their faces and cross: rims coincide in part."""
-    box = Hull.of(np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float))
-    for shift in ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.25, 0.5, 0.0)):
-        surface = together((box.vertices, box.faces), (box.vertices + shift, box.faces))
-        sides = cut(surface, (0.0, 0.0, 1.0), offset)
-        for side in sides:
-            if len(side[1]):
-                assert is_closed(side[1])
-        assert volume(sides[0]) == pytest.approx(2 * offset, abs=1e-9)
-        assert volume(sides[1]) == pytest.approx(2 - 2 * offset, abs=1e-9)
+    box = trimesh.creation.box(bounds=[(0, 0, 0), (1, 1, 1)])
+    both = component_of(trimesh.util.concatenate([box, box.copy().apply_translation(shift)]))
+    below, above = both.cut(Plane((0.0, 0.0, 1.0), offset), -np.inf)
+    assert all(is_closed(side.faces) for side in (below, above) if side is not None)
+    assert volume(below) == pytest.approx(2 * offset, abs=1e-9)
+    assert volume(above) == pytest.approx(2 - 2 * offset, abs=1e-9)
+
+
+def solids() -> dict[str, trimesh.Trimesh]:
+    bumpy = trimesh.creation.icosphere(subdivisions=4)
+    bumpy.vertices *= 1 + 0.1 * np.random.default_rng(0).normal(size=(len(bumpy.vertices), 1))
+    return {
+        "box": trimesh.creation.box((1, 2, 3)),
+        "ring": trimesh.creation.torus(1.0, 0.3, 64, 32),
+        "bumpy ball": bumpy,
+        "hollow box": trimesh.creation.box((2, 2, 2)) + inverted(trimesh.creation.box((1.5, 1.5, 1.5))),
+        "two boxes": trimesh.creation.box((1, 1, 1)) + trimesh.creation.box((1, 1, 1)).apply_translation((2, 0, 0)),
+    }
+
+
+def inverted(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    mesh.invert()
+    return mesh
+
+
+def hulls(mesh: trimesh.Trimesh, count: int = 30) -> list[Hull]:
+    """One around all, one inside; of corners of the solid, whose faces touch the facets; of grid points; of any."""
+    rng = np.random.default_rng(1)
+    found = [Hull.of(np.array(trimesh.creation.box((side,) * 3).vertices)) for side in (9, 0.1)]
+    for size in rng.integers(4, 40, size=count).tolist():
+        near = mesh.vertices[rng.integers(len(mesh.vertices))]
+        for points in (
+            mesh.vertices[rng.integers(len(mesh.vertices), size=size)],
+            rng.integers(-4, 5, size=(size, 3)) / 2,
+            near + 0.3 * rng.normal(size=(size, 3)),
+        ):
+            hull = Hull.of(np.array(points, dtype=np.float64))
+            if hull is not None:
+                found.append(hull)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", solids())
+def test_clipping_agrees_with_a_boolean(name: str) -> None:
+    mesh = solids()[name]
+    solid = component_of(mesh)
+    whole = to_manifold(solid.vertices, solid.faces)
+    for hull in hulls(mesh):
+        part = solid.inside(hull)
+        vertices, faces = part.vertices, part.faces
+        assert is_closed(faces)
+        boolean = whole ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
+        assert part.volume == pytest.approx(boolean.volume(), abs=1e-6)
+        if len(faces):
+            planes = hull.vertices[hull.faces]
+            normals = np.cross(planes[:, 1] - planes[:, 0], planes[:, 2] - planes[:, 0])
+            large = np.linalg.norm(normals, axis=1) > 1e-6
+            normals = normals[large] / np.linalg.norm(normals[large], axis=1)[:, None]
+            heights = np.einsum("vfk,fk->vf", vertices[:, None] - planes[None, large, 0], normals)
+            assert heights[np.unique(faces)].max() < 1e-6
+
+
+def test_a_surface_folded_by_noise_is_clipped_and_its_halves_add_up() -> None:
+    """Some hulls have corners where the folded surface holds them twice, or turns inside out."""
+    crumpled = trimesh.creation.icosphere(subdivisions=4)
+    crumpled.vertices += np.random.default_rng(0).uniform(-0.1, 0.1, crumpled.vertices.shape)
+    solid = component_of(crumpled)
+    rng = np.random.default_rng(2)
+    for _ in range(60):
+        hull = Hull.of(crumpled.vertices[rng.integers(len(crumpled.vertices), size=12)] * 0.985)
+        below, above = Component((hull.vertices, hull.faces)).cut(Plane((0.0, 0.6, 0.8), 0.1))
+        whole, *halves = (solid.inside(one) for one in (hull, below.hull, above.hull))
+        assert all(is_closed(part.faces) for part in (whole, *halves))
+        assert whole.volume == pytest.approx(sum(half.volume for half in halves), rel=1e-3)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold, Mesh64
 
 import rlacd
 from rlacd import _native
@@ -18,10 +19,11 @@ from rlacd.repair.union import unite
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
+from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from tests.shapes import box, component_of, trimesh_of
+from tests.shapes import box, component_of, from_manifold, trimesh_of
 
 
 def noisy(mesh: trimesh.Trimesh, noise: float = 0.001) -> trimesh.Trimesh:
@@ -60,13 +62,14 @@ def bricks(count: int, edge: float) -> trimesh.Trimesh:
 SHAPES = {"ring": ring, "cross": cross}
 
 
-def frame_scale(mesh: trimesh.Trimesh) -> float:
-    return float(2 / max(mesh.extents))
+def in_frame(hulls: Iterable[trimesh.Trimesh], mesh: trimesh.Trimesh) -> list[Hull]:
+    return [Hull.of(Frame.of(mesh.vertices).to_frame(hull.vertices)) for hull in hulls]
 
 
-def in_frame(hulls: list[trimesh.Trimesh], mesh: trimesh.Trimesh) -> list[Hull]:
-    middle, scale = mesh.bounds.mean(axis=0), frame_scale(mesh)
-    return [Hull.of(np.array((hull.vertices - middle) * scale)) for hull in hulls]
+def uncovered(hulls: Iterable[trimesh.Trimesh], mesh: trimesh.Trimesh) -> float:
+    """How far some of the mesh is from the hulls, at most, in the frame."""
+    vertices = Frame.of(mesh.vertices).to_frame(mesh.vertices)
+    return hull_union(in_frame(hulls, mesh), 1).under(vertices, np.array(mesh.faces, dtype=np.int32), 1e-4, 1)[1]
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -78,23 +81,12 @@ def test_promises_hold_on_the_solid_itself(shape: str, quality: rlacd.QualityNam
     assert "lift" in result.report["seconds"]
     assert not result.report["warnings"]
     assert result.report["concavity"]["max"] <= 0.05
-    hulls = in_frame(list(result), mesh)
-    middle, scale = mesh.bounds.mean(axis=0), frame_scale(mesh)
-    vertices = np.array((mesh.vertices - middle) * scale)
-    faces = np.array(mesh.faces, dtype=np.int32)
-    assert hull_union(hulls, 1).under(vertices, faces, 1e-4, 1)[1] <= 1e-3
+    assert uncovered(result, mesh) <= 1e-3
     # The strict test, with parts made by another library: the solid clipped to each hull.
-    solid = Manifold(Mesh64(vertices, faces.astype(np.uint64)))
-    for hull in hulls:
-        clipped = solid ^ Manifold(Mesh64(hull.vertices, hull.faces.astype(np.uint64)))
-        surface = clipped.to_mesh64()
-        part = Part(
-            np.array(surface.vert_properties[:, :3]),
-            np.array(surface.tri_verts, dtype=np.int32),
-            clipped.volume(),
-            hull,
-        )
-        assert Concavity(0.0501).is_met(part)
+    solid = to_manifold(Frame.of(mesh.vertices).to_frame(mesh.vertices), mesh.faces)
+    for hull in in_frame(result, mesh):
+        clipped = from_manifold(solid ^ to_manifold(hull.vertices, hull.faces))
+        assert Concavity(0.0501).is_met(Part(clipped.vertices, clipped.faces, clipped.volume, hull))
 
 
 def test_a_part_without_room_below_the_threshold_keeps_its_own_hull() -> None:
@@ -146,9 +138,7 @@ def test_stopped_at_any_time_the_hulls_cover_the_solid() -> None:
     for stage in ("simplify", "cut", "merge", "lift"):
         result = rlacd.decompose(mesh, progress=lambda p, stage=stage: p.stage != stage)
         assert not result.report["complete"]
-        scaled = np.array((mesh.vertices - mesh.bounds.mean(axis=0)) * frame_scale(mesh))
-        union = hull_union(in_frame(list(result), mesh), 1)
-        assert union.under(scaled, np.array(mesh.faces, dtype=np.int32), 1e-4, 1)[1] <= 1e-3
+        assert uncovered(result, mesh) <= 1e-3
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -199,9 +189,8 @@ def test_simple_hulls_hold_the_full_ones_and_have_fewer_corners() -> None:
         pytest.approx(mesh.volume, rel=0.03),
         pytest.approx(mesh.convex_hull.volume),
     )
-    around = in_frame(list(simple), mesh)
-    held = in_frame(list(full), mesh)
-    assert hull_union(around, 1).distance(held[0].vertices, 1).max() <= 1e-9
+    (held,) = in_frame(full, mesh)
+    assert hull_union(in_frame(simple, mesh), 1).distance(held.vertices, 1).max() <= 1e-9
     assert simple.report["concavity"]["max"] <= 0.05
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
-import json
 import math
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,15 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
 
 import rlacd
 from rlacd import _native
-from rlacd.cli.main import app
 from rlacd.criteria import Concavity
+from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
@@ -32,9 +30,11 @@ from rlacd.search.context import SearchContext, by_score
 from rlacd.search.neighbourhood import LAG, LEAST_TRIALS, Neighbourhood, cost
 from rlacd.search.part_graph import PartGraph
 from rlacd.search.recut import Exchange, recut
+from rlacd.search.redistribute import redistribute
 from rlacd.search.search import BOUNDED_PATIENCE, search
 from rlacd.solid.component import Component, Part, Plane, reunite, touch
-from tests.shapes import box, from_manifold, strangers
+from tests.hulls import assert_same_hulls
+from tests.shapes import bent_bar, box, depth_outside, own_volume, stacks, strangers, together, trimesh_of
 
 SHAPES = ("test/coacd_examples/SnowFlake.ply", "test/vhacd/ob_chess_table.ply", "test/capod/class8__m85.ply")
 CRITERION = Concavity(0.05)
@@ -43,6 +43,11 @@ CRITERION = Concavity(0.05)
 def frame() -> Any:
     """A picture frame, turned so that no face lies along an axis."""
     return (box((-1, -1, -0.3), (1, 1, 0.3)) - box((-0.5, -0.5, -1), (0.5, 0.5, 1))).rotate([20, 30, 10])
+
+
+def crossed() -> Any:
+    """Two of them, where what the search finds depends on what it draws."""
+    return frame() + frame().rotate([0, 90, 0])
 
 
 def solid_of(mesh: Path) -> Component:
@@ -89,48 +94,17 @@ def test_what_slanted_planes_cut_is_reunited(cuts: list[tuple[tuple[float, float
 
 
 @pytest.mark.nightly
-def test_most_neighbours_can_be_reunited_without_a_wall_between_them(real: Component) -> None:
-    with Run(1) as run:
-        parts = first_pass(real, run)
-    reunited = glued = 0.0
-    tried = failed = 0
-    for first, second in itertools.pairwise(parts):
-        tried += 1
-        solid = reunite(strangers([*first.members, *second.members]))
-        if solid is None:
-            failed += 1
-            continue
-        union = Part.glued(first, second)
-        reunited += _native.mesh_area(solid.vertices, solid.faces)
-        glued += _native.mesh_area(union.vertices, union.faces)
-        assert solid.volume == pytest.approx(first.volume + second.volume, rel=1e-6)
-    assert failed <= 0.1 * tried
-    assert reunited == pytest.approx(glued, rel=1e-2)
-
-
-@pytest.mark.nightly
-def test_a_search_only_improves_and_keeps_the_solid(real: Component) -> None:
-    with Run(1) as run:
-        parts = first_pass(real, run)
-        found, account = search(SearchContext(real, CRITERION), parts, run, "best", steps=40)
-    assert cost(found) <= cost(parts)
-    assert account.parts == len(found) <= account.portfolio <= account.first_pass == len(parts)
-    assert account.steps == 40 or account.exhausted
-    assert all(CRITERION.is_met(part) for part in found)
-    assert sum(own.volume for part in found for own in part.members) == pytest.approx(real.volume, rel=1e-3)
-
-
-@pytest.mark.nightly
-def test_a_search_is_never_worse_than_its_start(real: Component) -> None:
+def test_a_search_is_never_worse_than_its_start_and_keeps_the_solid(real: Component) -> None:
     """Whatever its steps. More of them may well end with more parts: what can be eliminated changes on the way."""
-    costs = []
     with Run(1) as run:
         parts = first_pass(real, run)
-        for steps in (0, 8, 24):
-            context = SearchContext(real, CRITERION, seed=3)
-            found, _ = search(context, parts, run, "best", steps=steps)
-            costs.append(cost(found))
-    assert costs[0] >= max(costs[1:])
+        for steps in (0, 8, 40):
+            found, account = search(SearchContext(real, CRITERION, seed=3), parts, run, "best", steps=steps)
+            assert cost(found) <= cost(parts)
+            assert account.parts == len(found) <= account.portfolio <= account.first_pass == len(parts)
+            assert account.steps == steps or account.exhausted
+            assert all(CRITERION.is_met(part) for part in found)
+            assert sum(own.volume for part in found for own in part.members) == pytest.approx(real.volume, rel=1e-3)
 
 
 def test_the_state_of_a_search_is_always_feasible() -> None:
@@ -206,20 +180,6 @@ def test_reuniting_again_and_again_leaves_no_crumbs() -> None:
     assert len(again.faces) < 12 * len(solid.faces)  # 160 times as many without cleaning up
 
 
-def test_what_is_all_there_of_a_component_is_put_together_without_a_boolean() -> None:
-    bar = Component(Manifold.cube((3, 1, 1), True))
-    low, high = (side for side in bar.cut(Plane((1, 0, 0), -0.3)) if side is not None)
-    left, right = (side for side in high.cut(Plane((0, 1, 0), 0.1)) if side is not None)
-    near, far = (side for side in high.cut(Plane((0, 0, 1), 0.2)) if side is not None)
-    assert reunite([right, low, left]) is bar
-    assert reunite([far, near]) is high
-    for some, volume in (([low, left], low.volume + left.volume), ([low, near], low.volume + near.volume)):
-        united = reunite(some)
-        assert united is not None
-        assert united is not bar
-        assert united.volume == pytest.approx(volume, rel=1e-6)
-
-
 def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     bar = Component(Manifold.cube((3, 1, 1), True))
     pieces: list[Component] = [bar]
@@ -233,24 +193,73 @@ def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     assert recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Run(1, -1.0)) is None
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("options", [{"quality": "balanced"}, {"quality": "best", "search_steps": 30, "seed": 5}])
-@pytest.mark.parametrize("name", SHAPES[:2])
-def test_the_same_hulls_for_any_number_of_threads(name: str, options: dict[str, Any], corpus: Path) -> None:
-    one, four = (rlacd.decompose(corpus / name, threads=threads, **options) for threads in (1, 4))
-    assert len(one) == len(four)
-    for a, b in zip(one, four, strict=True):
-        assert (a.vertices == b.vertices).all()
-        assert (a.faces == b.faces).all()
+def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Criterion) -> None:
+    assert exchange.gain == 1
+    assert exchange.out[0] is part
+    assert set(exchange.out[1:]) <= set(around)
+    assert all(criterion.is_met(new) for new in exchange.into)
+    assert own_volume(exchange.into) == pytest.approx(own_volume(exchange.out), rel=1e-6)
+    corners = np.concatenate([member.vertices for member in part.members])
+    assert depth_outside(corners, exchange.into) < 1e-6, "all of it is in the hulls of those that took it"
+
+
+def test_a_part_is_divided_between_its_neighbours() -> None:
+    left, middle, right = bent_bar()
+    solid = together([left, middle, right])
+    found = [redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid) for seed in range(5)]
+    assert any(found)
+    for exchange in found:
+        if exchange is not None:
+            check(exchange, middle, [left, right], CRITERION)
+            assert len(exchange.into) == 2
+
+
+def test_a_part_that_sticks_out_stays() -> None:
+    slab, pin = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((0.4, 0.4, 0.2), (0.6, 0.6, 0.9)))
+    solid = together([slab, pin])
+    assert redistribute(pin, [slab], CRITERION, np.random.default_rng(0), solid) is None
+    assert redistribute(pin, [], CRITERION, np.random.default_rng(0), solid) is None
+
+
+def test_all_or_nothing() -> None:
+    """A half that fits into a neighbour does not go there if the other half fits nowhere."""
+    slab, long = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((1, 0, 0), (3, 1, 0.2)))
+    tower = Component(box((2.9, 0, 0.2), (3, 1, 1.5)))
+    parts: list[Part] = [slab, tower]
+    bent = Part.glued(long, tower)
+    solid = together([slab, long, tower])
+    assert redistribute(bent, [slab], CRITERION, np.random.default_rng(0), solid) is None
+    assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid) is not None
+
+
+@settings(max_examples=30, deadline=None)
+@given(stacks(), st.integers(0, 2**32 - 1))
+def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
+    solid = together(stack)
+    part, *around = sorted(stack, key=lambda part: part.hull.volume)
+    once, again = (redistribute(part, around, CRITERION, np.random.default_rng(seed), solid) for _ in range(2))
+    assert (once is None) == (again is None)
+    if once is not None and again is not None:
+        check(once, part, around, CRITERION)
+        assert [p.volume for p in once.into] == [p.volume for p in again.into]
+
+
+@pytest.mark.promise("same-bytes")
+def test_a_seed_makes_the_same_search_on_any_number_of_threads_and_another_seed_another() -> None:
+    first, again, threaded, other = (
+        rlacd.decompose(trimesh_of(crossed()), quality="best", search_steps=8, seed=seed, threads=threads)
+        for seed, threads in ((0, 1), (0, 1), (0, 4), (1, 1))
+    )
+    assert_same_hulls(first, again, threaded)
+    assert [hull.vertices.tobytes() for hull in first] != [hull.vertices.tobytes() for hull in other]
 
 
 @pytest.mark.slow
 @pytest.mark.promise("levels")
 def test_no_level_makes_more_hulls_than_the_one_before() -> None:
-    for solid in (frame(), frame() + frame().rotate([0, 90, 0])):
-        shape = from_manifold(solid)
+    for solid in (frame(), crossed()):
         fast, balanced, best = (
-            rlacd.decompose((shape.vertices, shape.faces), threads=1, **options)
+            rlacd.decompose(trimesh_of(solid), threads=1, **options)
             for options in ({"quality": "fast"}, {}, {"quality": "best", "search_steps": 16})
         )
         assert len(best) <= len(fast) >= len(balanced)
@@ -272,39 +281,6 @@ def test_levels_are_ordered(name: str, corpus: Path) -> None:
         assert result.report["complete"]
     assert fast.report["search"] is None
     assert balanced.report["search"]["work"] <= balanced.report["search"]["allowed"]
-
-
-@pytest.mark.nightly
-def test_other_criteria_are_searched_too(corpus: Path) -> None:
-    space = rlacd.NavigableSpace(0.025, 0.02)
-    fast, best = (
-        rlacd.decompose(corpus / SHAPES[0], criterion=space, **options)
-        for options in ({}, {"quality": "best", "search_steps": 40})
-    )
-    assert len(best) <= len(fast)
-    assert best.report["navigable"]["intrusion"]["max"] == 0
-    limited = rlacd.decompose(corpus / SHAPES[1], max_vertices=24, quality="balanced")
-    assert max(len(hull.vertices) for hull in limited) <= 24
-    assert limited.report["concavity"]["max"] <= 0.05
-
-
-@pytest.mark.nightly
-def test_the_command_line_searches(corpus: Path, tmp_path: Path) -> None:
-    words = ["--quality", "best", "--search-steps", "5", "--report", "-", "-q"]
-    done = CliRunner().invoke(app, ["decompose", str(corpus / SHAPES[1]), "-o", str(tmp_path / "h.glb"), *words])
-    assert done.exit_code == 0, done.output
-    report = json.loads(done.stdout)
-    assert report["options"]["quality"] == "best"
-    assert report["search"]["steps"] <= 5
-
-
-@pytest.mark.parametrize("words", ["--quality better", "--quality fast --budget 3", "--quality best --budget -1"])
-def test_the_command_line_refuses_bad_options(words: str, tmp_path: Path) -> None:
-    mesh = tmp_path / "ball.ply"
-    trimesh.creation.icosphere().export(mesh)
-    done = CliRunner().invoke(app, ["decompose", str(mesh), *words.split()])
-    assert done.exit_code == 2
-    assert list(tmp_path.iterdir()) == [mesh]
 
 
 @pytest.mark.nightly

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -16,14 +14,12 @@ import pytest
 
 import fuzz.light
 import fuzz.warm
-from fuzz import soak
-from fuzz.cases import case_of, file_of, minimised, try_case
+from fuzz.cases import try_case
 from fuzz.faults import Fault, Run, complaints, left_behind
 from fuzz.light import READ, REFUSED, LightTrials, wrong_in
 from fuzz.mutations import Seed
 from fuzz.soak import reasons
 from fuzz.trials import Laboratory, Trial, seeds_from
-from fuzz.warm import WarmTrials
 from rlacd.solid.input_mesh import InputMesh
 
 CASES = sorted((Path(__file__).parent / "cases").glob("*.json"))
@@ -56,42 +52,6 @@ def test_a_number_is_always_the_same_trial(kind: str, laboratory: Laboratory) ->
     one, two = (laboratory.trial(number) for _ in range(2))
     assert one.is_well, one.said
     assert replace(one, cpu=0) == replace(two, cpu=0)
-
-
-def test_a_soak_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
-    made: list[int] = []
-
-    class Quick:
-        seed = 0
-
-        def __init__(self, *_: Any) -> None:
-            pass
-
-        def trial(self, number: int) -> Trial:
-            made.append(number)
-            if number == 130:
-                raise KeyboardInterrupt
-            end = "wrong" if number == 7 else "done"
-            return Trial(0, number, "fault", end, ["bad"] if end == "wrong" else [], counts=Counter(files=2), cpu=0.5)
-
-        def close(self) -> None:
-            pass
-
-    monkeypatch.setattr(soak, "Laboratory", Quick)
-    words = ["soak", "--folder", str(tmp_path), "--hours", "1"]
-    monkeypatch.setattr("sys.argv", words)
-    with pytest.raises(KeyboardInterrupt):
-        soak.main()
-    assert made == list(range(131))
-    with pytest.raises(KeyboardInterrupt):
-        soak.main()
-    assert made[131:] == list(range(100, 131)), "the chunk that was not finished is made again"
-    assert json.loads((tmp_path / "0-7.json").read_text())["said"] == ["bad"]
-    monkeypatch.setattr("sys.argv", [*words, "--totals"])
-    assert soak.main() == 0
-    said = capsys.readouterr().out
-    assert "| fault | 100 | 99 | 0 | 0 | 1 |" in said
-    assert "files 200" in said
 
 
 FULL = Fault("full disk", (0, 3))
@@ -204,47 +164,3 @@ def test_a_mesh_that_is_none_is_seen() -> None:
     assert wrong_in(replace(good, faces=face + 1))
     assert wrong_in(replace(good, faces=face.astype(np.int32)))
     assert wrong_in(replace(good, node_of=np.array([0])))
-
-
-@pytest.mark.slow
-def test_a_warm_process_that_dies_hangs_or_grows_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
-    warm = WarmTrials(0, SEEDS)
-    numbers = [number for number in range(200) if warm.kind(number) == "read"][:4]
-    try:
-        first = [warm.trial(number) for number in numbers[:1]]
-        assert first[0].is_well
-        process = warm._process.pid
-        monkeypatch.setattr(fuzz.warm.LightTrials, "trial", lambda *_: None)  # only here: the process is another
-        os.kill(process, signal.SIGKILL)
-        ends = [warm.trial(number).end for number in range(numbers[0] + 1, numbers[0] + 3)]
-        assert set(ends) <= {"crash", "loaded", "refused", "done"}  # answers sent before it died still count
-        assert warm.trial(numbers[-1]).is_well
-        assert warm._process.pid != process
-        os.kill(warm._process.pid, signal.SIGSTOP)
-        monkeypatch.setattr(fuzz.warm, "PATIENCE", 0.1)
-        while (stopped := warm.trial(warm._next)).is_well:  # those it had finished before
-            time.sleep(0)
-        assert stopped.end == "hang"
-        monkeypatch.setattr(fuzz.warm, "PATIENCE", 600.0)
-        monkeypatch.setattr(fuzz.warm, "LOOK", 0.0)
-        monkeypatch.setattr(fuzz.warm, "MEMORY", 1)
-        assert warm.trial(numbers[0]).end == "memory"
-    finally:
-        warm.close()
-
-
-def test_a_damaged_file_is_a_case_that_is_made_small(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails_on_nan(path: Path) -> None:
-        if b"nan" in path.read_bytes():
-            raise KeyError("what a parser says")
-        raise fuzz.light.rlacd.MeshFileError("refused")
-
-    monkeypatch.setattr(fuzz.light, "load_mesh", fails_on_nan)
-    content = b"v 0 0 0\nv 1 0 0\nv 0 nan 0\n" + b"f 1 2 3\n" * 20
-    trial = light.reread(Trial(0, 5, "read"), "obj", Seed(content, {"a.bin": b"\0"}))
-    assert trial.end == "untyped"
-    laboratory: Any = light
-    case = json.loads(json.dumps(case_of(trial) | file_of("obj", Seed(content, {"a.bin": b"\0"}))))
-    assert try_case(laboratory, case).end == "untyped"
-    small = minimised(laboratory, case, 200)
-    assert small == {**case, "content": "bmFu"}, "only the letters nan are left"

@@ -1,4 +1,4 @@
-"""The plane sweep against real cuts."""
+"""The plane sweep against real cuts; the tree of cuts, where a second policy takes over and films are halved."""
 
 from __future__ import annotations
 
@@ -7,19 +7,22 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from manifold3d import Manifold, Mesh64
+from manifold3d import CrossSection, Manifold, Mesh64
 from scipy.spatial import ConvexHull, QhullError
 
-from rlacd import _native
-from rlacd.planes.candidates import Candidates, axis_and_principal
+from rlacd import _native, cut
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.decompose_mesh import decompose
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
 from rlacd.planes.sweep import SLIVER, SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep
-from rlacd.policies import SCORES
+from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import excess_norm, hull_sum
+from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
 from rlacd.solid.manifold import to_manifold
+from tests.shapes import box
 
 
 def from_trimesh(mesh: trimesh.Trimesh) -> Manifold:
@@ -65,7 +68,8 @@ def test_sweep_equals_real_cuts(name: str) -> None:
             assert solid[index] == pytest.approx(side.volume(), abs=1e-9 * total)
             points = np.asarray(side.to_mesh64().vert_properties[:, :3])
             assert hull[index] == pytest.approx(hull_volume(points), rel=1e-9, abs=1e-12)
-        section = whole.rotate(_upright(plane.normal)).slice(plane.offset)
+        flat = trimesh.geometry.plane_transform(plane.offset * np.array(plane.normal), plane.normal)
+        section = whole.transform(flat[:3]).slice(0)
         assert scored.section_area[index] == pytest.approx(section.area(), abs=1e-6)
 
 
@@ -93,7 +97,10 @@ def finned_tetrahedron() -> tuple[FloatArray, IntArray]:
     return vertices, np.array([*tetrahedron, *fin], dtype=np.int32)
 
 
-@pytest.mark.parametrize("solid", [crowded_pyramid(12), crowded_pyramid(40), finned_tetrahedron()])
+DEGENERATE = {"crowded 12": crowded_pyramid(12), "crowded 40": crowded_pyramid(40), "fin": finned_tetrahedron()}
+
+
+@pytest.mark.parametrize("solid", DEGENERATE.values(), ids=DEGENERATE)
 def test_corners_count_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray]) -> None:
     component = Component(solid)
     vertices, faces = solid
@@ -112,12 +119,26 @@ def test_corners_count_where_the_mesh_is_degenerate(solid: tuple[FloatArray, Int
             assert hull[index] == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
-def _upright(normal: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Euler angles (degrees, x then y then z) that turn the normal to +z."""
-    x, y, z = normal
-    about_x = np.degrees(np.arctan2(y, z))
-    about_y = -np.degrees(np.arctan2(x, np.hypot(y, z)))
-    return (float(about_x), float(about_y), 0.0)
+def test_candidates_are_the_papers_150() -> None:
+    component = Component(Manifold.cube((3, 2, 1), True).rotate((10, 20, 30)))
+    candidates = axis_and_principal(component)
+    assert len(candidates) == 6 * OFFSETS_PER_AXIS == 150
+    for k, direction in enumerate(candidates.directions):
+        heights = component.vertices @ direction
+        steps = np.diff([heights.min(), *candidates.offsets[k], heights.max()])
+        assert steps == pytest.approx(np.full(26, np.ptp(heights) / 26))
+    plane = candidates.plane(25 * 4 + 7)
+    assert plane.normal == pytest.approx(candidates.directions[4])
+    assert plane.offset == candidates.offsets[4, 7]
+
+
+@pytest.mark.parametrize("score", SCORES)
+def test_greedy_cuts_a_dumbbell_at_its_bar(score: str) -> None:
+    balls = Manifold.sphere(0.5, 32).translate((-1, 0, 0)) + Manifold.sphere(0.5, 32).translate((1, 0, 0))
+    dumbbell = Component(balls + Manifold.cylinder(2, 0.1, 0.1, 16, True).rotate((0, 90, 0)))
+    plane = Greedy(score).choose(dumbbell)
+    assert abs(plane.normal[0]) > 0.99
+    assert abs(plane.offset) < 0.7
 
 
 def test_section_of_a_box() -> None:
@@ -129,23 +150,6 @@ def test_section_of_a_box() -> None:
     assert scores[:, 6] == pytest.approx([0.25] * 3)
     assert scores[:, 7] == pytest.approx([0.75, 1.75, 2.75])
     assert scores[:, 8] == pytest.approx([3, 3, 2])
-
-
-def test_planes_that_miss_or_shave_are_invalid() -> None:
-    component = Component(Manifold.cube((4, 4, 1)))
-    scored = sweep(component, axis_and_principal(component))
-    valid = scored.valid().reshape(6, 25)
-    assert valid[0].all()
-    assert valid[1].all()
-    assert not valid[2, 0], "a slice of 1/26 of the height is thinner than 2 % of the plate"
-    assert valid[2, 12]
-
-
-@pytest.mark.parametrize("offsets", [[0.5, 0.2], [0.2, np.nan], [np.inf, np.inf]])
-def test_offsets_have_to_be_finite_and_ascend(offsets: list[float]) -> None:
-    component = Component(Manifold.cube((1, 1, 1)))
-    with pytest.raises(ValueError, match="finite and ascend"):
-        _native.sweep(component.vertices, component.faces, np.eye(3)[:1], np.array([offsets]), 1)
 
 
 # --- the plane of least excess ----------------------------------------------------------------------------------------
@@ -172,61 +176,13 @@ def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
 
 
 @pytest.mark.parametrize("score", EXPONENTS)
-@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize("name", [*SOLIDS, *DEGENERATE])
 def test_it_is_the_plane_that_a_sweep_of_all_finds(name: str, score: str) -> None:
-    component = Component(SOLIDS[name]())
+    component = Component(SOLIDS[name]() if name in SOLIDS else DEGENERATE[name])
     sweeps = SweepCache()
     swept = sweeps.of(component)
     found = least_excess(component, sweeps.candidates(component), EXPONENTS[score])
     assert found == cheapest(swept, COSTS[score](swept))
-
-
-@pytest.mark.parametrize("solid", [crowded_pyramid(12), crowded_pyramid(40), finned_tetrahedron()])
-def test_it_is_so_where_the_mesh_is_degenerate(solid: tuple[FloatArray, IntArray]) -> None:
-    component = Component(solid)
-    candidates = axis_and_principal(component)
-    swept = sweep(component, candidates)
-    assert least_excess(component, candidates, EXPONENTS["excess_norm"]) == cheapest(swept, excess_norm(swept))
-
-
-@st.composite
-def blocks_and_planes(draw: st.DrawFn) -> tuple[Component, Candidates]:
-    """A few blocks with corners on a coarse grid, and planes on it and off it: many meet faces, some miss the solid."""
-    grid = st.integers(0, 6)
-    solid = Manifold()
-    for _ in range(draw(st.integers(1, 4))):
-        corner = [draw(grid) / 4 for _ in range(3)]
-        solid += Manifold.cube([draw(st.integers(1, 4)) / 4 for _ in range(3)]).translate(corner)
-    if draw(st.booleans()):
-        solid = solid.rotate((0, 0, 45)) + Manifold.sphere(draw(st.integers(1, 3)) / 4, 12)
-    directions, offsets = [], []
-    for _ in range(draw(st.integers(1, 8))):
-        normal = np.array([draw(st.integers(-2, 2)) for _ in range(3)], dtype=np.float64)
-        if not normal.any():
-            normal[2] = 1
-        directions.append(normal / np.linalg.norm(normal))
-        offsets.append(sorted(draw(st.lists(st.integers(-4, 12).map(lambda i: i / 4), min_size=5, max_size=5))))
-    return Component(solid), Candidates(np.array(directions) + 0.0, np.array(offsets))
-
-
-@settings(max_examples=150, deadline=None)
-@given(blocks_and_planes(), st.sampled_from([1.0, 1.3, 2.0, math.inf]))
-def test_no_valid_plane_costs_less(case: tuple[Component, Candidates], exponent: float) -> None:
-    component, candidates = case
-    swept = sweep(component, candidates)
-    valid = next((v for s in (SLIVER, SLIVER / 100) if (v := swept.valid(s)).any()), None)
-    found = least_excess(component, candidates, exponent)
-    if valid is None:
-        assert found is None
-        return
-    cost = excess_cost(swept, exponent)
-    chosen = next(i for i in np.flatnonzero(valid) if candidates.plane(int(i)) == found)
-    # Excesses are differences of volumes: those of nearly convex solids are nothing but rounding.
-    rounding = 1e-12 * component.hull.volume
-    rounding = rounding if math.isinf(exponent) else exponent * component.hull.volume ** (exponent - 1) * rounding
-    most = component.hull.volume - (0 if exponent == 1 else component.volume)
-    tie = 1e-9 * max(most, 0.0) ** (1 if math.isinf(exponent) else exponent)
-    assert cost[chosen] <= cost[valid].min() + tie + rounding
 
 
 def test_the_first_of_equal_planes_is_taken() -> None:
@@ -248,25 +204,134 @@ def test_slivers_are_left_only_where_every_plane_leaves_one() -> None:
     assert least_excess(notched, Candidates(np.zeros((0, 3)), np.zeros((0, 1))), 1.0) is None
 
 
-def ask(vertices: FloatArray, offsets: list[float], exponent: float = 1.3, tie: float = 0.0) -> int:
-    faces = Component(gear()).faces
-    return _native.find_least_excess(
-        vertices, faces, np.eye(3)[:1], np.array([offsets]), exponent, tie, 1e-11, [SLIVER], 1
-    )
+@pytest.mark.parametrize(
+    ("offsets", "exponent", "tie", "says"),
+    [
+        ([0.5, 0.2], 1.3, 0.0, "finite and ascend"),
+        ([0.2, math.nan], 1.3, 0.0, "finite and ascend"),
+        ([math.inf, math.inf], 1.3, 0.0, "finite and ascend"),
+        ([0.2], 0.9, 0.0, "exponent"),
+        ([0.2], math.nan, 0.0, "exponent"),
+        ([0.2], 1.3, -1.0, "tie"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(offsets: list[float], exponent: float, tie: float, says: str) -> None:
+    component, planes = Component(gear()), (np.eye(3)[:1], np.array([offsets]))
+    with pytest.raises(ValueError, match=says):
+        _native.find_least_excess(component.vertices, component.faces, *planes, exponent, tie, 1e-11, [SLIVER], 1)
+    if says == "finite and ascend":
+        with pytest.raises(ValueError, match=says):
+            _native.sweep(component.vertices, component.faces, *planes, 1)
 
 
-def test_what_makes_no_sense_is_refused() -> None:
-    vertices = Component(gear()).vertices
-    assert ask(vertices, [0.1, 0.2]) in (0, 1)
-    with pytest.raises(ValueError, match="finite and ascend"):
-        ask(vertices, [0.5, 0.2])
-    with pytest.raises(ValueError, match="finite and ascend"):
-        ask(vertices, [0.2, math.nan])
-    with pytest.raises(ValueError, match="exponent"):
-        ask(vertices, [0.2], exponent=0.9)
-    with pytest.raises(ValueError, match="exponent"):
-        ask(vertices, [0.2], exponent=math.nan)
-    with pytest.raises(ValueError, match="tie"):
-        ask(vertices, [0.2], tie=-1.0)
+def test_corners_that_are_not_finite_are_refused() -> None:
+    component = Component(gear())
+    vertices = np.where(component.vertices == component.vertices.max(), np.nan, component.vertices)
     with pytest.raises(ValueError, match="not finite"):
-        ask(np.where(vertices == vertices.max(), np.nan, vertices), [0.2])
+        _native.find_least_excess(
+            vertices, component.faces, np.eye(3)[:1], np.array([[0.2]]), 1.3, 0, 1e-11, [SLIVER], 1
+        )
+
+
+CRITERION = Concavity(0.02)
+
+
+class Slices:
+    """A policy that fails: cuts 4 % off the lower end, whatever the shape."""
+
+    def choose(self, component: Component, threads: int = 1) -> Plane:
+        lower, upper = component.box[:, 0].tolist()
+        return Plane((1.0, 0.0, 0.0), lower + 0.04 * (upper - lower))
+
+
+def cross() -> Component:
+    arms = [box((-1, -0.1, -0.1), (1, 0.1, 0.1)), box((-0.1, -1, -0.1), (0.1, 1, 0.1))]
+    return Component(arms[0] + arms[1])
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cut, "MANY_COMPONENTS", 12)
+
+
+def cut_by(tree: CutTree, criterion: Concavity = CRITERION) -> list[Component]:
+    done, left = tree.cut_until(criterion)
+    assert not left
+    assert all(criterion.is_met(part) for part in done)
+    return done
+
+
+@pytest.mark.usefixtures("few")
+def test_where_one_policy_fails_the_other_takes_over_for_good() -> None:
+    solid = cross()
+    with Run(1) as run:
+        sliced = len(cut_by(CutTree(solid, Slices(), run)))
+        alone = cut_by(CutTree(solid, Greedy(), run))
+        tree = CutTree(solid, Slices(), run, second=Greedy())
+        both = cut_by(tree)
+        assert len(alone) < 12 < sliced
+        assert [part.volume for part in both] == [part.volume for part in alone]
+        coarser = Concavity(2 * CRITERION.threshold)
+        assert len(cut_by(tree, coarser)) == len(cut_by(CutTree(solid, Greedy(), run), coarser))
+
+
+@pytest.mark.usefixtures("few")
+def test_a_second_policy_that_is_no_better_changes_nothing() -> None:
+    solid = cross()
+    with Run(1) as run:
+        alone = cut_by(CutTree(solid, Slices(), run))
+        both = cut_by(CutTree(solid, Slices(), run, second=Slices()))
+    assert [part.volume for part in both] == [part.volume for part in alone]
+
+
+@pytest.mark.parametrize("units", [0.0, 3e3])
+def test_work_ends_the_cutting(units: float) -> None:
+    with Run(1) as run:
+        _, left = CutTree(cross(), Slices(), run).cut_until(CRITERION, math.inf, units)
+    assert left
+    assert run.work.done > units
+
+
+@pytest.mark.usefixtures("few")
+def test_limits_on_parts_see_the_same_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The default policy, made to fail, is replaced in `decompose` too; a chosen one is not."""
+    monkeypatch.setattr("rlacd.find_parts.make_policy", lambda *_: Slices())
+    options = {"quality": "fast", "merge": False, "threshold": 0.05, "threads": 1}
+    mesh = cross().vertices, cross().faces
+    assert len(decompose(mesh, **options)) <= 7
+    assert len(decompose(mesh, policy="greedy-excess-norm", **options)) > 12
+
+
+def gutter(thickness: float) -> Component:
+    """Half a pipe without ends."""
+    half = CrossSection.circle(0.5, 64) - CrossSection.circle(0.5 - thickness, 64)
+    half ^= CrossSection.square((1, 0.5)).translate((-0.5, 0))
+    return Component(half.extrude(1.0))
+
+
+class Never:
+    """A policy that finds no plane."""
+
+    def choose(self, component: Component, threads: int = 1) -> None:
+        return None
+
+
+def test_a_film_that_no_plane_cuts_is_halved_until_it_is_done() -> None:
+    with Run(1) as run:
+        film = gutter(1e-4)
+        parts = cut_by(CutTree(film, Never(), run))
+        assert 4 <= len(parts) <= 64
+        assert sum(part.volume for part in parts) == pytest.approx(film.volume, rel=1e-6)
+        corners = np.concatenate([part.vertices for part in parts])
+        assert np.allclose([corners.min(axis=0), corners.max(axis=0)], film.box, atol=1e-12)
+
+
+def test_a_film_inside_out_is_halved_and_a_body_is_left_as_it_is() -> None:
+    with Run(1) as run:
+        film = gutter(1e-4)
+        turned = Component((film.vertices, np.ascontiguousarray(film.faces[:, ::-1])))
+        assert turned.volume < 0
+        below, above = cut.halves(turned)
+        assert below.volume + above.volume == pytest.approx(turned.volume, rel=1e-6)
+        body = gutter(0.1)
+        assert CutTree(body, Never(), run).cut_until(CRITERION) == ([], [body])

@@ -1,30 +1,30 @@
-"""Hulls with limits: within them, convex, around the given hull, and not much larger."""
+"""Limits on hulls and on their number: kept, convex, around the given hull, not much larger, never worse for more."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from manifold3d import Manifold
 
+import rlacd
+from fuzz.geometry import Polytope, why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.finish.limit import limit_part
+from rlacd.merge.merge import united_in_turn
 from rlacd.options.presets import HullLimits
-from rlacd.solid.component import Part
+from rlacd.run import Run, Work
+from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, Hull, limit_hull
-
-
-def excess(outer: Hull, inner: Hull) -> float:
-    """How far a corner of `inner` sticks out of `outer`, by planes pushed out to the outer's own corners."""
-    a, b, c = (outer.vertices[outer.faces[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1)
-    normals = normals[lengths > 0] / lengths[lengths > 0, None]
-    return float(((inner.vertices @ normals.T).max(axis=0) - (outer.vertices @ normals.T).max(axis=0)).max())
+from tests.hulls import assert_same_hulls
+from tests.shapes import box, trimesh_of
 
 
 def exactly_inside(point: np.ndarray, hull: Hull) -> bool:
@@ -39,17 +39,14 @@ def exactly_inside(point: np.ndarray, hull: Hull) -> bool:
     return True
 
 
-def exactly_convex(hull: Hull) -> bool:
-    """Whether every corner lies on or below the plane of every facet, in exact arithmetic."""
-    return all(exactly_inside(point, hull) for point in hull.vertices)
-
-
 def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = None) -> Hull:
     limited = limit_hull(hull, HullLimits(max_vertices, max_faces))
     assert len(limited.vertices) <= (max_vertices or len(hull.vertices))
     assert len(limited.faces) <= (max_faces or len(hull.faces))
     assert len(limited.faces) == 2 * len(limited.vertices) - 4
-    assert excess(limited, hull) < 1e-12 * max(1.0, float(np.abs(limited.vertices).max()))
+    assert Polytope(limited.vertices, limited.faces).height(hull.vertices).max() < 1e-12 * max(
+        1.0, float(np.abs(limited.vertices).max())
+    )
     assert limited.volume >= hull.volume * (1 - 1e-9)
     again = Hull.of(limited.vertices)
     assert len(again.vertices) == len(limited.vertices)
@@ -68,7 +65,7 @@ def test_any_hull_within_any_limit(cloud: np.ndarray, most: int) -> None:
     hull = Hull.of(cloud)
     assume(hull is not None and hull.volume >= 1e-9)
     for limited in (check(hull, max_vertices=most), check(hull, max_faces=most)):
-        assert hull.volume < 1e-6 or exactly_convex(limited)
+        assert hull.volume < 1e-6 or why_not_convex(limited.vertices, limited.faces, exactly=True) is None
 
 
 @pytest.mark.parametrize("thickness", [1e-10, 1e-12, 1e-14])
@@ -79,7 +76,7 @@ def test_what_is_hardly_there_is_held(seed: int, plate: bool, thickness: float) 
     hull = Hull.of(random.uniform(-1, 1, (40, 3)) * [1, 0.8 if plate else thickness, thickness])
     limited = limit_hull(hull, HullLimits(int(random.integers(4, 13))))
     assert len(limited.vertices) <= 12
-    assert exactly_convex(limited)
+    assert why_not_convex(limited.vertices, limited.faces, exactly=True) is None
     middle = hull.vertices.mean(axis=0)
     assert all(exactly_inside(middle + (1 - 1e-9) * (p - middle), limited) for p in hull.vertices)
     assert np.ptp(limited.vertices[:, 2]) < 1e-7
@@ -157,3 +154,83 @@ def test_redundant_corners_stay_if_the_threshold_needs_them() -> None:
     assert limit_part(part, NO_LIMITS, tight) is part
     assert limit_part(part, HullLimits(8), tight).hull.volume == simple.hull.volume
     assert limit_part(part, NO_LIMITS, Concavity(0.05)).hull.volume == simple.hull.volume
+
+
+def cabinet() -> Manifold:
+    rooms = [box((0.02, -0.1, 0.02 + 0.445 * i), (0.88, 0.43, 0.445 + 0.445 * i)) for i in range(4)]
+    return box((0, 0, 0), (0.9, 0.45, 1.8)) - sum(rooms[1:], rooms[0])
+
+
+def drawer() -> Manifold:
+    inside = box((-0.195, -0.145, 0.005), (0.195, 0.145, 0.2))
+    return box((-0.2, -0.15, 0), (0.2, 0.15, 0.12)) - inside + box((-0.22, -0.17, -0.01), (0.22, -0.15, 0.14))
+
+
+def mug() -> Manifold:
+    handle = Manifold.cylinder(0.9, 2.6, 2.6, 24, True) - Manifold.cylinder(1, 1.8, 1.8, 24, True)
+    outside = Manifold.cylinder(9, 4, 4, 24) + handle.rotate((90, 0, 0)).translate((4, 0, 4.5))
+    return outside - Manifold.cylinder(10, 3.7, 3.7, 24).translate((0, 0, 0.4))
+
+
+ACCURACY = 0.001
+"""Of concavities above the threshold: a fiftieth of it."""
+
+CRITERIA: list[tuple[str, dict[str, Any]]] = [
+    ("concavity", {}),
+    ("concavity", {"quality": "fast", "max_vertices": 24}),
+    ("volume", {"criterion": "volume", "volume_tolerance": 0.05, "quality": "fast"}),
+    ("navigable", {"criterion": rlacd.NavigableSpace(0.05, 0.02), "quality": "fast"}),
+]
+
+
+def error(result: rlacd.Decomposition, criterion: str) -> float:
+    entry = result.report[criterion]
+    return float(entry["intrusion"]["max"] if criterion == "navigable" else entry["max"])
+
+
+CASES = [pytest.param(drawer, 8, marks=pytest.mark.slow)]
+CASES += [pytest.param(shape, 39, marks=pytest.mark.nightly) for shape in (cabinet, drawer, mug)]
+
+
+@pytest.mark.parametrize(("shape", "most"), CASES)
+@pytest.mark.parametrize(("criterion", "options"), CRITERIA)
+@pytest.mark.promise("max-hulls")
+def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(
+    shape: Callable[[], Manifold], most: int, criterion: str, options: dict[str, Any]
+) -> None:
+    mesh = trimesh_of(shape())
+    free = rlacd.decompose(mesh, **options)
+    last = np.inf
+    for limit in range(1, most + 1):
+        result = rlacd.decompose(mesh, max_hulls=limit, **options)
+        assert len(result) <= limit
+        assert result.report["hausdorff"]["under"] < 0.005
+        if limit >= len(free):
+            assert_same_hulls(result, free)
+            assert result.report["warnings"] == free.report["warnings"]
+            break
+        worst = error(result, criterion)
+        assert worst <= last + (ACCURACY if criterion == "concavity" else 1e-9)
+        assert worst > error(free, criterion)
+        assert result.report["warnings"], "it says by how much"
+        last = worst
+
+
+def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() -> None:
+    boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(5)]
+
+    def united(work: float) -> list[tuple[int, float, float]]:
+        states = united_in_turn(boxes, Part.glued, Concavity(0.05), Work(work), Run(1))
+        return [(len(parts), sum(part.volume for part in parts), worst) for parts, worst in states]
+
+    every = united(1e9)
+    assert [count for count, _, _ in every] == [5, 4, 3, 2, 1]
+    assert [volume for _, volume, _ in every] == pytest.approx([5] * 5)
+    assert every[0][2] < 0.05 < every[1][2] < every[-1][2]
+    assert [count for count, _, _ in united(0)] == [5]
+
+
+def test_coarser_thresholds_are_tried_where_the_finest_has_used_up_its_account(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rlacd.find_parts.MOST_CUTTING", 3e4)
+    result = rlacd.decompose(trimesh_of(mug()), max_hulls=4, quality="fast")
+    assert error(result, "concavity") < 0.5

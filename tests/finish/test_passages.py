@@ -10,6 +10,7 @@ import trimesh
 from manifold3d import Manifold
 
 import rlacd
+from fuzz.geometry import Polytope, distance_to_union
 from rlacd import _native
 from rlacd.cli.options import decompose_options
 from rlacd.errors import OptionError
@@ -31,13 +32,7 @@ def plate(*bores: Manifold) -> Manifold:
 
 def clearance(hulls: list[trimesh.Trimesh], points: Floats) -> Floats:
     """Distance of each point from the nearest hull, 0 inside, by all its triangles and planes."""
-    least = np.full(len(points), np.inf)
-    for hull in hulls:
-        away = point_to_triangles(points, np.asarray(hull.vertices), np.asarray(hull.faces))
-        a, b, c = (np.asarray(hull.vertices)[hull.faces[:, i]] for i in range(3))
-        outside = (np.einsum("pfi,fi->pf", points[:, None] - a, np.cross(b - a, c - a)) > 0).any(axis=1)
-        least = np.minimum(least, np.where(outside, away, 0.0))
-    return least
+    return distance_to_union(points, [Polytope(np.array(hull.vertices), np.array(hull.faces)) for hull in hulls])
 
 
 def axis(x: float, y: float) -> Floats:
@@ -154,47 +149,6 @@ def test_where_a_limit_forbids_it_a_warning_says_so() -> None:
     report = rlacd.decompose(mesh, keep_open=0.95, max_hulls=2, quality="fast", threads=1).report
     told = ("1 passage narrows by more than --keep-open allows", "limits on the hulls")
     assert any(all(words in said for words in told) for said in report["warnings"])
-
-
-@pytest.mark.slow
-@pytest.mark.promise("keep-open")
-@pytest.mark.parametrize("shape", ["peg_hole", "plate_hole", "carrier"])
-def test_a_peg_falls_through_its_hole_in_mujoco_and_jams_without(shape: str) -> None:
-    """As wide as 0.95 of the hole; it falls freely and starts 1 mm above."""
-    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
-    holes: dict[str, tuple[Manifold, float, list[tuple[float, float]]]] = {
-        "peg_hole": (Manifold.cube((60, 60, 30), True) - bore(10, 0, 0, 128).scale((1, 1, 10)), 10, [(0, 0)]),
-        "plate_hole": (Manifold.cube((100, 60, 10), True) - bore(10, 0, 0).scale((1, 1, 10)), 10, [(0, 0)]),
-        "carrier": (Manifold.cube((120, 80, 40), True), 12, [(x, y) for x in (-30, 30) for y in (-18, 18)]),
-    }
-    solid, radius, places = holes[shape]
-    if shape == "carrier":
-        for x, y in places:
-            solid -= bore(12, x, y).scale((1, 1, 20))
-    mesh = trimesh_of(solid).apply_scale(1e-3)
-
-    def fallen(result: rlacd.Decomposition) -> list[bool]:
-        top = mesh.bounds[1, 2]
-        size, start = 0.95e-3 * radius, top + 1e-3
-        geoms = "".join(f'<geom type="mesh" mesh="h{i}" friction="0.1"/>' for i in range(len(result.hulls)))
-        assets = "".join(
-            f'<mesh name="h{i}" vertex="{" ".join(f"{v:.9g}" for v in np.asarray(hull.vertices).ravel())}"/>'
-            for i, hull in enumerate(result.hulls)
-        )
-        pegs = "".join(
-            f'<body pos="{x * 1e-3} {y * 1e-3} {start + 1.1 * size}"><freejoint/>'
-            f'<geom type="cylinder" size="{size} {1.0 * size}" friction="0.1" mass="0.1"/></body>'
-            for x, y in places
-        )
-        model = mujoco.MjModel.from_xml_string(
-            f'<mujoco><option timestep="0.0005"/><asset>{assets}</asset><worldbody>{geoms}{pegs}</worldbody></mujoco>'
-        )
-        data = mujoco.MjData(model)
-        mujoco.mj_step(model, data, 1000)
-        return [bool(data.qpos[7 * i + 2] < mesh.bounds[0, 2] - size) for i in range(len(places))]
-
-    assert not any(fallen(rlacd.decompose(mesh, quality="fast", threads=1)))
-    assert all(fallen(rlacd.decompose(mesh, keep_open=0.97, quality="fast", threads=1)))
 
 
 def test_a_share_and_a_radius_are_told_apart() -> None:

@@ -1,7 +1,8 @@
-"""A server that does what it is told, well or badly, in whatever process it is."""
+"""A server that does what it is told, well or badly, in whatever process it is, and the processes of pools."""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -10,6 +11,8 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import psutil
 
 from rlacd.errors import OptionError
 from rlacd.pool import Blobs, Shared
@@ -45,3 +48,13 @@ class Obedient:
             raise ZeroDivisionError("a surprise")
         seen = {name: {part: len(blob) for part, blob in given.blobs.items()} for name, given in shared.items()}
         return {"pid": os.getpid(), "echo": values, "shared": seen}, dict(blobs)
+
+
+def pool_processes() -> list[psutil.Process]:
+    """Those that run, the oldest first; not what other tests have left, such as a server of forks."""
+    found = []
+    for child in psutil.Process().children():
+        with contextlib.suppress(psutil.Error):  # it has just ended
+            if "rlacd.pool.child" in child.cmdline():
+                found.append(child)
+    return sorted(found, key=lambda child: (child.create_time(), child.pid))

@@ -19,8 +19,7 @@ import pytest
 from rlacd.errors import OptionError
 from rlacd.pool import Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError, local, open_pool
 from rlacd.pool.local import InProcessPool, LocalPool
-from tests.pool.obedient import SERVER
-from tests.pool.processes import pool_processes
+from tests.pool.obedient import SERVER, pool_processes
 
 pytestmark = pytest.mark.slow
 

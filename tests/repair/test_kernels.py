@@ -1,4 +1,4 @@
-"""The kernels and measures of repair against plain references."""
+"""The kernels and measures of repair against numpy, scipy, trimesh and manifold3d."""
 
 from __future__ import annotations
 
@@ -7,11 +7,19 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
 from scipy import ndimage
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from rlacd import _native
-from rlacd.repair.voxels import Reach, _grown
+from rlacd._native import face_areas, long_normals, signed_tetrahedra
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
+from rlacd.repair.union import unite, volume_of
+from rlacd.repair.voxels import _grown
+from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.topology import Edges, bodies_of, first_of_doubled
 
 BALL = trimesh.creation.icosphere(3)
 VERTICES, FACES = np.array(BALL.vertices), np.array(BALL.faces, dtype=np.int64)
@@ -64,27 +72,150 @@ def test_points_in_a_ball(seed: int, count: int, radius: float) -> None:
     assert found.tolist() == [int(i) for own in expected for i in own]
 
 
-def test_a_search_for_points_ends_at_its_limit() -> None:
-    points = np.zeros((100, 3))
-    _, found = _native.PointTree(points).within(points, np.ones(100), 250)
-    assert len(found) == 300
-    with pytest.raises(ValueError, match="not finite"):
-        _native.PointTree(np.full((1, 3), np.inf))
-    with pytest.raises(ValueError, match="one radius"):
-        _native.PointTree(points).within(points, np.ones(3))
+def soup(seed: int, count: int, faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points, many of them equal, with zeros of both signs; faces, many of them equal or degenerate."""
+    rng = np.random.default_rng(seed)
+    vertices = rng.integers(-1, 2, (count, 3)) * rng.choice([1.0, -1.0], (count, 3))
+    return vertices, rng.integers(0, count, (faces, 3))
 
 
-@given(st.integers(0, 10**6))
-@settings(max_examples=40, deadline=None)
-def test_the_nearest_room(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    room = np.where(random.uniform(size=(9, 10, 11)) < 0.02, random.integers(1, 4, (9, 10, 11)), 0)
-    none = np.zeros(room.shape, dtype=bool)
-    reach = Reach(np.zeros(3), 1.0, 1.5, none, none, room)
-    points = np.argwhere(~none).astype(float)
-    found = reach.rooms_near(points)
-    away = ndimage.distance_transform_edt(room == 0) if room.any() else np.full(room.shape, np.inf)
-    assert ((found > 0) == (away.ravel() <= 3.5)).all()
-    for label in np.unique(found[found > 0]):  # the room is as near as any
-        own = ndimage.distance_transform_edt(room != label).ravel()
-        assert (own[found == label] == away.ravel()[found == label]).all()
+soups = given(st.integers(0, 2**32), st.integers(3, 40), st.integers(0, 80))
+
+
+@settings(max_examples=200, deadline=None)
+@soups
+def test_welding_keeps_first_places_and_one_of_equal_faces(seed: int, count: int, faces: int) -> None:
+    vertices, triangles = soup(seed, count, faces)
+    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    place = first[inverse.reshape(-1)]  # of each vertex, the first vertex there
+    used = np.unique(place[triangles])
+    number = np.searchsorted(used, place)
+    alike: dict[frozenset[int], list[list[int]]] = {}  # faces with the same corners
+    for face in number[triangles].tolist():
+        if len(set(face)) == 3:
+            alike.setdefault(frozenset(face), []).append(face)
+
+    def windings(group: list[list[int]]) -> list[int]:
+        return [round(np.linalg.det(np.eye(3)[np.argsort(face)])) for face in group]
+
+    kept, films = {}, set()
+    for corners, group in alike.items():
+        net = sum(windings(group))
+        kept[corners] = next(face for face, sign in zip(group, windings(group), strict=True) if sign * net >= 0)
+        films |= {corners} if net == 0 else set()
+    found, faces_found, is_film = _native.weld(vertices, triangles)
+    assert np.array_equal(found, vertices[used])
+    assert not np.signbit(found[found == 0]).any()
+    assert sorted(faces_found.tolist()) == sorted(kept.values())
+    assert [frozenset(face) in films for face in faces_found.tolist()] == is_film.tolist()
+
+
+@settings(max_examples=50, deadline=None)
+@soups
+def test_edges_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: int) -> None:
+    """Edges are the distinct pairs in ascending order; bodies share them and are numbered by their first faces."""
+    _, triangles = soup(seed, count, faces)
+    vertices, edges = np.random.default_rng(seed).normal(size=(count, 3)), Edges.of(triangles, count)
+    pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    distinct, inverse, valence = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    assert np.array_equal(edges.vertices, distinct)
+    assert np.array_equal(edges.of_halfedge, inverse.reshape(-1))
+    assert np.array_equal(edges.valence, valence)
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    assert np.array_equal(np.flatnonzero(first_of_doubled(triangles, count)), np.sort(first))
+    number, body = bodies_of(triangles, edges)
+    assert (np.diff(np.unique(body, return_index=True)[1]) > 0).all()
+    edge = edges.of_halfedge.reshape(-1, 3)
+    shares = (edge[:, None, :, None] == edge[None, :, None, :]).any(axis=(2, 3))
+    expected, same = connected_components(shares, directed=False)
+    assert number == expected
+    assert len(np.unique(np.stack([body, same]), axis=1).T) == number
+    corners = vertices[triangles]
+    np.testing.assert_allclose(face_areas(vertices, triangles), trimesh.triangles.area(corners), atol=1e-14)
+    np.testing.assert_allclose(signed_tetrahedra(vertices, triangles), np.linalg.det(corners) / 6, atol=1e-14)
+    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    assert np.array_equal(long_normals(vertices, triangles), np.cross(along, across))
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
+    np.testing.assert_allclose(_native.longest_edges(vertices, triangles), longest, rtol=1e-14)
+
+
+def test_indices_out_of_range_are_refused() -> None:
+    with pytest.raises(ValueError, match="out of range"):
+        _native.weld(np.zeros((3, 3)), np.array([[0, 1, 3]]))
+    with pytest.raises(ValueError, match="out of range"):
+        _native.edges(np.array([[0, 1, -1]]), 3)
+    with pytest.raises(ValueError, match="out of range"):
+        _native.components(2, np.array([0]), np.array([2]))
+
+
+def shapes() -> dict[str, trimesh.Trimesh]:
+    box = trimesh.creation.box()
+    there = box.copy().apply_translation([3, 0, 0])
+    touching = trimesh.Trimesh(box.vertices, box.faces)
+    touching = trimesh.util.concatenate([touching, box.copy().apply_translation([1, 1, 1])])
+    touching.merge_vertices()  # two boxes that share a corner
+    return {
+        "box": box,
+        "ball": trimesh.creation.icosphere(3),
+        "torus": trimesh.creation.torus(1, 0.3),
+        "two": trimesh.util.concatenate([box, there]),
+        "open": trimesh.Trimesh(box.vertices, box.faces[1:]),
+        "one turned": trimesh.Trimesh(box.vertices, np.concatenate([box.faces[:1, ::-1], box.faces[1:]])),
+        "touching": touching,
+        "inside out": trimesh.Trimesh(box.vertices, box.faces[:, ::-1]),
+    }
+
+
+@pytest.mark.parametrize("name", shapes())
+def test_closed_bodies_of_shapes(name: str) -> None:
+    mesh = shapes()[name]
+    vertices, faces, _ = _native.weld(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces))
+    found = _native.closed_bodies(vertices, faces)
+    if name in ("open", "one turned"):
+        assert found is None
+        return
+    body, volume, area, box, has_no_pinch, least_height, least_fold = found
+    parts = mesh.split(only_watertight=False) if name in ("two", "touching") else [mesh]
+    assert len(volume) == len(parts) == body.max() + 1
+    for i, part in enumerate(parts):
+        assert volume[i] == pytest.approx(part.volume)
+        assert area[i] == pytest.approx(part.area)
+        np.testing.assert_allclose(box[i].reshape(2, 3), part.bounds)
+        assert (body == i).sum() == len(part.faces)
+    assert has_no_pinch == (name != "touching")
+    assert least_fold == pytest.approx(2 * np.cos(mesh.face_adjacency_angles / 2).min())
+    sides = np.linalg.norm(np.diff(mesh.triangles[:, [0, 1, 2, 0]], axis=1), axis=2)
+    assert least_height == pytest.approx((2 * mesh.area_faces / sides.max(axis=1)).min())
+
+
+@pytest.mark.parametrize("sliver", [1e-13, 1e-11])
+def test_a_mesh_that_manifold3d_would_change_is_left_to_it(sliver: float) -> None:
+    ball = trimesh.creation.icosphere(2)
+    vertices = np.asarray(ball.vertices).copy()
+    a, b = ball.edges_unique[0]
+    vertices[b] = vertices[a] + [sliver, 0, 0]
+    solid = repair(InputMesh(vertices, np.asarray(ball.faces, dtype=np.int64), "ball", ()))
+    assert isinstance(solid.shape, Manifold)
+    assert solid.manifold.volume() == pytest.approx(_native.mesh_volume(vertices, np.asarray(ball.faces, np.int32)))
+
+
+def test_windings_decide_where_rounding_folds_a_closed_surface() -> None:
+    def wall(x: float, y: float, z: float) -> float:
+        s, c = np.sin(4 * np.array([x, y, z])), np.cos(4 * np.array([x, y, z]))
+        return float(min(0.35 - abs(s @ np.roll(c, -1)), 0.98 - max(abs(x), abs(y), abs(z))))
+
+    body = Manifold.level_set(wall, [-1, -1, -1, 1, 1, 1], 0.1).to_mesh64()
+    rounded = np.asarray(body.vert_properties[:, :3], dtype=np.float32).astype(float)
+    exact, solid = Manifold(body).volume(), repair(load_mesh((rounded, body.tri_verts)))
+    assert solid.manifold.volume() / solid.frame.scale**3 == pytest.approx(exact, rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_union_does_not_depend_on_the_order_of_solids(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    solids = [
+        Manifold.sphere(0.3 + rng.random(), 8 + 40 * int(rng.integers(8))).translate(rng.random(3)) for _ in range(12)
+    ]
+    volume = volume_of(unite(solids, keep_cavities=True))
+    assert volume == pytest.approx(Manifold.batch_boolean(solids, OpType.Add).volume(), rel=1e-9)
+    assert volume_of(unite(solids[::-1], keep_cavities=True)) == pytest.approx(volume, rel=1e-9)

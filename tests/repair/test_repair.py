@@ -1,4 +1,6 @@
-"""Any soup gives one closed solid, by the least change."""
+"""Any soup gives one closed solid by the least change, however finely it is divided, and with a little noise."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
@@ -8,19 +10,16 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from rlacd import _native
+import rlacd
 from rlacd.io.read.load import load_mesh
-from rlacd.repair.cracks import close_cracks, free_edges
-from rlacd.repair.distance import points_covering
-from rlacd.repair.holes import HOLE
+from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import Edges, IntArray
-from tests.repair.repaired import BOX, check_closed, join, moved, solid_of, steps, volume
+from tests.repair.repaired import BOX, check_closed, join, moved, solid_of, steps, volume, without
+from tests.scripts import script
 
 
 def soup(mesh):
@@ -84,65 +83,52 @@ def test_overlapping_boxes_have_the_volume_of_their_union(seed):
     assert steps(solid) == ["closed"] * 3
 
 
-def test_doubled_faces_in_both_orientations_are_one_box():
-    mesh = join(BOX, BOX, trimesh.Trimesh(BOX.vertices, BOX.faces[:, ::-1], process=False))
-    solid = solid_of(mesh)
-    assert volume(solid) == pytest.approx(8)
-    assert len(solid.surface[1]) == 12
+def sides(gap=0.0):
+    """The six sides of a box, each moved outwards."""
+    found = [BOX.submesh([np.flatnonzero(BOX.face_normals @ n > 0.9)], append=True) for n in (*np.eye(3), *-np.eye(3))]
+    return [moved(side, *(gap * side.face_normals[0])) for side in found]
 
 
-@pytest.mark.parametrize("offset", [(2, 2, 0), (2, 2, 2), (2, 0, 0)], ids=["edge", "vertex", "face"])
-def test_boxes_that_touch_stay_two_boxes_worth(offset):
-    solid = solid_of(join(BOX, moved(BOX, *offset)))
-    assert volume(solid) == pytest.approx(16)
-    assert max(body.deviation for body in solid.bodies) < 1e-9
-
-
-def test_six_separate_sides_make_one_box():
-    sides = [
-        BOX.submesh([np.flatnonzero(BOX.face_normals @ n > 0.9)], append=True)
-        for n in np.vstack([np.eye(3), -np.eye(3)])
-    ]
-    assert volume(solid_of(join(*sides))) == pytest.approx(8)
-    gap = 0.004  # sides that do not quite touch
-    apart = [moved(side, *(gap * side.face_normals[0])) for side in sides]
-    solid = solid_of(join(*apart))
-    assert volume(solid) == pytest.approx(8 * (1 + gap) ** 3, rel=0.05)
-    assert max(body.deviation for body in solid.bodies) < 2 * DEFAULT_GAP
-
-
-def test_a_crack_and_a_t_junction_are_welded():
+def cracked():
     mesh = soup(BOX)
-    jitter = np.random.default_rng(0).uniform(-1e-5, 1e-5, mesh.vertices.shape)
-    assert volume(solid_of(trimesh.Trimesh(mesh.vertices + jitter, mesh.faces, process=False))) == pytest.approx(
-        8, rel=1e-3
-    )
-    # One face of the box split at the middle of an edge that its neighbour keeps whole.
-    vertices, faces = BOX.vertices.tolist(), BOX.faces.tolist()
-    a, b, c = faces.pop(0)
-    vertices.append(((BOX.vertices[a] + BOX.vertices[b]) / 2).tolist())
-    faces += [[a, 8, c], [8, b, c]]
-    solid = solid_of((vertices, faces))
-    assert volume(solid) == pytest.approx(8)
-    assert steps(solid) == ["welded"]
+    mesh.vertices += np.random.default_rng(0).uniform(-1e-5, 1e-5, mesh.vertices.shape)
+    return mesh
 
 
-def test_planks_that_touch_along_faces_that_do_not_match():
-    planks = [trimesh.creation.box(bounds=[[i, 0, 0], [i + 1, 3 + i % 2, 1]]) for i in range(4)]
-    mesh = join(*planks)
+def t_junction():
+    """One face of the box is split at the middle of an edge that its neighbour keeps whole."""
+    a, b, c = BOX.faces[0]
+    vertices = np.vstack([BOX.vertices, (BOX.vertices[a] + BOX.vertices[b]) / 2])
+    return trimesh.Trimesh(vertices, np.vstack([BOX.faces[1:], [a, 8, c], [8, b, c]]), process=False)
+
+
+def planks():
+    mesh = join(*(trimesh.creation.box(bounds=[[i, 0, 0], [i + 1, 3 + i % 2, 1]]) for i in range(4)))
     mesh.merge_vertices()
-    assert volume(solid_of(mesh)) == pytest.approx(3 + 4 + 3 + 4)
+    return mesh
 
 
-@pytest.mark.nightly
-def test_the_quick_corpus(corpus):
-    """Every real mesh gives a closed solid whose surface is near the input's, and all of the input is on or in it."""
-    allowed = {"test/vhacd/bunny.ply": HOLE}
-    for name in (corpus / "quick.txt").read_text().split():
-        solid = repair(load_mesh(corpus / name))
-        check_closed(solid)
-        worst = max(body.deviation for body in solid.bodies)
-        assert worst <= allowed.get(name, 0.05), name
+WHOLE = {
+    "faces doubled both ways": (join(BOX, BOX, trimesh.Trimesh(BOX.vertices, BOX.faces[:, ::-1])), 8, 1e-6, 1e-9),
+    "boxes that share an edge": (join(BOX, moved(BOX, 2, 2, 0)), 16, 1e-6, 1e-9),
+    "boxes that share a vertex": (join(BOX, moved(BOX, 2, 2, 2)), 16, 1e-6, 1e-9),
+    "boxes that share a face": (join(BOX, moved(BOX, 2, 0, 0)), 16, 1e-6, 1e-9),
+    "six separate sides": (join(*sides()), 8, 1e-6, 1e-9),
+    "six sides that do not quite touch": (join(*sides(0.004)), 8 * 1.004**3, 0.05, 2 * DEFAULT_GAP),
+    "corners that do not quite meet": (cracked(), 8, 1e-3, 1e-4),
+    "a T-junction": (t_junction(), 8, 1e-6, 1e-9),
+    "planks whose faces do not match": (planks(), 3 + 4 + 3 + 4, 1e-6, 1e-9),
+}
+
+
+@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.promise("repair-keeps")
+def test_what_is_meant_to_be_solid_is_so_by_a_small_change(name):
+    mesh, expected, rel, most = WHOLE[name]
+    solid = solid_of(mesh)
+    assert volume(solid) == pytest.approx(expected, rel=rel)
+    assert max(body.deviation for body in solid.bodies) <= most
+    assert len(solid.surface[1]) == 12 or name != "faces doubled both ways"
 
 
 FOLDED = (
@@ -185,42 +171,75 @@ def test_points_cover_every_face_and_share_corners(spacing: float) -> None:
         assert len(points) < len(vertices) + 50
 
 
-TOLERANCES = (2e-5, 5e-4)
+def noisy_copy(corpus, name):
+    """The mesh, and a copy of some 10,000 faces or more that is displaced by 0.001 of half the longest side."""
+    mesh = trimesh.load(corpus / name, force="mesh", process=False)
+    return mesh, script(corpus / "dense.py").densify(mesh.copy(), 10_000, 0.001)
 
 
-def cracked(mesh: trimesh.Trimesh, seed: int, cut: float, missing: float) -> tuple[FloatArray, IntArray]:
-    """Some faces get corners of their own, a little away; some are split on one side only; some are missing."""
-    rng = np.random.default_rng(seed)
-    faces = np.array(mesh.faces, dtype=np.int64)
-    vertices = np.array(mesh.vertices)
-    apart = np.flatnonzero(rng.random(len(faces)) < cut)
-    own = vertices[faces[apart]].reshape(-1, 3)
-    own = own + rng.choice([0, 1e-5, 3e-4, 2e-3], (len(own), 1)) * rng.normal(size=own.shape)
-    faces[apart] = len(vertices) + np.arange(len(own)).reshape(-1, 3)
-    vertices = np.concatenate([vertices, own])
-    whole = np.flatnonzero(rng.random(len(faces)) < cut)
-    a, b, c = faces[whole].T
-    middle = len(vertices) + np.arange(len(whole))
-    vertices = np.concatenate([vertices, (vertices[a] + vertices[b]) / 2])
-    faces[whole] = np.stack([a, middle, c], axis=1)
-    faces = np.concatenate([faces, np.stack([middle, b, c], axis=1)])
-    faces = faces[rng.random(len(faces)) >= missing]
-    points, welded, _ = _native.weld(vertices, rng.permutation(faces))
-    return points, welded.astype(np.int64)
+def finely(mesh, times, noise=0.0):
+    """Every triangle divided into four, so many times, and all vertices displaced a little."""
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    mesh.merge_vertices()
+    for _ in range(times):
+        mesh = mesh.subdivide()
+    shift = np.random.default_rng(0).normal(0, noise, mesh.vertices.shape) if noise else 0
+    return trimesh.Trimesh(mesh.vertices + shift, mesh.faces, process=False)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_cracks_are_closed(seed: int) -> None:
-    ball = trimesh.creation.icosphere(3)
-    vertices, faces = cracked(ball, seed, 0.05, 0.0)
-    before = len(free_edges(faces, Edges.of(faces, len(vertices))))
-    found, _ = close_cracks(vertices, faces, Edges.of(faces, len(vertices)), (*TOLERANCES, 2e-2))
-    left = len(free_edges(found, Edges.of(found, len(vertices))))
-    assert left < before / 4
+def box_with_room():
+    """A box, and on it a room of sheets, half as high, with a slit in its roof and eaves: 8 + 4 units of volume."""
+    x, top = [-1, -0.01, 0.01, 1], 2.0
+    roof = [(a, y, top) for y in (-1, 1) for a in x]
+    eaves = [(2, y, top) for y in (-1, 1)]
+    floor = [(a, y, 1.0) for y in (-1, 1) for a in (-1, 1)]
+    quads = [[0, 1, 5, 4], [2, 3, 7, 6], [0, 4, 10, 8], [3, 9, 11, 7], [3, 12, 13, 7]]
+    fans = [[8, 0, 1], [8, 1, 2], [8, 2, 9], [9, 2, 3], [10, 5, 4], [10, 6, 5], [10, 11, 6], [11, 7, 6]]
+    faces = [t for a, b, c, d in quads for t in ([a, b, c], [a, c, d])] + fans
+    return join(BOX, trimesh.Trimesh([*roof, *floor, *eaves], faces, process=False))
 
 
-def test_a_body_that_crosses_itself_is_a_result():
-    twisted = SHAPES["ring"].copy()
-    twisted.vertices[:, 0] *= np.sign(twisted.vertices[:, 1]) * 0.9 + 0.1
-    solid = solid_of(twisted)
-    assert solid.manifold.num_tri() > 0
+@pytest.mark.parametrize(("times", "noise"), [(0, 0.0), (4, 0.0), (4, 1e-3)])
+def test_a_room_of_sheets_on_a_box_is_filled_and_the_box_stays(times, noise):
+    mesh = finely(box_with_room(), times, noise)
+    solid = solid_of(mesh)
+    assert volume(solid) == pytest.approx(12, rel=0.02)
+    query, there = SurfaceQuery(*to_arrays(solid.shape)), solid.frame.to_frame(mesh.vertices)
+    assert query.distance(there)[~query.inside(there)].max(initial=0) <= 1e-3
+
+
+@pytest.mark.parametrize("times", [0, 2])
+def test_a_capped_body_whose_faces_cross_at_an_edge_is_solid(times):
+    """Two wedges share an edge and overlap by a hair: the angles around it join the inside with the outside."""
+    angles = np.radians([0, 30, 29.9, 60])
+    rays = [(np.cos(a), np.sin(a)) for a in angles]
+    corners = [(0, 0, z) for z in (0, 1)] + [(x, y, z) for x, y in rays for z in (0, 1)]
+    wedge = [[0, 2, 3], [0, 3, 1], [0, 5, 4], [0, 1, 5], [2, 4, 5], [2, 5, 3], [0, 4, 2], [1, 3, 5]]
+    faces = wedge + [[i if i < 2 else i + 4 for i in face] for face in wedge]
+    closed = finely(trimesh.Trimesh(corners, faces, process=False), times)
+    far = int(np.argmax(closed.triangles_center @ (1, 0, 0)))
+    solid = solid_of(without(closed, far))
+    assert volume(solid) == pytest.approx(np.sin(np.radians(30)), rel=0.02)
+
+
+LOST = [
+    *("test/capod/class5__m54.ply", "test/capod/class5__m55.ply", "test/capod/class5__m58.ply"),  # plants, wrapped
+    "train/kenney_cc0/space_kit__spaceCraft1.ply",  # films around a room that is filled
+    "test/gazebo_models/speed_limit_sign__speed_limit_sign.ply",  # caps turn it inside out in places
+    "train/kenney_cc0/furniture_pack__cabinetBedDrawer.ply",  # its first skin leads away from it
+]
+CROSSING = [f"test/ikea_assembled/{name}.ply" for name in ("bed_dalselv_0270", "bookcase_hensvik_0565")]
+CROSSING += [f"test/ikea_assembled/cabinet_akurum_{name}.ply" for name in ("0011", "0021")]
+CROSSING += ["test/vhacd/hornbug.ply", "train/kenney_cc0/furniture_pack__kitchenCabinetUpper.ply"]
+CROSSING += ["train/kaykit_cc0/restaurant__crate_ham.ply"]
+"""Noisy copies of these have skins that cross themselves."""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", [*LOST, *CROSSING])
+@pytest.mark.promise("covered")
+def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name):
+    report = rlacd.decompose(noisy_copy(corpus, name)[1] if name in CROSSING else corpus / name, quality="fast").report
+    assert report["hausdorff"]["under"] <= 1e-3
+    assert report["concavity"]["max"] <= 0.0501
+    assert max(body["deviation"] for body in report["repair"]) < 0.03

@@ -1,16 +1,36 @@
-"""How many threads run: as many as were asked for, in whichever thread or process they start."""
+"""A run: its threads, its account of work, which is the same for any number of them, its memory, `RLACD_TRACE`."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import threading
+import time
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+import psutil
 import pytest
+import trimesh
+from benchmarks.replay import Cost, Step, replayed, steps_of
+from hypothesis import given
+from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
 
-from rlacd.run import Run, available_cpus
+import rlacd
+from rlacd import cut_and_merge, memory
+from rlacd.errors import MeshDataError
+from rlacd.io.read.load import load_mesh
+from rlacd.repair.repair import repair
+from rlacd.run import Run, Work, available_cpus
+from tests.hulls import assert_same_hulls
+from tests.shapes import box, trimesh_of
+from tests.shapes_large import screws, sponge
 
 ON_LINUX = sys.platform.startswith("linux")
 
@@ -48,8 +68,12 @@ def test_as_many_workers_as_the_process_may_use() -> None:
 
 
 def test_results_come_in_the_order_of_the_items() -> None:
+    def late(item: int) -> int:
+        time.sleep(0.02 if item % 3 == 0 else 0)  # those after it are done earlier
+        return item * item
+
     with Run(3) as run:
-        assert run.map(lambda x: x * x, range(100)) == [x * x for x in range(100)]
+        assert run.map(late, range(30)) == [item * item for item in range(30)]
 
 
 def test_items_do_not_wait_behind_what_was_begun_before() -> None:
@@ -69,3 +93,141 @@ def test_one_thread_does_what_was_begun_when_it_is_asked_for() -> None:
         run.result(second)
         run.drop([first])
     assert done == [1]
+
+
+PRICES = st.lists(st.floats(0, 50), max_size=40)
+
+
+@given(st.floats(0, 200), PRICES)
+def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> None:
+    work = Work(most)
+    paid = [price for price in prices if work.pay(price)]
+    assert sum(paid) <= work.done <= most
+    assert work.is_spent == (len(paid) < len(prices))
+    assert paid == prices[: len(paid)]  # once something was refused, so is all that follows
+
+
+@given(st.floats(0, 200), st.floats(0, 200), PRICES)
+def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: list[float]) -> None:
+    run = Run(1).alone(most)
+    with run.limited(units, cuts="cut"):
+        for price in prices:
+            run.work.pay(price)
+        spent, used_up = run.work.done, run.work.is_spent
+        assert spent <= units
+    assert run.work.done == spent <= most
+    assert not run.work.is_spent
+    assert run.cut_short == ({"cut"} if used_up else set())
+
+
+def crossing() -> Any:
+    return screws(60, sides=6)
+
+
+def grate() -> trimesh.Trimesh:
+    holes = [box((i, j, -1), (i + 0.7, j + 0.7, 1)) for i in range(6) for j in range(6)]
+    return trimesh_of(box((-0.3, -0.3, 0), (6, 6, 0.2)) - Manifold.batch_boolean(holes, OpType.Add))
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [pytest.param(grate, marks=pytest.mark.slow), pytest.param(lambda: sponge(2), marks=pytest.mark.slow), crossing],
+)
+@pytest.mark.promise("bounded")
+def test_the_default_stays_within_its_account(shape: Callable[[], Any]) -> None:
+    solid = shape()
+    one, three = (rlacd.decompose(solid, threads=threads) for threads in (1, 3))
+    fast = rlacd.decompose(solid, quality="fast")
+    search = one.report["search"]
+    assert 0 < search["work"] <= search["allowed"]
+    assert search["work"] == three.report["search"]["work"]
+    assert len(one) <= len(fast)
+    assert_same_hulls(one, three)
+
+
+@pytest.mark.slow
+def test_a_pass_whose_merging_is_cut_short_meets_the_threshold_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    solid = sponge(2)
+    whole = rlacd.decompose(solid, quality="fast")
+    monkeypatch.setattr(cut_and_merge, "MOST_MERGING", 1e5)
+    short = rlacd.decompose(solid, quality="fast")
+    assert len(short) > len(whole)
+    assert short.report["concavity"]["max"] <= 0.05
+    for result, expected in ((whole, False), (short, True)):
+        assert any("merging stopped" in warning for warning in result.report["warnings"]) == expected
+
+
+def tasks(count: int, locked: float, unlocked: float) -> list[Step]:
+    return [Step("map", [Cost(locked, unlocked, 0.0, 0.0, 50)] * count)]
+
+
+@pytest.mark.parametrize(("threads", "seconds"), [(1, 8.0), (2, 4.0), (8, 1.0), (16, 1.0)])
+def test_what_needs_no_lock_is_divided_among_the_cores(threads: int, seconds: float) -> None:
+    assert replayed(tasks(8, 0.0, 1.0), threads) == pytest.approx(seconds, rel=0.01)
+
+
+def test_a_trace_holds_the_work_of_all_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    torus = trimesh.creation.torus(1.0, 0.4, major_sections=24, minor_sections=12)
+    monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "missing" / "torus.json"))
+    with pytest.raises(rlacd.OutputError, match="correct RLACD_TRACE"):
+        rlacd.decompose(torus, progress=lambda _: pytest.fail("work was begun"))
+    monkeypatch.setenv("RLACD_TRACE", str(tmp_path / "torus.json"))
+    rlacd.decompose(torus, threads=2)
+    spans = json.loads((tmp_path / "torus.json").read_text())["traceEvents"]
+    (whole,) = (span for span in spans if span["cat"] == "run")
+    assert {"repair", "cut", "merge", "search", "measure"} <= {s["name"] for s in spans if s["cat"] == "stage"}
+    assert all(whole["ts"] <= s["ts"] and s["ts"] + s["dur"] <= whole["ts"] + whole["dur"] + 1 for s in spans)
+    assert len({span["tid"] for span in spans}) in (2, 3)
+    steps = list(steps_of(spans))
+    used = sum(c.locked + c.unlocked - c.in_loops + c.of_loops for step in steps for c in step.costs)
+    assert replayed(steps, 1) == pytest.approx(used, rel=0.1)
+    assert used / 2 <= replayed(steps, 2) < used
+
+
+def test_what_is_left_is_no_more_than_the_machine_has() -> None:
+    assert 0 < memory.memory_left() <= psutil.virtual_memory().total
+
+
+@pytest.mark.parametrize("kind", ["ply", "stl", "obj"])
+def test_a_file_that_declares_too_much_is_refused_before_it_is_parsed(kind: str, tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / f"ball.{kind}"
+    ball = trimesh.creation.icosphere(3)
+    ball.export(path)
+    monkeypatch.setattr(memory, "_UNQUESTIONED", 0)
+    monkeypatch.setattr(memory, "memory_left", lambda: len(ball.faces) * memory.BYTES_READ - 1)
+    monkeypatch.setattr(np, "frombuffer", lambda *_, **__: pytest.fail("it was parsed"))
+    with pytest.raises(
+        MeshDataError, match=r"ball\.\w+ has 1,280 triangles, which need about 0\.0 GB of memory"
+    ) as error:
+        load_mesh(path)
+    assert "simplify it first" in str(error.value)
+
+
+def test_a_closed_mesh_needs_less_than_one_that_has_to_be_repaired(monkeypatch) -> None:
+    ball = trimesh.creation.icosphere(3)
+    monkeypatch.setattr(memory, "_UNQUESTIONED", 0)
+    monkeypatch.setattr(memory, "memory_left", lambda: len(ball.faces) * memory.BYTES_READ)
+    assert repair(load_mesh(ball)).bodies[0].step == "closed"
+    opened = load_mesh((ball.vertices, ball.faces[1:]))
+    with pytest.raises(MeshDataError, match="1,279 triangles"):
+        repair(opened)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_control_groups_limit_what_is_left(version: int, tmp_path: Path, monkeypatch) -> None:
+    names = ["memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"]
+    names = ["memory.max", "memory.current", "inactive_file"] if version == 2 else names
+    root = tmp_path / "memory" if version == 1 else tmp_path
+    group = root / "outer" / "inner"
+    group.mkdir(parents=True)
+    for folder, limit in ((group, "max" if version == 2 else str(2**63)), (group.parent, "1000000")):
+        (folder / names[0]).write_text(limit + "\n")
+        (folder / names[1]).write_text("900000\n")
+        (folder / "memory.stat").write_text(f"cache 5\n{names[2]} 40000\n")
+    line = "0::/outer/inner" if version == 2 else "4:cpu,memory:/outer/inner"
+    read = Path.read_text
+    monkeypatch.setattr(memory, "_CGROUPS", tmp_path)
+    monkeypatch.setattr(
+        Path, "read_text", lambda self, *a, **k: line if str(self) == "/proc/self/cgroup" else read(self, *a, **k)
+    )
+    assert memory.memory_left() == 140_000

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -20,8 +21,9 @@ from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.run import Run
 from rlacd.solid.cover import MOST_HULLS, cover
-from rlacd.solid.distance import hull_distances
-from tests.hulls import assert_covers
+from rlacd.solid.distance import hull_distances, hull_union
+from rlacd.solid.hull import Hull
+from tests.hulls import assert_covers, assert_same_hulls
 from tests.shapes_large import LARGE, Mesh, boxes, bristles, noisy_ball, screws, sheet, spiked_ball, sponge, terrain
 
 SMALL: dict[str, Mesh] = {
@@ -58,58 +60,45 @@ def polls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return wanted
 
 
-def stops(most: int, ratio: float = 1.7) -> list[int]:
-    """Polls to stop at: close together in the beginning, where the stages change quickly."""
-    return [round(ratio**k) for k in range(60) if ratio**k < most]
+WHOLE = {"quality": "balanced", "search_steps": 4}
+STAGES_OF_THEIR_OWN = [
+    {"max_hulls": 3},
+    {"max_vertices": 8, "max_faces": 12},
+    {"max_vertices": 5},
+    {"criterion": rlacd.NavigableSpace(0.05, 0.05)},
+    {"merge": False},
+    {"threshold_abs": 0.05},
+    {"quality": "fast", "threads": 3},
+]
 
 
 @pytest.mark.parametrize(
-    ("name", "ratio"),
-    [pytest.param(name, 4, marks=pytest.mark.slow) if name in LONG else (name, 2.5) for name in SMALL]
-    + [pytest.param(name, 1.7, marks=pytest.mark.nightly) for name in SMALL],
+    ("name", "ratio", "options"),
+    [pytest.param(n, 4, WHOLE, marks=pytest.mark.slow) if n in LONG else (n, 2.5, WHOLE) for n in SMALL]
+    + [pytest.param(name, 1.7, WHOLE, marks=pytest.mark.nightly) for name in SMALL]
+    + [
+        pytest.param("screws", 8.4, options, marks=pytest.mark.slow, id=str(options)) for options in STAGES_OF_THEIR_OWN
+    ],
 )
 @pytest.mark.promise("timeout")
-def test_stopped_at_any_poll_the_hulls_cover_the_input(polls: list[int], name: str, ratio: float) -> None:
+def test_stopped_at_any_poll_the_hulls_cover_the_input(
+    polls: list[int], name: str, ratio: float, options: dict[str, Any]
+) -> None:
+    """At polls close together in the beginning, where the stages change quickly, until it comes to its end."""
     stages = set()
-    for number in stops(10**7, ratio):
+    for number in (round(ratio**k) for k in itertools.count()):
         polls[:] = [number]
-        result = rlacd.decompose(SMALL[name], threads=1, quality="balanced", search_steps=4)
+        result = rlacd.decompose(SMALL[name], **{"threads": 1, **options})
         if result.report["stopped_by"] is None:
             break
+        assert number < 10**7, "it never comes to its end"
         assert not result.report["complete"]
         assert any("early" in sentence for sentence in result.report["warnings"])
         assert_covers(result, *SMALL[name])
-        stages |= {stage for stage in result.report["seconds"]}
-    else:
-        pytest.fail("it never came to its end")
-    assert {"repair", "cut"} <= stages
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"max_hulls": 3},
-        {"max_vertices": 8, "max_faces": 12},
-        {"max_vertices": 5},
-        {"criterion": rlacd.NavigableSpace(0.05, 0.05)},
-        {"merge": False},
-        {"threshold_abs": 0.05},
-        {"quality": "fast", "threads": 3},
-    ],
-    ids=str,
-)
-def test_stopped_with_options_that_have_stages_of_their_own(polls: list[int], options: dict[str, object]) -> None:
-    mesh = SMALL["screws"]
-    for number in stops(10**7)[::4]:
-        polls[:] = [number]
-        result = rlacd.decompose(mesh, **{"threads": 1, **options})  # type: ignore[arg-type]
-        if result.report["stopped_by"] is None:
-            break
-        assert_covers(result, *mesh)
-        for limit in ("max_vertices", "max_faces"):
-            count = max(len(hull.vertices if limit == "max_vertices" else hull.faces) for hull in result)
-            assert count <= options.get(limit, count)  # type: ignore[operator]
+        stages |= set(result.report["seconds"])
+        assert max(len(hull.vertices) for hull in result) <= options.get("max_vertices", np.inf)
+        assert max(len(hull.faces) for hull in result) <= options.get("max_faces", np.inf)
+    assert {"repair", "cut"} <= stages or options is not WHOLE
 
 
 def test_a_stop_that_never_comes_changes_no_bit(polls: list[int]) -> None:
@@ -117,10 +106,7 @@ def test_a_stop_that_never_comes_changes_no_bit(polls: list[int]) -> None:
     plain = rlacd.decompose(mesh)
     polls[:] = [10**12]
     for result in (rlacd.decompose(mesh), rlacd.decompose(mesh, timeout=1e6, progress=lambda _: None)):
-        assert len(result) == len(plain)
-        for hull, other in zip(result, plain, strict=True):
-            assert hull.vertices.tobytes() == other.vertices.tobytes()
-            assert hull.faces.tobytes() == other.faces.tobytes()
+        assert_same_hulls(plain, result)
 
 
 def test_hulls_of_bodies_that_had_no_repair_hold_them() -> None:
@@ -170,18 +156,10 @@ def test_a_timeout_ends_the_work_however_large_the_input(name: str) -> None:
     # The step that notices the timeout is the last: see `python -m benchmarks late`.
     assert sum(step.seconds > 1.0 for step in seen) <= 1
     assert result.report["stopped_by"] == "timeout"
-    # All corners: for the surface between them there is no time here either.
-    corners = mesh[0][:: max(1, len(mesh[0]) // 2000)]
-    left = np.ones(len(corners), dtype=bool)
-    slack = 2e-3 * np.ptp(mesh[0], axis=0).max()
-    for hull in result:
-        lower, upper = hull.bounds
-        some = np.flatnonzero(left & (corners >= lower - slack).all(axis=1) & (corners <= upper + slack).all(axis=1))
-        height = np.einsum("pj,fj->pf", corners[some], hull.face_normals) - np.einsum(
-            "fj,fj->f", hull.triangles[:, 0], hull.face_normals
-        )
-        left[some[(height <= slack).all(axis=1)]] = False
-    assert not left.any()
+    # Corners: for the surface between them there is no time here either.
+    corners = np.ascontiguousarray(mesh[0][:: max(1, len(mesh[0]) // 2000)], dtype=np.float64)
+    union = hull_union([hull for part in result if (hull := Hull.of(part.vertices))], 1)
+    assert union.distance(corners, 1).max() <= 2e-3 * np.ptp(mesh[0], axis=0).max()
 
 
 @pytest.mark.slow
@@ -248,8 +226,21 @@ def test_a_stop_ends_with_its_decomposition() -> None:
     assert _native.seconds_left() == float("inf")
 
 
-AT_WORK = 4.0
-"""CPU seconds after which the libraries are loaded and the mesh is read: these shapes take many more."""
+def interrupted(name: str, handler: str, seconds: float, times: int, *words: str, folder: Path) -> int:
+    """Exit code of the command that gets Ctrl-C so many times after so many CPU seconds."""
+    trimesh.Trimesh(*LARGE[name](), process=False).export(folder / "mesh.ply")
+    code = f"import signal; signal.signal(signal.SIGINT, signal.{handler}); from rlacd.cli.main import main; main()"
+    with subprocess.Popen([sys.executable, "-c", code, "decompose", "mesh.ply", *words], cwd=folder) as run:
+        try:
+            used = psutil.Process(run.pid).cpu_times
+            while run.poll() is None and used().user < seconds:
+                time.sleep(0.05)
+            for _ in range(times):
+                run.send_signal(signal.SIGINT)
+                time.sleep(0.2)
+            return run.wait(PATIENCE)
+        finally:
+            run.kill()
 
 
 @pytest.mark.slow
@@ -257,43 +248,19 @@ AT_WORK = 4.0
 @pytest.mark.parametrize("name", ["terrain", "boxes"])
 @pytest.mark.promise("ctrl-c")
 def test_ctrl_c_is_heeded_in_the_middle_of_a_stage(name: str, tmp_path: Path) -> None:
-    trimesh.Trimesh(*LARGE[name](), process=False).export(tmp_path / "mesh.ply")
-    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from rlacd.cli.main import main; main()"
-    run = subprocess.Popen(
-        [sys.executable, "-c", code, "decompose", str(tmp_path / "mesh.ply"), "-o", str(tmp_path / "hulls.glb")],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        used = psutil.Process(run.pid).cpu_times
-        while run.poll() is None and used().user < AT_WORK:
-            time.sleep(0.05)
-        run.send_signal(signal.SIGINT)
-        assert run.wait(PATIENCE) == 4
-        assert (tmp_path / "hulls.glb").exists()
-    finally:
-        run.kill()
+    """After 4 CPU seconds the libraries are loaded and the mesh is read: these shapes take many more."""
+    assert interrupted(name, "SIG_IGN", 4.0, 1, "-o", "hulls.glb", folder=tmp_path) == 4
+    assert (tmp_path / "hulls.glb").exists()
 
 
 @pytest.mark.nightly
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 @pytest.mark.parametrize("begun", [0.2, 1.2, 1.6, 2.0, 3.0, 5.0])  # CPU seconds
 def test_ctrl_c_twice_ends_the_command_at_any_moment(begun: float, tmp_path: Path) -> None:
-    trimesh.Trimesh(*LARGE["boxes"](), process=False).export(tmp_path / "mesh.ply")
-    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # ignored in a shell's background
-    command = [sys.executable, "-c", f"{heed}; from rlacd.cli.main import main; main()"]
-    run = subprocess.Popen([*command, "decompose", "mesh.ply", "--budget", "20"], cwd=tmp_path)
-    try:
-        used = psutil.Process(run.pid).cpu_times
-        while run.poll() is None and used().user < begun:
-            time.sleep(0.05)
-        for _ in range(2):
-            run.send_signal(signal.SIGINT)
-            time.sleep(0.2)
-        assert run.wait(2 + PATIENCE) in (4, 130, -signal.SIGINT)  # the last while Python starts
-        assert not list(tmp_path.glob(".*")), "no file is left half-written"
-    finally:
-        run.kill()
+    """A handler is set, because SIGINT is ignored in a shell's background."""
+    code = interrupted("boxes", "default_int_handler", begun, 2, "--budget", "20", folder=tmp_path)
+    assert code in (4, 130, -signal.SIGINT)  # the last while Python starts
+    assert not list(tmp_path.glob(".*")), "no file is left half-written"
 
 
 @pytest.mark.slow

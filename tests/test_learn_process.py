@@ -1,0 +1,204 @@
+"""The decision process is that of `decompose`, its rewards are the paper's; loss and replay, against work by hand."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip("torch", reason="needs the extra train")
+
+import torch
+
+from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.errors import RlacdError
+from rlacd.learn.meshes import list_meshes
+from rlacd.learn.process import Cut, CutProcess, terminal_reward
+from rlacd.learn.q_network import bellman_loss, dual_state_target, soft_value
+from rlacd.learn.replay import Replay, Seen, Transition
+from rlacd.planes.sweep import paper_planes, sweep, valid_planes
+from rlacd.run import Run
+from rlacd.solid.component import Component, Plane
+from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
+from tests.test_sweep import SOLIDS
+
+CRITERION = Concavity(0.04)
+
+
+@pytest.fixture
+def meshes(tmp_path: Path) -> Path:
+    return write_meshes(tmp_path / "meshes")
+
+
+def volumes(components: list[Component]) -> list[tuple[float, float]]:
+    return sorted((c.volume, c.hull.volume) for c in components)
+
+
+def cut_greedily(cutting: CutProcess) -> list[Cut]:
+    """Cut to the end."""
+    earned = []
+    while cutting.unfinished:
+        index = cutting.largest()
+        component = cutting.unfinished[index]
+        number = greedy_plane(component)
+        assert number is not None
+        cut = cutting.cut(index, cutting.candidates(component).plane(number))
+        earned.append(cut)
+    return earned
+
+
+@pytest.mark.parametrize("name", small_solids())
+def test_the_same_policy_reaches_the_same_components_as_decompose(name: str) -> None:
+    solid = Component(small_solids()[name])
+    with Run(1) as run:
+        done, left = CutTree(solid, GreedyOverMask(), run).cut_until(CRITERION)
+    cutting = CutProcess(solid, CRITERION)
+    start = sum(c.hull.volume for c in cutting.all)
+    earned = cut_greedily(cutting)
+    assert volumes(cutting.finished) == volumes(done)
+    assert volumes(cutting.stuck) == volumes(left)
+    end = sum(c.hull.volume for c in cutting.finished + cutting.stuck)
+    assert sum(cut.saved for cut in earned) * solid.hull.volume == pytest.approx(start - end, abs=1e-9)
+    paid = terminal_reward(len(cutting.finished)) if earned and cutting.terminal else 0
+    assert sum(cut.finishes for cut in earned) == paid
+
+
+def test_reward_of_an_angle_by_hand() -> None:
+    solid = Component(small_solids()["angle"])  # two boxes, 2 x 1 x 0.3 and 0.3 x 1 x 1.2 on top of it
+    cutting = CutProcess(solid, CRITERION)
+    plane = Plane((0.0, 0.0, 1.0), 0.3)
+    cut = cutting.cut(0, plane)
+    hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
+    assert solid.hull.volume == pytest.approx(hull)
+    assert cut.saved == pytest.approx((hull - 0.6 - 0.36) / hull)
+    assert cut.finishes == 1
+    assert cutting.terminal
+    assert (cut.left.unfinished, cut.discounts, len(cut.left.finished)) == ([], [], 2)
+
+
+def test_rewards_are_relative_to_the_whole_solids_hull_and_discounts_to_the_components() -> None:
+    cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
+    hull = before = cutting.unfinished[0].hull.volume
+    while cutting.unfinished:
+        component = cutting.unfinished[0]
+        cut = cutting.cut(0, cutting.candidates(component).plane(greedy_plane(component) or 0))
+        after = sum(c.hull.volume for c in cutting.all)
+        assert cut.saved == pytest.approx((before - after) / hull)
+        before = after
+        whole = max(component.hull.volume, sum(c.hull.volume for c in cut.left.all))
+        assert cut.discounts == [pytest.approx(c.hull.volume / whole) for c in cut.left.unfinished]
+        assert sum(cut.discounts) <= 1
+
+
+def test_terminal_reward_falls_with_the_number_of_parts() -> None:
+    assert terminal_reward(2) == 1
+    assert terminal_reward(3) == pytest.approx(1 / (1 + math.log(2)))
+    assert terminal_reward(11) == pytest.approx(1 / (1 + math.log(10)))
+
+
+def test_valid_planes_need_no_sweep_and_are_valid_by_it() -> None:
+    differ = total = 0
+    for solid in SOLIDS.values():
+        for piece in Component(solid()).pieces():
+            candidates = paper_planes(piece)
+            cheap, exact = valid_planes(piece, candidates), sweep(piece, candidates).valid()
+            assert not exact.any() or not (cheap & ~exact).any()
+            differ += int((cheap != exact).sum())
+            total += len(exact)
+    assert differ < 0.1 * total
+
+
+def test_unreadable_meshes_are_left_out_and_counted(meshes: Path) -> None:
+    listed = list_meshes(meshes, max_faces=1000, validation=2, seed=0)
+    assert listed.unreadable == 1
+    assert len(listed.training) == 3
+    assert len(listed.validation) == 2
+    assert "deeper/table.ply" in listed.training + listed.validation
+    assert list_meshes(meshes, max_faces=12, validation=0, seed=0).training == ("box.ply",)
+
+
+Q = torch.tensor([[1.0, 2.0, 3.0], [4.0, 0.0, -1.0]])
+MASK = torch.tensor([[True, True, False], [True, True, True]])
+
+
+def test_soft_value_by_hand() -> None:
+    expected = [2 * math.log(math.exp(0.5) + math.exp(1.0)), 2 * math.log(math.exp(2) + 1 + math.exp(-0.5))]
+    assert soft_value(Q, MASK, 0).tolist() == [2.0, 4.0], "the greatest valid value"
+    assert soft_value(Q, MASK, 2.0).tolist() == pytest.approx(expected, rel=1e-6)
+
+
+def test_dual_state_target_by_hand() -> None:
+    # Three cuts: both sides unfinished, nothing left, and one side in three pieces.
+    target = dual_state_target(
+        torch.tensor([100.0, 1000.0, 0.0]),
+        torch.tensor([500.0, 200.0, 10.0, 20.0, 30.0]),
+        torch.tensor([0.5, 0.25, 0.1, 0.2, 0.3]),
+        torch.tensor([0, 0, 2, 2, 2]),
+    )
+    assert target.tolist() == pytest.approx([100 + 250 + 50, 1000, 1 + 4 + 9])
+
+
+def test_loss_by_hand_and_only_through_the_planes_taken() -> None:
+    q = Q.clone().requires_grad_()
+    loss = bellman_loss(q, torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0)
+    assert loss.item() == pytest.approx(0.5 * (1 + 0) / 2)
+    assert (
+        bellman_loss(torch.tensor([2.0, 4.0]), torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0) == loss.detach()
+    )
+    loss.backward()
+    assert q.grad is not None
+    assert q.grad.tolist() == [pytest.approx([0, -1.0 / 10 / 2, 0]), [0, 0, 0]]
+
+
+def component(number: int, replay: Replay) -> Seen:
+    return replay.seen(np.full(3, number, np.float16), np.arange(11) == number % 11)
+
+
+def test_fewest_cuts_by_hand() -> None:
+    replay = Replay(9, unknown=100)
+    a, b, c, d = (component(i, replay) for i in range(4))
+    replay.count([(a, ((b, 1.0), (c, 1.0))), (b, ()), (c, ((d, 1.0),))])  # d is left when the episode ends
+    assert [x.fewest for x in (a, b, c, d)] == [1 + 1 + 101, 1, 1 + 100, math.inf]
+    replay.count([(component(2, replay), ((d, 1.0),)), (d, ())])  # another episode comes to the same component
+    assert [x.fewest for x in (a, b, c, d)] == [103, 1, 2, 1]
+    assert replay.cuts(((b, 1.0), (c, 1.0))) == 4
+
+
+@given(st.integers(1, 9), st.lists(st.integers(0, 3), min_size=1, max_size=60))
+@settings(max_examples=40, deadline=None)
+def test_replay_gives_back_the_last_transitions_also_when_restored(capacity: int, children: list[int]) -> None:
+    replay, made, added = Replay(capacity), 1, {}
+    for count in children:
+        state, *below = (component(made + i, replay) for i in range(count + 1))
+        left = tuple((child, 0.5 / (i + 1)) for i, child in enumerate(below))
+        replay.count([(state, left)])
+        added[float(made)] = Transition(state, made % 11, state.features, -made, left)
+        replay.add(added[float(made)])
+        made += 1 + count
+    restored = Replay(capacity)
+    restored.restore(replay.state())
+    kept = dict(list(added.items())[-capacity:])
+    assert len(replay) == len(restored) == len(kept)
+    batch, again = (r.sample(40, np.random.default_rng(0)) for r in (replay, restored))
+    for name in batch:
+        assert np.array_equal(batch[name], again[name]), name
+    for i in range(40):
+        cut, mine = kept[float(batch["features"][i, 0])], batch["owner"] == i
+        assert (batch["planes"][i], batch["rewards"][i], batch["cuts"][i]) == (
+            cut.plane,
+            cut.reward,
+            1 + len(cut.children),
+        )
+        assert batch["child_features"][mine, 0].tolist() == [float(c.features[0]) for c, _ in cut.children]
+        assert [m.tolist() for m in batch["child_masks"][mine]] == [c.mask.tolist() for c, _ in cut.children]
+        assert batch["child_discounts"][mine] == pytest.approx([d for _, d in cut.children])
+
+
+def test_nothing_to_sample_is_reported() -> None:
+    with pytest.raises(RlacdError, match="nothing to learn from"):
+        Replay(4).sample(1, np.random.default_rng(0))
