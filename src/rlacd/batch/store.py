@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from filelock import FileLock
 
-from rlacd.errors import MissingExtraError, OptionError, OutputError, OutputNameError
+from rlacd.errors import MissingExtraError, OptionError, OutputError, OutputNameError, import_extra
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write.atomic import lock_folder, output_errors, write_file
 
@@ -175,12 +175,7 @@ class AddressStore:
     append_every = APPEND_SECONDS
 
     def __init__(self, address: str) -> None:
-        try:
-            import fsspec
-        except ImportError as error:
-            raise MissingExtraError(
-                "results at an address need an extra: run  pip install 'rlacd[fleet]'  and try again."
-            ) from error
+        fsspec = import_extra("fsspec", "an address", "fleet")
         try:
             self._system, self._root = fsspec.core.url_to_fs(address)
         except ImportError as error:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
-from rlacd.io.read.conventions import UNITS as METRES
 from rlacd.options import OPTION_NAMES, Options, with_criterion
 from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, stated
+from rlacd.options.names import UNITS
 from rlacd.options.navigable import NavigableSpace
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
             raise OptionError(
                 f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
             )
-        if unit not in METRES:
+        if unit not in UNITS:
             taken[name] = value / 100 * longest if unit == "%" else value
             continue
         if metres is None or f"{name}_abs" not in _ABSOLUTE:
@@ -121,7 +121,7 @@ def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
         if f"{name}_abs" in taken:
             raise OptionError(f"--{flag} and --{flag}-abs are both lengths; give one of the two.")
         del taken[name]
-        taken[f"{name}_abs"] = value * METRES[unit]
+        taken[f"{name}_abs"] = value * UNITS[unit]
     return taken
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
 from rlacd.fit import Fit
-from rlacd.io.read.conventions import UNITS as METRES
+from rlacd.options.names import UNITS
 from rlacd.run import Progress, ProgressCallback
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def _unit(report: dict[str, Any], unit: str | None) -> tuple[float, str]:
     if unit == "%":
         return 0.02, "in % of the longest side"
     if unit is not None:
-        return report["scale"] * METRES[unit], f"in {unit}"
+        return report["scale"] * UNITS[unit], f"in {unit}"
     if report.get("options", {}).get("threshold_abs") is not None:
         return report["scale"], "in the input's unit"
     return 1.0, "longest side = 2"

@@ -9,7 +9,7 @@ import click
 
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of, taken
 from rlacd.cli.options import PoolOptions
-from rlacd.errors import MissingExtraError, OptionError
+from rlacd.errors import OptionError, import_extra
 from rlacd.learn.options import PRESETS, TrainOptions
 
 DEFAULT_PRESET = "two-cores"
@@ -34,12 +34,9 @@ def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> 
     options = TrainOptions.preset(preset, **chosen(given))
     if run.exists() and not run.is_dir():
         raise OptionError(f"--run {run} is a file; give a folder.")
-    try:
-        from rlacd.learn.train import train
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] != "torch":
-            raise
-        raise MissingExtraError("training needs an extra: run  pip install 'rlacd[train]'  and try again.") from error
+    import_extra("torch", "training", "train")
+    from rlacd.learn.train import train
+
     with where.open(1) as pool:
         train(meshes, run, options, resume=resume, say=click.echo, pool=pool, limits=where.limits())
 

@@ -29,6 +29,9 @@ LEARNED = ("learned", "rl-acd")
 
 POLICIES = ("greedy", *LEARNED, *AS_PUBLISHED, *CONTROLS)
 
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+"""Metres of each unit that a mesh may be said to be in."""
+
 WEIGHTS_ENDING = ".npz"
 """A policy's name that ends so is the path of a network."""
 

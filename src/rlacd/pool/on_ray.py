@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.errors import MissingExtraError, OptionError
+from rlacd.errors import OptionError, import_extra
 from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared
 from rlacd.pool.local import Worker
 
@@ -51,12 +51,7 @@ class RayPool(Pool):
 
     def __init__(self, address: str, jobs: int | None = None) -> None:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # disables usage reports
-        try:
-            import ray
-        except ImportError as error:
-            raise MissingExtraError(
-                "a cluster needs an extra: run  pip install 'rlacd[fleet]'  and try again."
-            ) from error
+        ray = import_extra("ray", "a cluster", "fleet")
         if jobs is not None and address != LOCAL:
             raise OptionError("--jobs belongs to one machine; a cluster knows how many processors it has.")
         if jobs is not None and jobs < 1:

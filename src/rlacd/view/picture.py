@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd._native import PointTree
+from rlacd.errors import import_extra
 from rlacd.fit import Fit
 from rlacd.io.write import write_file
 from rlacd.io.write.palette import linear_from_srgb
@@ -22,7 +23,7 @@ from rlacd.result import Result
 from rlacd.solid.primitive import Balls
 from rlacd.view.apart import render_apart
 from rlacd.view.coloring import color_hulls
-from rlacd.view.render import Body, Spheres, require_extra
+from rlacd.view.render import Body, Spheres
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
@@ -49,7 +50,7 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     check_up(up)
     place = checked_place(path, "the picture", [".png"])
     for module in ("mitsuba", "PIL"):
-        require_extra(module)
+        import_extra(module, "a picture", "view")
     return place
 
 
@@ -115,8 +116,8 @@ def picture_bytes(
     width = read(integer(300, 8000, rule="a number of pixels between 300 and 8000"), "width", width)
     samples = read(integer(1, 10_000), "samples", samples)
 
-    image = require_extra("PIL.Image")
-    require_extra("mitsuba")  # before a process is started that needs it
+    image = import_extra("PIL.Image", "a picture", "view")
+    import_extra("mitsuba", "a picture", "view")  # before a process is started that needs it
     up = decomposition.up_axis(up)
     panels: list[tuple[str, list[Body], Spheres | None]] = [
         ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)], None),

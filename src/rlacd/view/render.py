@@ -6,7 +6,6 @@ find no OpenGL and abort the process.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.errors import MissingExtraError
+from rlacd.errors import import_extra
 from rlacd.io.write.palette import srgb_from_linear
 
 FIELD_OF_VIEW = 22.0  # degrees, vertical; narrow, so that perspective barely changes the size of equal hulls
@@ -36,17 +35,6 @@ class Spheres:
     centres: npt.NDArray[np.float64]
     radii: npt.NDArray[np.float64]
     color: npt.NDArray[np.float64]
-
-
-def require_extra(module: str) -> Any:
-    """Import a module of the extra ``view``, or raise an error that says how to get it."""
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
-    except ImportError as error:
-        # Installed, but a system library is missing, such as libatomic in a container without a compiler.
-        raise MissingExtraError(f"pictures need {module}, which does not load here ({error}); install that.") from error
 
 
 def render(
@@ -75,7 +63,7 @@ def render(
     MissingExtraError
         Mitsuba is not installed.
     """
-    mi = require_extra("mitsuba")
+    mi = import_extra("mitsuba", "a picture", "view")
     mi.set_variant("scalar_rgb")  # needs no compiler at run time
     points = np.concatenate([body.triangles.reshape(-1, 3) for body in bodies])
     low, high = points.min(axis=0), points.max(axis=0)

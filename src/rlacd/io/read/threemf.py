@@ -14,14 +14,15 @@ import trimesh
 from lxml import etree
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
-from rlacd.io.read.conventions import METRES
+from rlacd.io.read.contents import LONGEST_NAME, Contents, Triangles, check_places
 from rlacd.io.read.xml import PARSER, check_prologue, open_archive, parse_xml
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 
 Color = tuple[float, float, float, float]
 """Red, green, blue in linear light, and opacity."""
+
+METRES = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "meter": 1.0, "inch": 0.0254, "foot": 0.3048}
 
 _HEX = re.compile(r"#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?$")
 
@@ -54,7 +55,7 @@ class _Archive:
         self.unit = ""
         self.placed: dict[str, tuple[SourceNode, _Object]] = {}
         self._objects_of(self._main())
-        self._place(self._build, np.eye(4), [])
+        self._place(self._build, np.eye(4))
 
     def _main(self) -> str:
         """The model that the relationships of the archive name, or the one of the usual name."""
@@ -88,21 +89,15 @@ class _Archive:
                         groups[element.get("id", "")] = [_color(one) for one in element.iter("{*}base", "{*}color")]
         return self._models[model]
 
-    def _place(self, items: Sequence[_Item], transform: FloatArray, around: list[tuple[str, str]]) -> None:
-        if len(around) > DEEPEST_PART:
-            raise MeshFileError(f"{self._path} places parts in parts more than {DEEPEST_PART} deep: export it again")
+    def _place(self, items: Sequence[_Item], transform: FloatArray, depth: int = 0) -> None:
         for item in items:
-            where = (item.model, item.number)
-            if where in around:
-                raise MeshFileError(f"{self._path} places the part {item.number!r:.80} inside itself: export it again")
-            if len(self.placed) > MOST_PLACES:
-                raise MeshFileError(f"{self._path} has more than {MOST_PLACES} places for its parts: simplify it first")
+            check_places(self._path, len(self.placed), depth)
             thing = self._objects_of(item.model)[item.number]
             here = transform @ item.transform
             key = trimesh.util.unique_name(thing.name, self.placed, self._keys)
             if len(thing.shape.vertices) or not thing.parts:
                 self.placed[key] = SourceNode(thing.name, key, here), thing
-            self._place(thing.parts, here, [*around, where])
+            self._place(thing.parts, here, depth + 1)
 
 
 def read_3mf(path: Path, content: bytes) -> Contents:

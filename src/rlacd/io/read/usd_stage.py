@@ -15,7 +15,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, ToldNodes, served
-from rlacd.io.read.contents import Triangles
+from rlacd.io.read.contents import Triangles, damaged
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Values
@@ -48,9 +48,7 @@ def read_stage(values: Values, blobs: Blobs) -> Answered:
     nodes = ToldNodes(path)
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
         if prim.IsA(UsdGeom.PointInstancer):
-            raise MeshFileError(
-                f"{path} has a point instancer, which rlacd does not read: convert its instances to meshes first"
-            )
+            raise MeshFileError(f"{path} has a point instancer, which is not read: convert its instances to meshes")
         if not _is_rendered(prim):
             continue
         if not prim.IsA(UsdGeom.Mesh) and str(prim.GetTypeName()) not in PRIMITIVES:
@@ -90,7 +88,7 @@ def check_files(path: Path) -> None:
     while waiting:
         layer = Sdf.Layer.FindOrOpen(waiting.pop())
         if layer is None:
-            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again")
+            raise damaged(path, "USD")
         for named in filter(None, layer.GetCompositionAssetDependencies()):  # a file may refer to its own prims
             found = layer.ComputeAbsolutePath(named)
             if found in known:

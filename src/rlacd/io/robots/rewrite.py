@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError
-from rlacd.io.read.conventions import collada_unit
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
@@ -139,8 +138,7 @@ def rewrite_robot(
     files: dict[str, bytes] = {}
     copies: dict[MeshUse, str] = {}
     for use, name in zip(plan.uses, _stems([use.path for use in plan.uses]), strict=True):
-        unit, said = collada_unit(use.path)
-        result = _decomposed(use, unit, options)
+        result, said = _decomposed(use, options)
         hulls = {f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)}
         if kind == "mjcf" and not mujoco_reads(use.path):
             copies[use] = f"{stem}_{name}_visual.obj"
@@ -266,11 +264,19 @@ def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
     return decompose((mesh.vertices, mesh.faces), **given)
 
 
-def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomposition:
+def _decomposed(use: MeshUse, options: Mapping[str, Any]) -> tuple[Decomposition, list[str]]:
+    """Decompose a mesh, in the unit that a COLLADA file states: ROS, Gazebo and Bullet apply it.
+
+    Whether such a file whose y axis points up is turned differs between them, so that is a warning.
+    """
     try:
-        mesh = load_mesh(use.path)
-        mesh = trimesh.Trimesh(mesh.vertices * unit * use.scale, _oriented(mesh.faces, use), process=False)
-        return _coarse(mesh, options)
+        read = load_mesh(use.path)
+        is_collada = use.path.suffix.lower() == ".dae"
+        unit = (read.metres or 1.0) if is_collada else 1.0
+        mesh = trimesh.Trimesh(read.vertices * unit * use.scale, _oriented(read.faces, use), process=False)
+        turned = f"{use.path.name} declares {read.up.upper()}_UP, and some programs rotate such a file when they read"
+        said = [f"{turned} it; its hulls keep its coordinates."] if is_collada and read.up != "z" else []
+        return _coarse(mesh, options), said
     except MeshError as error:
         if str(use.path) in str(error):
             raise

@@ -15,6 +15,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read.xml import refuse_doctype
 
 DEEPEST_ELEMENT = 500
 """Depth of nested elements; robots have about fifty."""
@@ -142,16 +143,10 @@ class _Builder:
         self.top: list[Element] = []
         self._file, self._depth, self._count = file, depth, 0
         self._open: list[Element] = []
-        self.parser.StartDoctypeDeclHandler = self._refuse
+        refuse_doctype(self.parser, file.path)
         self.parser.XmlDeclHandler = self._declared
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
-
-    def _refuse(self, *_: object) -> None:
-        raise MeshFileError(
-            f"{self._file.path} has a document type (<!DOCTYPE>), which is not allowed, as it can refer to anything: "
-            "remove it."
-        )
 
     def _declared(self, version: str, encoding: str | None, standalone: int) -> None:
         self._file.encoding = encoding or "utf-8"

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import unicodedata
 from typing import Any
 
 import numpy as np
 
-from rlacd.errors import MissingExtraError
+from rlacd.errors import import_extra
 from rlacd.io.write.encode import hull_name
 from rlacd.io.write.model import Model
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull
 from rlacd.solid.primitive import Primitive
 
-NEEDS_EXTRA = "USD needs an extra: run  pip install 'rlacd[usd]'  and try again."
-
 
 def require_usd() -> None:
     """Raise MissingExtraError, with installation advice, unless USD can be imported."""
-    try:
-        for module in ("pxr", "pxr.UsdPhysics"):
-            importlib.import_module(module)
-    except ImportError as error:
-        raise MissingExtraError(NEEDS_EXTRA) from error
+    import_extra("pxr.UsdPhysics", "USD", "usd")
 
 
 def encode_usd(model: Model, ending: str) -> bytes:
