@@ -102,7 +102,7 @@ def train_arms(
     folder : Path
         Run folder; each arm and seed gets a subfolder.
     preset : str
-        See `rlacd.learn.options.PRESETS`.
+        See `rlacd.learn.options.TRAIN_PRESETS`.
     iterations : int, optional
         Cuts per arm; the preset's number by default.
     seeds : int

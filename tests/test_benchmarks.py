@@ -29,7 +29,7 @@ from typer.testing import CliRunner
 
 import rlacd
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.learn.options import PRESETS
+from rlacd.learn.options import TRAIN_PRESETS
 from tests.shapes import box, from_manifold, trimesh_of
 
 CROSS = box((-1, -0.2, -0.2), (1, 0.2, 0.2)) + box((-0.2, -1, -0.2), (0.2, 1, 0.2))
@@ -441,7 +441,9 @@ def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     for number in range(6):
         mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
         trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
-    monkeypatch.setattr("rlacd.learn.options.PRESETS", {"two-cores": {**PRESETS["two-cores"], "validation": 2}})
+    monkeypatch.setattr(
+        "rlacd.learn.options.TRAIN_PRESETS", {"two-cores": {**TRAIN_PRESETS["two-cores"], "validation": 2}}
+    )
     said: list[str] = []
     page = train_arms("curves", folder, tmp_path / "run", "two-cores", 40, seeds=2, say=said.append)
     table = next(block for block in page.blocks if isinstance(block, Table))

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from filelock import FileLock
@@ -34,16 +34,8 @@ def open_store(place: str) -> ResultStore:
     OptionError
         fsspec does not support the address.
     """
-    if "://" not in place:
-        return FolderStore(Path(place))
-    if place.startswith("file://"):
-        return FolderStore(Path(place.removeprefix("file://")))
-    return AddressStore(place)
-
-
-def under(parent: str, files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Prefix file names with their folder."""
-    return {str(PurePosixPath(parent) / name): data for name, data in files.items()}
+    folder = place.removeprefix("file://")
+    return AddressStore(place) if "://" in folder else FolderStore(Path(folder))
 
 
 def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[str], bool]) -> dict[str, int]:
@@ -71,13 +63,10 @@ class FolderStore:
 
     Attributes
     ----------
-    shared : bool
-        Whether every machine can reach the store under the same address.
     append_every : float
         Seconds that lines of a journal may wait.
     """
 
-    shared = False
     append_every = 0.0
 
     def __init__(self, folder: Path) -> None:
@@ -171,7 +160,6 @@ class FolderStore:
 class AddressStore:
     """Any address that fsspec has a driver for; the driver finds credentials its usual way (environment, files)."""
 
-    shared = True
     append_every = APPEND_SECONDS
 
     def __init__(self, address: str) -> None:
@@ -182,7 +170,6 @@ class AddressStore:
             raise MissingExtraError(f"{address} needs another package: {str(error).splitlines()[0]}") from error
         except ValueError as error:
             raise OptionError(f"{address} is not an address that fsspec knows: {error}.") from error
-        self.shared = not address.startswith("memory://")
 
     def write(self, name: str, data: bytes) -> None:
         """See `FolderStore`; atomic where the system writes objects atomically, as all object stores do."""

@@ -10,7 +10,7 @@ import click
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of, taken
 from rlacd.cli.options import PoolOptions
 from rlacd.errors import OptionError, import_extra
-from rlacd.learn.options import PRESETS, TrainOptions
+from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
 
 DEFAULT_PRESET = "two-cores"
 
@@ -47,10 +47,10 @@ COMMAND = Command(
     [
         Argument("meshes", "MESHES", "A folder of meshes, of any depth."),
         Option("--run", "-o", type=click.Path(path_type=Path), required=True, help="The folder of this run."),
-        Option("--preset", default=DEFAULT_PRESET, show_default=True, help=f"One of {', '.join(PRESETS)}."),
+        Option("--preset", default=DEFAULT_PRESET, show_default=True, help=f"One of {', '.join(TRAIN_PRESETS)}."),
         Option("--resume", is_flag=True, default=False, help="Continue from the run's last checkpoint."),
         Option("--jobs", type=int, panel="Processes", help="Processes that play episodes.  [default: 1]"),
         *options_of(PoolOptions, only=("ray", "limit", "memory")),
-        *options_of(TrainOptions, note="without a preset: "),
+        *options_of(TrainOptions, note="the preset's, or "),
     ],
 )

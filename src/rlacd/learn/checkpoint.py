@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from collections.abc import Mapping
@@ -12,12 +13,24 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from rlacd.errors import OutputError, TrainingError
-from rlacd.learn.files import packed, save_bytes
-
-FORMAT = 5
+from rlacd._version import __version__
+from rlacd.errors import TrainingError
+from rlacd.io.write.atomic import write_file
 
 Arrays = Mapping[str, NDArray[Any]]
+
+
+def packed(arrays: Arrays) -> bytes:
+    """Pack arrays as the content of an .npz file."""
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def unpacked(content: bytes) -> dict[str, NDArray[Any]]:
+    """Unpack the content of an .npz file."""
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        return dict(arrays)
 
 
 def save_checkpoint(path: Path, arrays: Arrays, state: Mapping[str, Any]) -> None:
@@ -28,13 +41,8 @@ def save_checkpoint(path: Path, arrays: Arrays, state: Mapping[str, Any]) -> Non
     OutputError
         The disk is full or the folder is not writable.
     """
-    text = np.frombuffer(json.dumps({"format": FORMAT, **state}).encode(), np.uint8)
-    try:
-        save_bytes(path, packed({"state": text, **arrays}))
-    except OSError as error:
-        raise OutputError(
-            f"the checkpoint {path} cannot be written ({error}); free some space and use --resume."
-        ) from error
+    text = np.frombuffer(json.dumps({"version": __version__, **state}).encode(), np.uint8)
+    write_file(path, packed({"state": text, **arrays}))
 
 
 def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
@@ -55,11 +63,11 @@ def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         state = json.loads(arrays.pop("state").tobytes())
-        version = state["format"]
+        version = state["version"]
     except damage as error:
         raise TrainingError(f"the checkpoint {path} is damaged ({error}); remove it to train again.") from error
-    if version != FORMAT:
-        raise TrainingError(f"{path} has format {version}, not {FORMAT}; train again from the beginning.")
+    if version != __version__:
+        raise TrainingError(f"{path} is of rlacd {version}, not {__version__}; train again from the beginning.")
     return arrays, state
 
 

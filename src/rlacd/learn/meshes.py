@@ -13,7 +13,8 @@ from manifold3d import Manifold, Mesh64
 
 from rlacd.errors import RlacdError, TrainingError
 from rlacd.io.read.load import load_mesh
-from rlacd.learn.files import packed, save_bytes, unpacked
+from rlacd.io.write.atomic import write_file
+from rlacd.learn.checkpoint import packed, unpacked
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from rlacd.solid.frame import Frame
@@ -129,7 +130,7 @@ class Solids:
         except (RlacdError, ValueError):  # flat or empty: nothing to cut
             vertices, faces = np.empty((0, 3)), np.empty((0, 3), np.uint64)
         content = packed({"vertices": vertices, "faces": faces})
-        save_bytes(place, content)
+        write_file(place, content)
         return content
 
 

@@ -60,12 +60,9 @@ def policy_name(policy: object) -> str:
 
 def is_policy(name: object) -> bool:
     """Tell whether this is the name of a policy, or may be the path of one."""
-    return isinstance(name, str) and (name in POLICIES or (name.endswith(WEIGHTS_ENDING) and _can_be_a_path(name)))
-
-
-def _can_be_a_path(name: str) -> bool:
     try:
-        return b"\0" not in os.fsencode(name)
+        is_path = isinstance(name, str) and name.endswith(WEIGHTS_ENDING) and b"\0" not in os.fsencode(name)
+        return is_path or (isinstance(name, str) and name in POLICIES)
     except UnicodeError:
         return False
 

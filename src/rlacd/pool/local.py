@@ -19,7 +19,7 @@ import psutil
 from rlacd import errors
 from rlacd.errors import OptionError, RlacdError
 from rlacd.pool import Answer, Pool, Request, Server, TimeLimitError, Values, WorkerDiedError
-from rlacd.pool.child import READY, find_server, receive, send
+from rlacd.pool.child import END_SECONDS, READY, find_server, receive, send
 from rlacd.pool.process import kill_group, start, why_it_ended
 
 LOOK_EVERY = 0.05
@@ -27,9 +27,6 @@ LOOK_EVERY = 0.05
 
 START_SECONDS = 300.0
 """Seconds a process may take to start, on a busy machine."""
-
-END_SECONDS = 10.0
-"""Seconds for a process to be gone after its pipe was closed, and for the thread that watches it to notice."""
 
 Message = tuple[Values, dict[str, bytes]]
 

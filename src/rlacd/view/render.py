@@ -1,11 +1,13 @@
 """Path-traced pictures of meshes on a transparent background, on any CPU.
 
 Mitsuba 3 renders without a display, GPU or OpenGL library, so it also works in a bare container, where VTK's wheels
-find no OpenGL and abort the process.
+find no OpenGL and abort the process. It runs in a process of its own: the renderer keeps Python's lock, and all other
+threads would stand still; and other libraries disturb it: CoACD hides its plugins.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,8 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.errors import import_extra
+from rlacd.errors import OutputError, import_extra
+from rlacd.io.read.apart import Answered, served
 from rlacd.io.write.palette import srgb_from_linear
+from rlacd.pool import Blobs, ProcessLimits, Request, Values, WorkerDiedError
+from rlacd.pool.local import Worker
 
 FIELD_OF_VIEW = 22.0  # degrees, vertical; narrow, so that perspective barely changes the size of equal hulls
 ELEVATION, AZIMUTH = np.deg2rad(24.0), np.deg2rad(-58.0)
@@ -146,3 +151,51 @@ def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.flo
     arrays["faces"] = np.arange(3 * len(triangles), dtype=np.uint32)
     arrays.update()
     return mesh
+
+
+SERVER = "rlacd.view.render:draw"
+
+
+def render_apart(
+    scenes: Sequence[tuple[Sequence[Body], Spheres | None]], width: int, height: int, samples: int
+) -> list[npt.NDArray[np.uint8]]:
+    """Do what `render` does for each scene; spheres are half transparent.
+
+    Raises
+    ------
+    MissingExtraError
+        Mitsuba is not installed.
+    OutputError
+        The process died.
+    """
+    how = {"width": width, "height": height, "samples": samples}
+    worker, drawn = Worker(), []
+    try:
+        for bodies, spheres in scenes:
+            arrays = [*bodies, *([] if spheres is None else [spheres])]
+            blobs = {
+                f"{i} {name}": array.tobytes() for i, body in enumerate(arrays) for name, array in vars(body).items()
+            }
+            values = {"bodies": len(bodies), "spheres": spheres is not None, "how": how}
+            pixels = worker.ask(Request(SERVER, values, blobs, limits=ProcessLimits(memory=0))).blobs["pixels"]
+            drawn.append(np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 4))
+    except WorkerDiedError as died:
+        raise OutputError(f"the picture could not be drawn: {died}.") from died
+    finally:
+        worker.close()
+    return drawn
+
+
+@served
+def draw(values: Values, blobs: Blobs) -> Answered:
+    """Render one scene, and leave processors to whoever else needs them."""
+    if hasattr(os, "nice") and os.nice(0) == 0:
+        os.nice(10)
+    arrays = {name: np.frombuffer(blob) for name, blob in blobs.items()}
+    count = values["bodies"]
+    bodies = [Body(arrays[f"{i} triangles"].reshape(-1, 3, 3), arrays[f"{i} color"]) for i in range(count)]
+    pixels = render(bodies, **values["how"])
+    if values["spheres"]:
+        balls = Spheres(*(arrays[f"{count} {name}"] for name in ("centres", "radii", "color")))
+        pixels = ((pixels.astype(np.uint16) + render(bodies, spheres=balls, **values["how"]) + 1) // 2).astype(np.uint8)
+    return {}, {"pixels": pixels.tobytes()}

@@ -23,10 +23,9 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.plan import HullFiles, MeshUse, Plan
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import Edit, Element, expand
-from rlacd.io.robots.urdf import read_scale
+from rlacd.io.robots.urdf import HullFiles, MeshUse, Plan, read_scale
 
 SHOWN, HIDDEN = ("0", "1", "2"), "3"
 """Groups that MuJoCo shows by default, and one that it does not."""

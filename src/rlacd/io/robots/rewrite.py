@@ -19,10 +19,9 @@ from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
 from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
-from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
-from rlacd.io.robots.urdf import plan_urdf
+from rlacd.io.robots.urdf import MeshUse, Plan, plan_urdf
 from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
