@@ -239,9 +239,7 @@ class Batch:
         assets = find_assets(self.assets, self.glob, here, self.spec.ending)
         if not assets:
             which = "" if self.glob == EVERYTHING else f" whose name fits {self.glob!r}"
-            raise MeshFileError(
-                f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, ... files."
-            )
+            raise MeshFileError(f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, ....")
         if here is not None:
             self._refuse_results_over_meshes(assets, here)
         return assets

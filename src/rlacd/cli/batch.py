@@ -96,12 +96,12 @@ def _print_plan(batch: Batch) -> None:
     from rlacd.cli.terminal import counted
 
     plan = batch.plan()
-    for asset, finished in plan:
-        if not finished:
-            result = asset.place + (result_ending(asset.name, batch.spec.ending) or "/")
-            give(printable(f"{asset.name} -> {result}") + "\n")
-    done = sum(finished for _, finished in plan)
-    say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(plan) - done} to do; nothing was written")
+    todo = [asset for asset, finished in plan if not finished]
+    for asset in todo:
+        result = asset.place + (result_ending(asset.name, batch.spec.ending) or "/")
+        give(printable(f"{asset.name} -> {result}") + "\n")
+    done = len(plan) - len(todo)
+    say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(todo)} to do; nothing was written")
 
 
 def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:

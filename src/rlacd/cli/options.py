@@ -105,9 +105,7 @@ def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
         flag, found = name.replace("_", "-"), _LENGTH.fullmatch(word.strip())
         value, unit = (_number(found[1]), found[2]) if found else (_number(word), None)
         if value is None:
-            raise OptionError(
-                f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
-            )
+            raise OptionError(f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length.")
         if unit not in UNITS:
             taken[name] = value / 100 * longest if unit == "%" else value
             continue
@@ -141,7 +139,5 @@ def _number(word: str) -> float | None:
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     values = [value for word in text.split(",") if (value := _number(word)) is not None]
     if not len(values) == len(text.split(",")) == count:
-        raise OptionError(
-            f"{option} is {text!r}; it takes {count} numbers separated by commas, such as {'0,0,1,0'[: 2 * count - 1]}."
-        )
+        raise OptionError(f"{option} is {text!r}; it takes {count} numbers with commas: {'0,0,1,0'[: 2 * count - 1]}.")
     return tuple(values)

@@ -193,9 +193,7 @@ class ViewServer(BoundedServer):
                 super().__init__((ADDRESS, 0), _Handler)
                 return
             why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be listened on ({error.strerror})"
-            raise OptionError(
-                f"port {port} {why}; choose another with --port, or leave it out to get a free one."
-            ) from error
+            raise OptionError(f"port {port} {why}; choose another with --port, or leave it out.") from error
 
 
 class _Handler(BoundedHandler):

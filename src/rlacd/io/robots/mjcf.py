@@ -301,9 +301,7 @@ def _numbers(geom: Element, attributes: Mapping[str, str], name: str, default: s
         return [float(word) for word in text.split()] or [float(text)]
     except ValueError as error:
         where = geom.attributes.get("name", "without a name")
-        raise MeshFileError(
-            f"the {name} of the geom {where} is {text!r}, which is not a number: correct it."
-        ) from error
+        raise MeshFileError(f"the {name} of the geom {where} is {text!r}, which is no number: correct it.") from error
 
 
 def _lacks_volume(mesh: trimesh.Trimesh, inertia: str) -> bool:

@@ -89,9 +89,7 @@ def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:
     on = [prim for prim in found if UsdPhysics.CollisionAPI(prim).GetCollisionEnabledAttr().Get() is not False]
     groups = [prim for prim in on if not prim.IsA(UsdGeom.Gprim)]
     if groups:
-        warnings.append(
-            f"{len(groups)} prims collide and are no shapes, such as {groups[0].GetPath()}: left unchanged."
-        )
+        warnings.append(f"{len(groups)} prims collide and are no shapes, as {groups[0].GetPath()}: left unchanged.")
     if any(prim.IsA(UsdGeom.PointInstancer) for prim in stage.Traverse()):
         raise MeshFileError(f"{path} has a point instancer, which is not rewritten: convert its instances first")
     return [prim for prim in on if prim.IsA(UsdGeom.Mesh)], warnings

@@ -124,9 +124,7 @@ def model_of(result: Result, asked: OutputOptions) -> Model:
         density = asked.mass / of_volume.volume_abs
     weighed = of_volume.scaled(density)
     if not (0 < weighed.volume_abs < math.inf and np.isfinite(weighed.inertia_abs).all()):
-        raise OutputError(
-            f"the mass of {result.name} at density {density:g} is {weighed.volume_abs:g}; scale the mesh."
-        )
+        raise OutputError(f"the mass of {result.name} at density {density:g} is {weighed.volume_abs:g}; scale it.")
     visual = result.source if len(result.source.faces) else None
     name = printable_name(result.name).replace("::", "_")  # a separator between names in SDF
     if name == "world" or re.fullmatch("__.*__", name):

@@ -183,9 +183,7 @@ class I2PMAEEncoder(nn.Module):
             `count` is too small.
         """
         if count < self.sizes.groups[0]:
-            raise OptionError(
-                f"there are {count} points; this encoder needs at least {self.sizes.groups[0]} (--points)."
-            )
+            raise OptionError(f"{count} points; this encoder needs at least {self.sizes.groups[0]} (--points).")
 
     def encode(self, points: Tensor) -> Tensor:
         """Features [B, 768] of components by points [B, 2, N, 3] of their surface and their hull's, on the CPU.

@@ -45,9 +45,7 @@ def load_weights(path: Path, expected: Mapping[str, Tensor]) -> dict[str, Tensor
     for name, wanted in expected.items():
         found = state.get(name)
         if found is None:
-            raise WeightsError(
-                f"{path} is not an I2P-MAE checkpoint: {name} is missing; give the published pre-trained file."
-            )
+            raise WeightsError(f"{path} is not an I2P-MAE checkpoint: {name} is missing; give the published file.")
         if found.shape != wanted.shape:
             raise WeightsError(
                 f"{path} is not an I2P-MAE checkpoint of this size: {name} has shape {list(found.shape)}, "
