@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -49,10 +48,7 @@ def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[st
     """
     for name, data in files.items():
         if not owns(name) and store.read(name) not in (None, data):
-            raise OutputNameError(
-                f"{name} is there already, and no row of the manifest says that this batch wrote it; "
-                "move it away or choose another folder."
-            )
+            raise OutputNameError(f"{name} is there already, and in no row of the manifest; move it or choose another.")
     for name, data in files.items():
         store.write(name, data)
     return {name: len(data) for name, data in files.items()}
@@ -235,34 +231,3 @@ class AddressStore:
 
 
 ResultStore: TypeAlias = FolderStore | AddressStore
-
-
-class Journal:
-    """Lines that survive a kill of the process that writes them, but at an address those of the last few seconds."""
-
-    def __init__(self, store: ResultStore, name: str) -> None:
-        self._store, self._name = store, f"{PRIVATE}/{name}"
-        self._waiting: list[bytes] = []
-        self._written = time.monotonic()
-
-    def lines(self) -> list[bytes]:
-        """All lines that are there."""
-        return self._store.appended(self._name).splitlines()
-
-    def add(self, line: bytes) -> None:
-        """Add a line."""
-        self._waiting.append(line)
-        if time.monotonic() - self._written >= self._store.append_every:
-            self.close()
-
-    def close(self) -> None:
-        """Write the lines that wait."""
-        if self._waiting:
-            self._store.append(self._name, b"".join(self._waiting))
-        self._waiting.clear()
-        self._written = time.monotonic()
-
-    def remove(self) -> None:
-        """Remove all lines."""
-        self._waiting.clear()
-        self._store.remove_appended(self._name)

@@ -105,10 +105,8 @@ class Rollouts:
             said = f"{LOST_IN_A_ROW} episodes in a row were lost with their processes; give more --memory or a longer"
             raise TrainingError(f"{said} --limit, or fewer --jobs, and use --resume.")
         if self._without_cuts == SOLIDS_TRIED:
-            raise TrainingError(
-                f"none of {SOLIDS_TRIED} solids drawn from {len(self._names)} meshes needs a cut; give other meshes, "
-                "or a smaller threshold."
-            )
+            said = f"none of {SOLIDS_TRIED} solids drawn from {len(self._names)} meshes needs a cut"
+            raise TrainingError(f"{said}; give other meshes, or a smaller threshold.")
         return episode
 
     def state(self) -> dict[str, NDArray[Any]]:

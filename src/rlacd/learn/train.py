@@ -23,7 +23,7 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError, TrainingError
 from rlacd.io.write.atomic import write_file
-from rlacd.learn.checkpoint import adam_state, load_checkpoint, of, restore_adam, save_checkpoint, tensors, under
+from rlacd.learn.checkpoint import adam_state, load_checkpoint, restore_adam, save_checkpoint, tensors
 from rlacd.learn.encoders import Encoder, make_encoder, pick_device
 from rlacd.learn.episodes import Episode
 from rlacd.learn.meshes import MeshList, Solids, list_once
@@ -87,10 +87,8 @@ def train(
         raise OptionError(f"{run} holds a run already; use --resume to go on with it, or another folder.")
     listed = list_once(meshes, run, options.max_faces, options.validation, options.seed)
     write_file(run / "options.json", json.dumps(dataclasses.asdict(options), indent=1).encode())
-    say(
-        f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; "
-        f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
-    )
+    left_out = f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
+    say(f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; {left_out}")
     with ExitStack() as stack:
         where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
         rollouts = Rollouts(where, solids, listed.training, options, limits or ProcessLimits(), say)
@@ -208,9 +206,8 @@ class Training:
 
     def save(self) -> None:
         """Write a checkpoint."""
-        arrays = under("network", self.network.state_dict()) | under("target", self.target.state_dict())
-        arrays |= under("adam", adam_state(self.optimizer)) | under("replay", self.replay.state())
-        arrays |= under("rollouts", self.rollouts.state())
+        arrays = {"network": self.network.state_dict(), "target": self.target.state_dict()}
+        arrays |= {"adam": adam_state(self.optimizer), "replay": self.replay.state(), "rollouts": self.rollouts.state()}
         state = {name: getattr(self, name) for name in ("cuts", "learned", "seconds", "seen", "best")}
         state |= {"options": dataclasses.asdict(self.options), "encoder": self.encoder.digest}
         save_checkpoint(self.folder / "checkpoint.npz", arrays, {**state, "generator": self.rng.bit_generator.state})
@@ -227,14 +224,12 @@ class Training:
             if name not in MAY_CHANGE and (was := state["options"][name]) != value:
                 raise OptionError(f"{name} is {value!r}, but was {was!r} when the run began: resume with that.")
         if state["encoder"] != self.encoder.digest:
-            raise OptionError(
-                f"{self.options.encoder_weights} holds other weights than the run began with; give those."
-            )
-        self.network.load_state_dict(tensors(of("network", arrays)))
-        self.target.load_state_dict(tensors(of("target", arrays)))
-        restore_adam(self.optimizer, tensors(of("adam", arrays)))
-        self.replay.restore(of("replay", arrays))
-        self.rollouts.restore(of("rollouts", arrays))
+            raise OptionError(f"{self.options.encoder_weights} holds other weights than the run began with.")
+        self.network.load_state_dict(tensors(arrays["network"]))
+        self.target.load_state_dict(tensors(arrays["target"]))
+        restore_adam(self.optimizer, tensors(arrays["adam"]))
+        self.replay.restore(arrays["replay"])
+        self.rollouts.restore(arrays["rollouts"])
         self.cuts, self.learned, self.seconds, self.best = (state[k] for k in ("cuts", "learned", "seconds", "best"))
         self.seen, self.rng.bit_generator.state = state["seen"], state["generator"]
         kept = [line for line in curves.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
@@ -267,12 +262,8 @@ class Validation:
     def ratios(self, network: QNetwork, encoder: Encoder) -> dict[str, float]:
         """Ratios of the network's own plane, its ten best, and of random planes."""
         own, ten = (self._parts(policy_of(network, encoder, shortlist=n)) for n in (1, SHORTLIST))
-        return {
-            "parts": sum(own) / len(own),
-            "own_plane": mean_ratio(own, self._greedy),
-            "ten_best": mean_ratio(ten, self._greedy),
-            "random": self._random,
-        }
+        ratios = {"own_plane": mean_ratio(own, self._greedy), "ten_best": mean_ratio(ten, self._greedy)}
+        return {"parts": sum(own) / len(own), **ratios, "random": self._random}
 
     def _parts(self, policy: Policy) -> list[int]:
         """Count the parts of each solid, without merging; a decomposition stops where an episode would."""
@@ -297,10 +288,5 @@ def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(counts, 1) / np.maximum(others, 1)))))
 
 
-MAY_CHANGE = {
-    *("iterations", "checkpoint_seconds", "log_every", "validate_every"),
-    "device",
-    "threads",
-    "encoder_weights",
-}
+MAY_CHANGE = ["iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"]
 """Options that may change when a run is resumed: its length, its logging, its place and files."""

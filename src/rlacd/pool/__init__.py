@@ -19,8 +19,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeAlias, TypeVar
 
-from rlacd.errors import OptionError
-
 Values: TypeAlias = dict[str, Any]
 """Values that JSON can represent."""
 
@@ -37,21 +35,10 @@ class ProcessLimits:
         Wall time.
     memory : int
         Bytes of main memory that the process may hold; 0 for no limit.
-
-    Raises
-    ------
-    OptionError
-        A limit is not positive.
     """
 
     seconds: float = 600.0
     memory: int = 4 * 2**30
-
-    def __post_init__(self) -> None:
-        if not self.seconds > 0:
-            raise OptionError(f"the limit of time is {self.seconds!r}; it has to be a positive number of seconds.")
-        if self.memory < 0:
-            raise OptionError(f"the limit of memory is {self.memory!r}; it has to be positive, or 0 for none.")
 
 
 @dataclass(frozen=True, eq=False)

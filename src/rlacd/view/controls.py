@@ -53,9 +53,9 @@ def options_of(controls: dict[str, Any]) -> dict[str, Any]:
     return with_criterion({name: value for name, value in controls.items() if name not in others})
 
 
-def draft_of(controls: dict[str, Any]) -> dict[str, Any] | None:
-    """Get the options of a quick first pass; None if the requested options are already quick."""
-    return None if controls["quality"] == FAST else options_of({**controls, "quality": FAST})
+def passes_of(controls: dict[str, Any]) -> list[dict[str, Any]]:
+    """Get the options of each pass: a quick one first, unless those requested are quick already."""
+    return [options_of({**controls, "quality": quality}) for quality in dict.fromkeys((FAST, controls["quality"]))]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -56,7 +56,8 @@ def still_page(title: str, config: dict[str, Any], scene: dict[str, Any]) -> str
     scene : dict
         The result of `rlacd.view.scene.scene`, with ``heat`` and ``picture`` if available.
     """
-    imports = {f"page/{name}": _data_address(_asset(f"{name}.js")) for name in MODULES}
+    scripts = {name: base64.b64encode(_asset(f"{name}.js").encode()).decode("ascii") for name in MODULES}
+    imports = {f"page/{name}": f"data:text/javascript;base64,{script}" for name, script in scripts.items()}
     return _page(title, {"live": False, **config}, scene, imports, modules="data:", connect="'none'")[0]
 
 
@@ -99,10 +100,6 @@ def _hash(text: str) -> str:
 
 def _asset(name: str) -> str:
     return (resources.files("rlacd.view") / "web" / name).read_text(encoding="utf-8")
-
-
-def _data_address(script: str) -> str:
-    return "data:text/javascript;base64," + base64.b64encode(script.encode()).decode("ascii")
 
 
 def _inert(json_text: str) -> str:

@@ -185,10 +185,8 @@ def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:
     corners = np.concatenate([hull.bounds for hull in decomposition])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
     colors = linear_from_srgb(color_hulls(decomposition.hulls)[0])
-    return [
-        _body(hull.triangles + pull * (hull.bounds.mean(axis=0) - middle), color, up)
-        for hull, color in zip(decomposition, colors, strict=True)
-    ]
+    moved = [hull.triangles + pull * (hull.bounds.mean(axis=0) - middle) for hull in decomposition]
+    return [_body(triangles, color, up) for triangles, color in zip(moved, colors, strict=True)]
 
 
 def _body(triangles: npt.ArrayLike, color: npt.NDArray[np.float64], up: str) -> Body:

@@ -21,6 +21,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import math
 import re
 import tempfile
 import threading
@@ -35,12 +36,12 @@ from typing import Any
 from rlacd._version import __version__
 from rlacd.errors import OptionError, RlacdError, sentence_of
 from rlacd.io.read.load import FORMATS as READ
-from rlacd.io.write import MODELS
+from rlacd.io.write.target import MODEL_OF
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
-from rlacd.view.controls import Subject, as_command, draft_of, options_of, read_controls, read_subject
+from rlacd.view.connections import ANSWER_SECONDS, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
+from rlacd.view.controls import Subject, as_command, passes_of, read_controls, read_subject
 from rlacd.view.downloads import download, offered
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
@@ -130,11 +131,8 @@ class ViewServer(BoundedServer):
 
     def decompose(self, controls: dict[str, Any], *, other_input: bool = False) -> None:
         """Decompose the subject next: first a draft, then with the requested options."""
-        mesh = {"mesh": self.subject.path}
-        draft = draft_of(controls)
-        self.session.decompose(
-            {**mesh, **options_of(controls)}, None if draft is None else {**mesh, **draft}, other_input=other_input
-        )
+        passes = [{"mesh": self.subject.path, **options} for options in passes_of(controls)]
+        self.session.decompose(*passes, other_input=other_input)
 
     def open_mesh(self, name: str, content: bytes, controls: dict[str, Any]) -> None:
         """Replace the subject by an uploaded file.
@@ -235,7 +233,9 @@ class _Handler(BoundedHandler):
             elif place.path == "/decompose":
                 self.server.decompose(read_controls(self._body()))
             elif place.path == "/command":
-                answer["command"] = self._command(self._body())
+                path = self.server.subject.path  # an uploaded mesh has no place but a copy that goes with the viewer
+                where = path if self.server.folder is None else path.name
+                answer["command"] = as_command(where, read_controls(self._body()))
             elif place.path == "/cancel":
                 self._body()
                 self.server.session.stop()
@@ -252,16 +252,10 @@ class _Handler(BoundedHandler):
         with self.server.heavy:
             self.server.open_mesh(query.get("name", [""])[0], content, controls)
 
-    def _command(self, given: dict[str, Any]) -> str:
-        controls = read_controls(given)
-        # An uploaded mesh has no place but the copy kept here, which goes with the viewer.
-        path = self.server.subject.path
-        return as_command(path if self.server.folder is None else path.name, controls)
-
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
         """Turn errors into answers that the page shows."""
-        self.server.expect(self.connection, FOREVER)
+        self.server.expect(self.connection, math.inf)
         try:
             yield
         except (TimeoutError, ConnectionError):
@@ -299,7 +293,7 @@ class _Handler(BoundedHandler):
             raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
         self.server.expect(self.connection, seconds)
         content = self.rfile.read(int(length))
-        self.server.expect(self.connection, FOREVER)
+        self.server.expect(self.connection, math.inf)
         if len(content) != int(length):
             raise ConnectionError("the request ended early")
         return content
@@ -398,7 +392,6 @@ def preset_words(name: str) -> dict[str, Any]:
     """Describe a preset for the page: its engine, limits and format."""
     preset = PRESETS[name]
     ending = preset.ending.lstrip(".")
-    model = next((model for model, endings in MODELS.items() if ending in endings), ending)
     stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
-    limits = [f"{limit} {what}" for what, limit in stated.items() if limit]
-    return {"engine": preset.engine, "format": preset.file_format or model, "limits": " and ".join(limits)}
+    limits = " and ".join(f"{limit} {what}" for what, limit in stated.items() if limit)
+    return {"engine": preset.engine, "format": preset.file_format or MODEL_OF.get(ending, ending), "limits": limits}

@@ -39,7 +39,7 @@ def most_in_memory(given: int) -> int:
 
 
 class Triangles(NamedTuple):
-    """Triangles as a node places them; points if there are no faces."""
+    """Triangles without looks; points if there are no faces. To make a `trimesh.Trimesh` takes longer than a hull."""
 
     vertices: FloatArray
     faces: IntArray

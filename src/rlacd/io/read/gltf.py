@@ -21,7 +21,7 @@ from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
 
-MAGIC, JSON_CHUNK = b"glTF", b"JSON"
+MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 
 INSTANCES = "EXT_mesh_gpu_instancing"
 
@@ -251,16 +251,14 @@ class _Scene:
     def _repeated(self, shape: Triangles, attributes: Json) -> Triangles:
         """All instances of a shape within its node."""
         kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+        floats = self._arrays.floats
         (count,) = {self._arrays.accessor(index)["count"] for index in attributes.values()}
         self._instances += count
         if self._instances > MOST_PLACES:
             raise ValueError(f"{self._instances} instances, more than {MOST_PLACES}")
         self._arrays.need(count * (shape.vertices.nbytes + shape.faces.nbytes))
-        given = [
-            self._arrays.floats(attributes[name], kind) if name in attributes else np.array([at])
-            for (name, kind), at in zip(kinds.items(), UNMOVED, strict=True)
-        ]
-        moves = _placements(*given)
+        given = {name: floats(attributes[name], kind) for name, kind in kinds.items() if name in attributes}
+        moves = _placements(*(given.get(name, np.array([at])) for name, at in zip(kinds, UNMOVED, strict=True)))
         vertices, faces = [shape.vertices[:0]], [shape.faces[:0]]
         for number, move in enumerate(np.broadcast_to(moves, (count, 4, 4))):
             vertices.append(heights(shape.vertices, move[:3, :3]) + move[:3, 3])

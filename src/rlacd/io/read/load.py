@@ -153,10 +153,8 @@ def _finite(name: str, vertices: FloatArray, faces: IntArray, node_of: IntArray 
         usable = finite[faces].all(axis=1)
         if len(faces) and not usable.any():
             raise MeshDataError(f"every face of {name} uses a vertex that is NaN or infinite: export the mesh again")
-        warnings.append(
-            f"{int((~finite).sum())} vertices are NaN or infinite: they and the {int((~usable).sum())} faces that use "
-            "them were left out"
-        )
+        bad, unusable = np.count_nonzero(~finite), np.count_nonzero(~usable)
+        warnings = [f"{bad} vertices are NaN or infinite: they and the {unusable} faces that use them were left out"]
         faces = (np.cumsum(finite) - 1)[faces[usable]]
         node_of = None if node_of is None else node_of[usable]
         vertices = vertices[finite]

@@ -119,20 +119,15 @@ def prim_geometry(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, An
 def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
     """The points and triangles of a mesh, in its own coordinates."""
     mesh = UsdGeom.Mesh(prim)
-    points, counts, corners = (
-        np.asarray(_value(attribute) or (), dtype=kind)
-        for attribute, kind in (
-            (mesh.GetPointsAttr(), np.float64),
-            (mesh.GetFaceVertexCountsAttr(), np.int64),
-            (mesh.GetFaceVertexIndicesAttr(), np.int64),
-        )
-    )
+    points = np.asarray(_value(mesh.GetPointsAttr()) or (), dtype=np.float64)
+    counts = np.asarray(_value(mesh.GetFaceVertexCountsAttr()) or (), dtype=np.int64)
+    corners = np.asarray(_value(mesh.GetFaceVertexIndicesAttr()) or (), dtype=np.int64)
     if (counts < 0).any() or counts.sum() != len(corners):
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} that are inconsistent: export it again")
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} that refer to missing points: export it again")
-    positions = np.asarray(points.reshape(-1, 3), dtype=np.float64)
-    faces = triangles_of(positions, np.asarray(counts, dtype=np.int64), np.asarray(corners, dtype=np.int64))
+    positions = points.reshape(-1, 3)
+    faces = triangles_of(positions, counts, corners)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         faces = faces[:, ::-1]
     return positions, faces

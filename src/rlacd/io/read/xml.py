@@ -76,10 +76,7 @@ def open_archive(path: Path, content: bytes) -> zipfile.ZipFile:
     # XML of meshes compresses to a tenth, rarely to a thirtieth.
     unpacked, most = sum(member.file_size for member in members), min(2**24 + 50 * len(content), 2**30)
     if unpacked > most:
-        raise MeshFileError(
-            f"{path} unpacks to {unpacked} bytes, more than the {most} that an archive of its length may hold: "
-            "convert it to glb, obj, stl or ply"
-        )
+        raise MeshFileError(f"{path} unpacks to {unpacked} bytes, more than the {most} allowed: convert it to glb")
     if any(member.compress_type not in PLAIN for member in members):
         raise MeshFileError(f"{path} is compressed in a way that its format does not allow: export it again")
     return archive

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
@@ -44,6 +45,15 @@ class File:
     def folder(self) -> Path:
         """The folder that holds it."""
         return self.path.absolute().parent
+
+
+class Edit(NamedTuple):
+    """New bytes for the range ``[start:end]`` of a file."""
+
+    file: File
+    start: int
+    end: int
+    new: bytes
 
 
 @dataclass(eq=False)
@@ -91,6 +101,10 @@ class Element:
         at = space.rfind(b"\n")
         return space[at - (space[at - 1 : at] == b"\r") :] if at >= 0 else b""
 
+    def replaced(self, new: bytes) -> Edit:
+        """The edit that puts other bytes in the place of the element."""
+        return Edit(self.file, self.start, self.end, new)
+
     def with_attributes(self, values: Mapping[str, str]) -> bytes:
         """Return the element's bytes with attributes set in its start tag, and the rest unchanged."""
         head, rest = self.file.data[self.start : self.head], self.file.data[self.head : self.end]
@@ -102,16 +116,6 @@ class Element:
         tail = kept[len(kept.rstrip()) :]
         added = b"".join(b" " + name + b"=" + value for name, value in left.items())
         return kept.rstrip() + added + tail + close + rest
-
-
-@dataclass(frozen=True)
-class Edit:
-    """New bytes for the range ``[start:end]`` of a file."""
-
-    file: File
-    start: int
-    end: int
-    new: bytes
 
 
 def parse(path: Path, data: bytes, depth: int = 0) -> Element:

@@ -93,22 +93,16 @@ def plan_urdf(root: Element, references: References, named: Callable[[str, str],
         scale = read_scale(mesh.attributes.get("scale"), where)
         found.append((collision, mesh, MeshUse(references.find(reference, root.file.folder), scale)))
     replaced_meshes = {mesh for _, mesh, _ in found}
-    relative = [
-        mesh.attributes["filename"]
-        for mesh in root.walk()
-        if mesh.tag in ("mesh", "texture")
-        and mesh not in replaced_meshes
-        and _is_relative(mesh.attributes.get("filename"))
-    ]
+    others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced_meshes]
+    names = [each.attributes.get("filename", "") for each in others]
+    relative = [name for name in names if name and "://" not in name and not name.startswith("/")]
 
     def edit(hulls: HullFiles, *_: object) -> list[Edit]:
         edits = []
         for collision, mesh, use in found:
-            pieces = []
-            for index, hull in enumerate(hulls[use]):
-                reference = named(mesh.attributes["filename"], hull)
-                pieces.append(_collision(collision, mesh, reference, index))
-            edits.append(Edit(root.file, collision.start, collision.end, collision.indent.join(pieces)))
+            references = [named(mesh.attributes["filename"], hull) for hull in hulls[use]]
+            pieces = [_collision(collision, mesh, name, index) for index, name in enumerate(references)]
+            edits.append(collision.replaced(collision.indent.join(pieces)))
         return edits
 
     return Plan(list(dict.fromkeys(use for _, _, use in found)), edit, relative)
@@ -138,7 +132,3 @@ def _collision(collision: Element, mesh: Element, reference: str, index: int) ->
     whole = collision.with_attributes({} if own is None else {"name": f"{own}_{index:03d}"})
     at = mesh.start - collision.end + len(whole)  # the mesh stands behind what has changed
     return whole[:at] + mesh.with_attributes({"filename": reference}) + whole[at + mesh.end - mesh.start :]
-
-
-def _is_relative(reference: str | None) -> bool:
-    return bool(reference) and "://" not in str(reference) and not str(reference).startswith("/")

@@ -52,14 +52,11 @@ def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
     with output_errors(folder):
         listing = folder / f"{stem}_hulls.json"
         ours = listed_hulls(listing, stem)
-        taken = [name for name in names if name not in ours and os.path.lexists(folder / name)]
-        if os.path.lexists(listing) and _listed(listing) is None:
-            taken.append(listing.name)
+        ours |= {listing.name} if _listed(listing) is not None else set()
+        taken = [name for name in (*names, listing.name) if name not in ours and os.path.lexists(folder / name)]
     if taken:
-        raise OutputError(
-            f"cannot write {folder / taken[0]}: a file of that name is there that rlacd did not write; "
-            "move it away or choose another name."
-        )
+        said = f"cannot write {folder / taken[0]}: a file of that name is there that rlacd did not write"
+        raise OutputError(f"{said}; move it away or choose another name.")
 
 
 def listed_hulls(listing: Path, stem: str) -> set[str]:

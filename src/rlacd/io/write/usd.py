@@ -10,7 +10,7 @@ import numpy as np
 
 from rlacd.errors import import_extra
 from rlacd.io.write.encode import hull_name
-from rlacd.io.write.model import Model
+from rlacd.io.write.model import RigidBody
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull
 from rlacd.solid.primitive import Primitive
@@ -21,12 +21,12 @@ def require_usd() -> None:
     import_extra("pxr.UsdPhysics", "USD", "usd")
 
 
-def encode_usd(model: Model, ending: str) -> bytes:
+def encode_usd(model: RigidBody, ending: str) -> bytes:
     """Write a stage: the rigid body ``/<name>``, with ``visual`` (visible) and ``collision/hull_000``, ... (colliding).
 
     Parameters
     ----------
-    model : Model
+    model : RigidBody
         USD supports y or z as the up axis; a body whose x axis points up is rotated.
     ending : {"usda", "usd", "usdc"}
         Text for ``usda``, else binary.
@@ -129,7 +129,7 @@ def _collider(prim: Any, color: Any) -> None:
     UsdPhysics.CollisionAPI.Apply(prim.GetPrim())
 
 
-def _set_mass(api: Any, model: Model) -> None:
+def _set_mass(api: Any, model: RigidBody) -> None:
     from pxr import Gf
 
     moments, axes = np.linalg.eigh(model.mass.inertia_abs)

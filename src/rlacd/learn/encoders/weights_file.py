@@ -38,19 +38,15 @@ def load_weights(path: Path, expected: Mapping[str, Tensor]) -> dict[str, Tensor
         state = {name.removeprefix("module."): value for name, value in _read(path).items()}
     except (pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:160].rstrip(".")
-        raise WeightsError(
-            f"{path} is damaged, cut off or not a file of weights ({reason}): {FIRST} and all that should follow it "
-            "are missing; fetch or make it again."
-        ) from error
+        said = f"{path} is damaged, cut off or not a file of weights ({reason}): {FIRST} and all after it are missing"
+        raise WeightsError(f"{said}; fetch or make it again.") from error
     for name, wanted in expected.items():
         found = state.get(name)
         if found is None:
             raise WeightsError(f"{path} is not an I2P-MAE checkpoint: {name} is missing; give the published file.")
         if found.shape != wanted.shape:
-            raise WeightsError(
-                f"{path} is not an I2P-MAE checkpoint of this size: {name} has shape {list(found.shape)}, "
-                f"not {list(wanted.shape)}."
-            )
+            shapes = f"{list(found.shape)}, not {list(wanted.shape)}"
+            raise WeightsError(f"{path} is not an I2P-MAE checkpoint of this size: {name} has shape {shapes}.")
         if not torch.isfinite(found).all():
             raise WeightsError(f"{path} is damaged: {name} holds values that are not finite.")
     return {name: state[name].to(wanted.dtype) for name, wanted in expected.items()}
