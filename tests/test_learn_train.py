@@ -104,7 +104,6 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         ({"rotate": 1}, "rotate is"),
         ({"seed": -1}, "seed is"),
         ({"volume_reward": 0.0, "finish_reward": 0.0}, "both 0; there is nothing to learn"),
-        ({"speed": 1}, "no option 'speed'"),
         ({"name": "best"}, "preset is 'best'"),
     ],
 )

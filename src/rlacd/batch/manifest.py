@@ -37,12 +37,9 @@ class Ledger:
         self._written = time.monotonic()
         self._rows: dict[str, Row] = {}
         self._owner: dict[str, str] = {}
-        for where, content in (
-            (name, store.read(name) or b""),
-            (f"the journal of {name}", store.appended(self._journal)),
-        ):
-            for row in _read(where, content.splitlines()):
-                self._put(row)
+        kept = {name: store.read(name) or b"", f"the journal of {name}": store.appended(self._journal)}
+        for row in (row for where, content in kept.items() for row in _read(where, content.splitlines())):
+            self._put(row)
 
     def get(self, mesh: str) -> Row | None:
         """The row of a mesh."""
