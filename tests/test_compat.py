@@ -11,10 +11,9 @@ import pytest
 import trimesh
 
 import rlacd
+from rlacd.compat import UnusedOptionWarning, unused
 from rlacd.compat import coacd as our_coacd
-from rlacd.compat import unused
 from rlacd.compat.trimesh import convex_decomposition
-from rlacd.compat.unused import UnusedOptionWarning
 from rlacd.compat.vhacd import compute_vhacd
 from rlacd.errors import MeshDataError, OptionError
 from tests.hulls import assert_convex_hull

@@ -25,9 +25,8 @@ _NAMES = (
 _USUAL, _SPACE = Options(), NavigableSpace()
 _NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
 
-CONTROLS: dict[str, Any] = {name: getattr(_SPACE if hasattr(_SPACE, name) else _USUAL, name) for name in _NAMES} | {
-    "primitives": False
-}
+CONTROLS: dict[str, Any] = {name: getattr(_SPACE if hasattr(_SPACE, name) else _USUAL, name) for name in _NAMES}
+CONTROLS["primitives"] = False
 """The page's controls, by the names of options, with their first values."""
 
 

@@ -154,14 +154,10 @@ def picture_bytes(
 
 def caption(decomposition: Result) -> str:
     """One line of numbers: hulls, faces, how well they fit; the same on every machine."""
-    report = decomposition.report
-    count = len(decomposition)
+    report, count, fit = decomposition.report, len(decomposition), Fit.of(decomposition.report)
     words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
-    fit = Fit.of(report)
-    if fit is not None and (said := fit.words()):
-        words.append(said)
-    if not report.get("complete", True):
-        words.append(f"stopped early by {report.get('stopped_by')}")
+    words += [said] if fit is not None and (said := fit.words()) else []
+    words += [] if report.get("complete", True) else [f"stopped early by {report.get('stopped_by')}"]
     return "   ·   ".join(words)
 
 

@@ -50,12 +50,8 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     if decomposition.balls is not None and len(decomposition.balls):
         some = apart(decomposition.balls)
         shown = min(len(some), 4000)  # more are slow to draw
-        balls = {
-            "centres": floats(frame.to_frame(some.centres[:shown])),
-            "radii": floats(some.radii[:shown] * frame.scale),
-            "shown": shown,
-            "of": len(decomposition.balls),
-        }
+        centres, radii = frame.to_frame(some.centres[:shown]), some.radii[:shown] * frame.scale
+        balls = {"centres": floats(centres), "radii": floats(radii), "shown": shown, "of": len(decomposition.balls)}
     return {
         **input_scene(decomposition.name, source.vertices, source.faces, up, unit=unit, frame=frame),
         "report": report,

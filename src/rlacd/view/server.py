@@ -78,31 +78,18 @@ class ViewServer(BoundedServer):
         The port is in use, forbidden, or out of range.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        subject: Subject,
-        *,
-        port: int | None,
-        options: dict[str, Any],
-    ) -> None:
+    def __init__(self, session: Session, subject: Subject, *, port: int | None, options: dict[str, Any]) -> None:
         self.session, self.subject = session, subject
         self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
         self.uploads = threading.BoundedSemaphore(UPLOADS)
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making = threading.Lock()
         self._opening = threading.Lock()
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
-        page, policy = live_page(
-            subject.name,
-            {
-                "options": options,
-                "downloads": [asdict(offer) for offer in offered()],
-                "presets": [{"name": name, **preset_words(name)} for name in PRESETS],
-                "formats": list(READ),
-                "version": __version__,
-            },
-        )
+        self.uploaded: tempfile.TemporaryDirectory[str] | None = None
+        config = {"options": options, "formats": list(READ), "version": __version__}
+        config["downloads"] = [asdict(offer) for offer in offered()]
+        config["presets"] = [{"name": name, **preset_words(name)} for name in PRESETS]
+        page, policy = live_page(subject.name, config)
         self.page, self.policy = page.encode(), f"{policy}; frame-ancestors 'none'"
         self._bind(port)
         self._thread = threading.Thread(target=self.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
@@ -112,11 +99,6 @@ class ViewServer(BoundedServer):
     def address(self) -> str:
         """URL of the page."""
         return f"http://{ADDRESS}:{self.server_address[1]}/"
-
-    @property
-    def folder(self) -> Path | None:
-        """Folder of an uploaded mesh; None if there is none."""
-        return None if self._folder is None else Path(self._folder.name)
 
     @property
     def at_work(self) -> bool:
@@ -152,15 +134,15 @@ class ViewServer(BoundedServer):
                 folder.cleanup()
                 raise
             self.decompose(controls, other_input=True)
-            if self._folder is not None:
-                self._folder.cleanup()
-            self._folder = folder
+            if self.uploaded is not None:
+                self.uploaded.cleanup()
+            self.uploaded = folder
 
     def server_close(self) -> None:
         """Stop listening, and remove uploaded files."""
         super().server_close()
-        if self._folder is not None:
-            self._folder.cleanup()
+        if self.uploaded is not None:
+            self.uploaded.cleanup()
 
     def scene(self) -> bytes:
         """Return the scene as JSON; computed once per subject or result."""
@@ -234,7 +216,7 @@ class _Handler(BoundedHandler):
                 self.server.decompose(read_controls(self._body()))
             elif place.path == "/command":
                 path = self.server.subject.path  # an uploaded mesh has no place but a copy that goes with the viewer
-                where = path if self.server.folder is None else path.name
+                where = path if self.server.uploaded is None else path.name
                 answer["command"] = as_command(where, read_controls(self._body()))
             elif place.path == "/cancel":
                 self._body()

@@ -125,12 +125,9 @@ def scene_of_3mf(path: Path, content: bytes) -> trimesh.Scene:
         shared[id(thing)] = key
         mesh = trimesh.Trimesh(*thing.shape, process=False)
         if thing.color is not None:
-            material = trimesh.visual.material.PBRMaterial(
-                baseColorFactor=np.array(thing.color),
-                metallicFactor=0.0,
-                roughnessFactor=0.5,
-                alphaMode="OPAQUE" if thing.color[3] == 1.0 else "BLEND",
-            )
+            how: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.5}
+            how["alphaMode"] = "OPAQUE" if thing.color[3] == 1.0 else "BLEND"
+            material = trimesh.visual.material.PBRMaterial(baseColorFactor=np.array(thing.color), **how)
             mesh.visual = trimesh.visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, node_name=key, geom_name=key, transform=node.transform)
     return scene

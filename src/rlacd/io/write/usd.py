@@ -18,7 +18,8 @@ from rlacd.solid.primitive import Primitive
 
 def require_usd() -> None:
     """Raise MissingExtraError, with installation advice, unless USD can be imported."""
-    import_extra("pxr.UsdPhysics", "USD", "usd")
+    for module in ("pxr", "pxr.UsdPhysics"):
+        import_extra(module, "USD", "usd")
 
 
 def encode_usd(model: RigidBody, ending: str) -> bytes:
