@@ -82,7 +82,7 @@ class TrainOptions:
     validate_every
         Cuts between validations.
     validation
-        Meshes held out for validation; 0 validates on the training meshes.
+        Meshes held out for validation; 0 validates on the first 16 training meshes.
     checkpoint_seconds
         Seconds between checkpoints.
 

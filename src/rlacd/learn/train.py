@@ -38,9 +38,6 @@ from rlacd.pool import Pool, ProcessLimits, Shared
 from rlacd.pool.local import InProcessPool
 from rlacd.run import Run
 
-VALIDATED = 16
-"""At most this many solids are validated with."""
-
 
 def train(
     meshes: Path,
@@ -250,7 +247,7 @@ class Validation:
     """Raw parts of a few solids, as geometric means of their ratios to greedy's over the 150 planes alone."""
 
     def __init__(self, listed: MeshList, solids: Solids, options: TrainOptions) -> None:
-        names = (listed.validation or listed.training)[:VALIDATED]
+        names = listed.validation or listed.training[: TrainOptions.validation]
         self._solids = [solid for name in names if (solid := solids.get(name)) is not None]
         if not self._solids:
             raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")

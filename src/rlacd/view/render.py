@@ -110,6 +110,7 @@ def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.floa
 
 
 def _sensor(mi: Any, eye: npt.NDArray[np.float64], width: int, height: int) -> dict[str, Any]:
+    film: dict[str, Any] = {"type": "hdrfilm", "pixel_format": "rgba", "rfilter": {"type": "gaussian"}}
     return {
         "type": "perspective",
         "fov": FIELD_OF_VIEW,
@@ -117,13 +118,7 @@ def _sensor(mi: Any, eye: npt.NDArray[np.float64], width: int, height: int) -> d
         "near_clip": 1e-3,
         "far_clip": 1e4,
         "to_world": mi.ScalarTransform4f().look_at(origin=eye.tolist(), target=[0, 0, 0], up=[0, 0, 1]),
-        "film": {
-            "type": "hdrfilm",
-            "width": width,
-            "height": height,
-            "pixel_format": "rgba",
-            "rfilter": {"type": "gaussian"},
-        },
+        "film": film | {"width": width, "height": height},
         "sampler": {"type": "multijitter"},
     }
 
@@ -132,11 +127,8 @@ def _lamp(mi: Any) -> dict[str, Any]:
     """Beside the uniform sky, one lamp gives the shadows a direction."""
     position = [1.2, -2.2, 3.2]
     facing = mi.ScalarTransform4f().look_at(origin=position, target=[0, 0, 0], up=[0, 1, 0])
-    return {
-        "type": "rectangle",
-        "to_world": facing @ mi.ScalarTransform4f().scale(1.1),
-        "light": {"type": "area", "radiance": {"type": "rgb", "value": 12.0}},
-    }
+    light = {"type": "area", "radiance": {"type": "rgb", "value": 12.0}}
+    return {"type": "rectangle", "to_world": facing @ mi.ScalarTransform4f().scale(1.1), "light": light}
 
 
 def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.float64]) -> Any:

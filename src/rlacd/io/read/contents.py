@@ -27,15 +27,10 @@ MOST_PLACES = 100_000
 """Nodes of a scene, and instances of its geometries; parsers take about a kilobyte for each."""
 
 LONGEST_NAME = 1000
-"""Instances of one part. Each gets a unique name by a counting suffix."""
+"""Characters of a node's name that are kept."""
 
 DEEPEST_PART = 20
 """Depth of nested instances: the cost of an instance grows with the cube of its depth."""
-
-
-def most_in_memory(given: int) -> int:
-    """Bytes of arrays that a file of this size may need: an index byte becomes eight, some are used repeatedly."""
-    return 2**29 + 16 * given
 
 
 class Triangles(NamedTuple):

@@ -31,9 +31,6 @@ READ = re.compile(
 )
 """Extensions that leave the triangles as they are, or that are read."""
 
-ENCODED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-"""Extensions that encode the triangles and are not read: without the decoder, the file holds zeros in their place."""
-
 POINTS, LINES, SURFACES = (0,), (1, 2, 3), (TRIANGLES := 4, STRIP := 5, FAN := 6)
 """Modes of primitives."""
 
@@ -64,7 +61,7 @@ def read_gltf(path: Path, content: bytes) -> Contents:
     arrays = Arrays(header, rest, len(content), FolderFiles(path.parent).get)
     required = DRACO in header.get("extensionsRequired", [])
     if not decode_draco(path, primitives, required, arrays) and required:
-        raise _hidden(path, DRACO)
+        raise _unread(path, DRACO)
     with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
         geometry, warnings = _Scene(header, arrays).read()
     return Contents(geometry, warnings, "y", 1.0, Asset(content, path, "gltf"))
@@ -94,10 +91,8 @@ def split(content: bytes) -> tuple[Json, bytes | None]:
 def _checked(path: Path, header: Json) -> list[Json]:
     """Refuse extensions that are not read, and more than is reasonable; returns all primitives."""
     for name in header.get("extensionsRequired", []):
-        if name in ENCODED:
-            raise _hidden(path, name)
         if READ.fullmatch(str(name)) is None:
-            raise MeshFileError(f"{path} requires the extension {name!r:.60}, which is not read: export it without it")
+            raise _unread(path, name)
     nodes = header.get("nodes", [])
     primitives = [primitive for mesh in header.get("meshes", []) for primitive in mesh["primitives"]]
     edges = sum(len(node.get("children", [])) for node in nodes)
@@ -109,11 +104,9 @@ def _checked(path: Path, header: Json) -> list[Json]:
     return primitives
 
 
-def _hidden(path: Path, extension: str) -> MeshFileError:
-    return MeshFileError(
-        f"{path} hides its triangles by {extension}, which is not read: export it again without that compression, "
-        "or run  npx @gltf-transform/cli copy IN.glb OUT.glb"
-    )
+def _unread(path: Path, extension: str) -> MeshFileError:
+    how = "export it without, or, if that compresses it, run  npx @gltf-transform/cli copy IN.glb OUT.glb"
+    return MeshFileError(f"{path} requires the extension {extension!r:.60}, which is not read: {how}")
 
 
 class _Scene:

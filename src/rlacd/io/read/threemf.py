@@ -162,10 +162,6 @@ def _color(element: Any) -> Color | None:
     match = _HEX.match(element.get("displaycolor", element.get("color", "")))
     if match is None:
         return None
-    red, green, blue = (_linear(int(match[1][at : at + 2], 16) / 255) for at in (0, 2, 4))
+    srgb = [int(match[1][at : at + 2], 16) / 255 for at in (0, 2, 4)]
+    red, green, blue = (value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in srgb)
     return red, green, blue, int(match[2] or "ff", 16) / 255
-
-
-def _linear(value: float) -> float:
-    """A channel of sRGB as light."""
-    return float(value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4)

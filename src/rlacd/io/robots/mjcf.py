@@ -193,8 +193,7 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
     defaults = Defaults.of(root)
     assets = {_mesh_name(mesh, defaults): mesh for section in root.named("asset") for mesh in section.named("mesh")}
     warnings: list[str] = []
-    bodies = [element for element in root.walk() if element.tag in BODIES]
-    geoms = [geom for body in bodies for geom in _colliding(body, defaults, compiler)]
+    geoms = [geom for body in root.walk() if body.tag in BODIES for geom in _colliding(body, defaults, compiler)]
     meshes = []
     for name in dict.fromkeys(geom.mesh for geom in geoms):
         full = defaults.full(assets[name]) if name in assets else {}
@@ -217,24 +216,19 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
         for mesh in meshes:
             names[mesh.name] = [_unused(f"{mesh.name}_{i:03d}", own) for i in range(len(hulls[mesh.use]))]
             edits.append(_hull_assets(mesh, named, zip(names[mesh.name], hulls[mesh.use], strict=True)))
-            moved = compiler.relocated(mesh.asset)
-            values = {} if moved is None else {"file": moved}
+            values = {"file": moved} if (moved := compiler.relocated(mesh.asset)) is not None else {}
             if mesh.use in copies:
                 values["file"] = named(mesh.full["file"], copies[mesh.use])
             if _lacks_volume(sources[mesh.use], mesh.full.get("inertia", "legacy")):
                 values["inertia"] = "shell"
-                warnings.append(_as_shell(mesh, geoms))
+                weighed = any(g.mesh == mesh.name and g.is_weighed and "mass" not in g.attributes for g in geoms)
+                said = " Its mass is its area times the density." if weighed else ""
+                warnings.append(f'{mesh.use.path.name} has no volume, so its mesh got inertia="shell".{said}')
             edits += [mesh.asset.replaced(mesh.asset.with_attributes(values))] if values else []
         edits += [_geom_edit(geom, names[geom.mesh], taken) for geom in geoms]
         return edits + _relocations(compiler, edits, rewritten)
 
     return Plan(list(dict.fromkeys(mesh.use for mesh in meshes)), edit, relative, warnings)
-
-
-def _as_shell(mesh: _Mesh, geoms: Sequence[_Geom]) -> str:
-    weighed = any(geom.mesh == mesh.name and geom.is_weighed and "mass" not in geom.attributes for geom in geoms)
-    density = " Its mass is its area times the density." if weighed else ""
-    return f'{mesh.use.path.name} has no volume, so its mesh got inertia="shell".{density}'
 
 
 def _hull_assets(mesh: _Mesh, named: Callable[[str, str], str], hulls: Iterable[tuple[str, str]]) -> Edit:

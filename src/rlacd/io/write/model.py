@@ -18,7 +18,7 @@ from rlacd.options.names import UNITS, PrimitiveKind
 from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.frame import Frame
+from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.mass import Mass, mass_of
 from rlacd.solid.primitive import Primitive
 
@@ -154,12 +154,12 @@ def hollow(result: Result) -> str | None:
     sheets = sum(body["faces_in"] for body in bodies if body["step"] == SHEET)
     if 2 * sheets <= sum(body["faces_in"] for body in bodies):
         return None
-    walls = f"walls {SHEET_THICKNESS / result.report['scale']:.3g} thick"
+    walls = f"walls {2 * HALF_THICKNESS / result.report['scale']:.3g} thick"
     return f"{result.name} is a hollow shell of open sheets, weighed as {walls}: mass= (--mass) sets its mass."
 
 
-SHEET, SHEET_THICKNESS = "slab", 2e-3
-"""The step of repair that gives sheets a thickness, and that thickness, where the longest side is 2."""
+SHEET = "slab"
+"""The step of repair that gives sheets a thickness."""
 
 PREFERRED = (5e-3, 5.0)
 """Metres: a unit is suggested if the body is as long in it."""
