@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from rlacd._native import PointTree
 from rlacd.errors import import_extra
-from rlacd.fit import Fit
 from rlacd.io.write import write_file
 from rlacd.io.write.palette import linear_from_srgb
 from rlacd.io.write.target import checked_place
@@ -145,20 +144,12 @@ def picture_bytes(
     if not clear:
         margin = round(32 * unit)
         _write(sheet, decomposition.name, (margin, round(40 * unit)), round(34 * unit), INK, anchor="lm")
-        _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
+        facts = "   ·   ".join(decomposition.facts())
+        _write(sheet, facts, (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
 
     encoded = io.BytesIO()
     (sheet if clear else sheet.convert("RGB")).save(encoded, format="PNG")
     return encoded.getvalue()
-
-
-def caption(decomposition: Result) -> str:
-    """One line of numbers: hulls, faces, how well they fit; the same on every machine."""
-    report, count, fit = decomposition.report, len(decomposition), Fit.of(decomposition.report)
-    words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
-    words += [said] if fit is not None and (said := fit.words()) else []
-    words += [] if report.get("complete", True) else [f"stopped early by {report.get('stopped_by')}"]
-    return "   ·   ".join(words)
 
 
 def apart(balls: Balls) -> Balls:

@@ -84,13 +84,13 @@ def _with_scene(result: Result, file_format: str, ending: str, keep_input: bool)
 
     With `keep_input`, an input without a scene is the triangles in grey.
     """
-    has_scene, kept = result.input is not None and result.input.asset is not None, function_of("write.keep:encode_kept")
+    has_scene, kept = result.input is not None and result.input.asset is not None, "write.keep:encode_kept"
     if ending == "glb" and has_scene and file_format in ENGINE_NAMES:
-        return bytes(kept(result, ENGINE_NAMES[file_format], colored=False))
+        return bytes(function_of(kept)(result, ENGINE_NAMES[file_format], colored=False))
     if not keep_input or not result.hulls:
         return None
     if has_scene:
-        return bytes(kept(result, lambda name, index, primitive: f"{name}_{hull_name(index)}", colored=True))
+        return bytes(function_of(kept)(result, lambda name, index, _: f"{name}_{hull_name(index)}", colored=True))
     visual = (node_name(result.name), result.source) if len(result.source.faces) else None
     return encode_glb(result.hulls, visual=visual)
 

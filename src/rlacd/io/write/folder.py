@@ -6,8 +6,8 @@ import contextlib
 import json
 import os
 import re
+import secrets
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -36,7 +36,8 @@ def write_folder(
         # Inside an existing folder, not beside it: it may be the root of a disk, and renames cannot cross disks.
         parent = folder if folder.is_dir() else folder.resolve().parent
         parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=".rlacd-", suffix=".tmp", dir=parent))
+        staging = parent / f".rlacd-{secrets.token_hex(8)}.tmp"
+        staging.mkdir()
         try:
             for name, data in {**files, listing: _list(files)}.items():
                 write_file(staging / name, data)
@@ -83,7 +84,6 @@ def _list(names: Sequence[str] | Mapping[str, bytes]) -> bytes:
 
 def _appear(staging: Path, folder: Path, then: Callable[[], None]) -> bool:
     """Give a complete folder its name; False if another run's has appeared there first."""
-    _open_to_umask(staging)
     with _locked(staging):  # the lock goes with the folder, so that nobody fills it before `then` is done
         try:
             os.rename(staging, folder)
@@ -125,10 +125,3 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _open_to_umask(folder: Path) -> None:
-    # mkdtemp makes the folder private to the user; give it the mode of any new folder of theirs.
-    umask = os.umask(0)
-    os.umask(umask)
-    folder.chmod(0o777 & ~umask)
