@@ -93,7 +93,7 @@ def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcom
     with ThreadPoolExecutor(1024) as threads:  # they start as needed, and wait for answers
         try:
             while True:
-                room = max(1, work.pool.room // work.spec.threads)
+                room = max(1, work.pool.room // work.spec.options["threads"])
                 while len(running) < room + WRITERS and sum(not writing for _, writing in running.values()) < room:
                     if (task := next(tasks, None)) is None:
                         break

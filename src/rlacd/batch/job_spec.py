@@ -90,11 +90,6 @@ class JobSpec:
             saved["file_format"] = None  # the same as not given
         return cls(plain, ending, saved, _weights(checked.first_policy))
 
-    @property
-    def threads(self) -> int:
-        """Number of threads for one mesh."""
-        return int(self.options["threads"])
-
     def key(self, content: str, name: str) -> str:
         """Name the result of a mesh with this content by everything that determines its bytes.
 

@@ -150,7 +150,7 @@ def _request(task: Task, work: Work) -> Request:
     brought, stem = work.pool.many_machines, PurePosixPath(task.asset.place).name
     path, files = (None, task.asset.files()) if brought else (str(task.asset.path), {})
     values = {"spec": asdict(work.spec), "path": path, "name": task.asset.name, "stem": stem, "hull_only": False}
-    return Request(SERVER, values, files, work.shared, work.limits, work.spec.threads)
+    return Request(SERVER, values, files, work.shared, work.limits, work.spec.options["threads"])
 
 
 def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerDiedError | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -126,11 +125,9 @@ def picture_bytes(
         some = apart(decomposition.balls)
         spheres = Spheres(some.centres @ TO_Z_UP[up].T, some.radii, BALL_COLOR)
         panels.insert(2, ("some of the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
-    columns = 3 if len(panels) == 3 else 2
-    rows = math.ceil(len(panels) / columns)
-    panel_width = width // columns
-    panel_height = round(panel_width * 0.92 if rows == 1 else panel_width * 0.62)
-    unit = width / 1600
+    columns, rows = (3, 1) if len(panels) == 3 else (2, 2)
+    panel_width, unit = width // columns, width / 1600
+    panel_height = round(panel_width * (0.92 if rows == 1 else 0.62))
     header, footer = 0 if clear else round(104 * unit), round(44 * unit)
     size = width, header + rows * (panel_height + footer)
     sheet = image.new("RGBA", size, (*PAPER, 0 if clear else 255))

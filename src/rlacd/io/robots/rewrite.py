@@ -148,7 +148,7 @@ def rewrite_robot(
         warnings += [*said, *(f"{use.path.name}: {warning}" for warning in result.report.get("warnings", []))]
     named = {use: mesh.files for use, mesh in meshes.items()}
     edits = plan.edit(named, {use: mesh.result.source for use, mesh in meshes.items()}, copies)
-    data = edited(root, edits, [element for element in root.walk() if element.included is not None])
+    data = edited(root, edits)
     warnings += [warning for warning in plan.warnings if warning not in warnings] + _fewer(meshes, options)
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
@@ -216,10 +216,9 @@ def _left_behind(files: Sequence[str], source: Path, place: Path) -> list[str]:
     """Warn about other files that are named relative to a folder which the result does not lie in."""
     if not files or os.path.realpath(place.absolute().parent) == os.path.realpath(source):
         return []
-    return [
-        f"{len(files)} other files, such as {files[0]}, are referred to relative to {source} and will not be found "
-        f"from {place.absolute().parent}: write the result beside the input, or copy them too."
-    ]
+    said = f"{len(files)} other files, such as {files[0]}, are referred to relative to {source}"
+    lost = f"will not be found from {place.absolute().parent}: write the result beside the input, or copy them too"
+    return [f"{said} and {lost}."]
 
 
 def _reference(old: str, hull: str, references: References, folder: Path) -> str:
@@ -241,11 +240,9 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     stated |= options.get("criterion") not in (None, "concavity")
     if stated or max(scales) < 2 * min(scales) or hulls < MANY_HULLS * len(meshes):
         return []
-    length = reports[0]["options"]["threshold"] / min(scales)
-    return [
-        f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; --threshold-abs "
-        f"{float(f'{1.05 * length:.2g}'):g}, about that of the largest, may give fewer."  # 5 %: never rounded below it
-    ]
+    length = float(f"{1.05 * reports[0]['options']['threshold'] / min(scales):.2g}")  # 5 %: never rounded below it
+    said = f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each"
+    return [f"{said}; --threshold-abs {length:g}, about that of the largest, may give fewer."]
 
 
 MANY_HULLS = 10

@@ -202,16 +202,12 @@ def expand(root: Element, find: Callable[[str, Element], Path], read: Callable[[
             waiting += [below for below in child.walk() if below.tag == "include"]
 
 
-def edited(root: Element, edits: Sequence[Edit], includes: Sequence[Element] = ()) -> bytes:
-    """Return the root's file with all edits, which do not overlap; an included file that changes is written into it.
-
-    `includes` are the ``<include>`` elements below `root`, those in other files too.
-    """
+def edited(root: Element, edits: Sequence[Edit]) -> bytes:
+    """Return the root's file with all edits, which do not overlap; an included file that changes is written into it."""
     changes = [(edit.start, edit.end, edit.new) for edit in edits if edit.file is root.file]
-    for element in includes:
-        if element.file is root.file and element.included is not None:
-            inner = element.included
-            whole = edited(inner, edits, includes)
+    for element in root.walk():
+        if element.file is root.file and (inner := element.included) is not None:
+            whole = edited(inner, edits)
             if whole != inner.file.data:
                 last = inner.end if inner.head == inner.end else inner.file.data.rindex(b"</", 0, inner.end)
                 content = whole[inner.head : len(whole) - (len(inner.file.data) - last)]
