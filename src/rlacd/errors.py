@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+import importlib
 from typing import Any
 
 
@@ -57,7 +57,7 @@ class ImplausibleBodyWarning(UserWarning):
 def import_extra(module: str, what: str, extra: str) -> Any:
     """Import a module that an extra installs; raises MissingExtraError, which says what needs it and how to get it."""
     try:
-        return import_module(module)
+        return importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise MissingExtraError(extra_needed(what, extra)) from error
     except ImportError as error:  # a system library is missing, such as libatomic in a container without a compiler

@@ -80,7 +80,8 @@ class ViewServer(BoundedServer):
 
     def __init__(self, session: Session, subject: Subject, *, port: int | None, options: dict[str, Any]) -> None:
         self.session, self.subject = session, subject
-        self.heavy, self.uploads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(UPLOADS)
+        self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
+        self.uploads = threading.BoundedSemaphore(UPLOADS)
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making, self._opening = threading.Lock(), threading.Lock()
         self.uploaded: tempfile.TemporaryDirectory[str] | None = None
@@ -297,7 +298,7 @@ class _Handler(BoundedHandler):
 
     def _send_file(self, wanted: str, up: str) -> None:
         check_up(up)
-        with self.server.heavy:
+        with self.server.downloads:
             name, content = download(self._result()[1], wanted, up=up)
         plain = name.encode("ascii", "replace").decode().replace('"', "_").replace("\\", "_")
         exact = urllib.parse.quote(name.encode(errors="replace"))
