@@ -35,12 +35,9 @@ EVERYTHING = "**"
 HULLS = "_hulls"
 """What `rlacd decompose` appends to a mesh's name to name its hulls."""
 
-# How files written by rlacd begin, within the first bytes.
-_MARKS = {
-    ".glb": f'"generator":"{GENERATOR}"'.encode(),
-    ".obj": f"# {GENERATOR}".encode(),
-    ".ply": f"comment {GENERATOR}".encode(),
-}
+_MARKS = f'"generator":"{GENERATOR}"', f"# {GENERATOR}", f"comment {GENERATOR}"
+"""What GLB, OBJ and PLY files written by rlacd say, within the first bytes."""
+
 _MARK_BYTES = 128
 
 
@@ -188,14 +185,11 @@ def _is_written(path: Path) -> bool:
     if path.suffix.lower() in ROBOTS:  # the hulls of models and rewritten robots are listed in a folder beside them
         kind = "mjcf" if path.suffix.lower() == ".xml" else "urdf"
         return any(path.with_name(f"{path.stem}_{kind}").glob(f"*{HULLS}.json"))
-    mark = _MARKS.get(path.suffix.lower())
-    if mark is None or not path.is_file():
-        return False
-    try:
-        with path.open("rb") as file:
-            return mark in file.read(_MARK_BYTES)
-    except OSError:  # reported when the mesh is read
-        return False
+    if path.is_file():  # what cannot be opened is reported when the mesh is read
+        with contextlib.suppress(OSError), path.open("rb") as file:
+            head = file.read(_MARK_BYTES).decode("latin-1")
+            return any(mark in head for mark in _MARKS)
+    return False
 
 
 def _refuse(error: OSError) -> None:

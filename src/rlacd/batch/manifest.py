@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import PurePosixPath
 from types import TracebackType
 from typing import Any, TypeAlias
@@ -16,7 +17,7 @@ Row: TypeAlias = dict[str, Any]
 """``mesh``, the asset's name, and facts about it; in the manifest also ``outputs``, the length of each of its files."""
 
 
-class Ledger:
+class Ledger(AbstractContextManager["Ledger"]):
     """The rows of a folder of results; rows of meshes outside this run are kept.
 
     Parameters
@@ -58,9 +59,6 @@ class Ledger:
         self._waiting.append(_line(row))
         if time.monotonic() - self._written >= self._store.append_every:
             self._write_journal()
-
-    def __enter__(self) -> Ledger:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """Write the sorted file and remove the journal; after an error, leave the journal for the next run."""

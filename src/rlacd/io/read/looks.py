@@ -85,7 +85,7 @@ def opened_picture(beside: FolderFiles, name: str) -> Any:
         picture.load()  # now, when one that cannot be decoded may still be left out
         return picture
     except Exception as error:  # decoders may raise anything
-        reasons = {ImportError: "run  pip install 'rlacd[view]'", FileNotFoundError: "it is not in the folder"}
-        why = next((said for kind, said in reasons.items() if isinstance(error, kind)), "it is damaged or too large")
+        why = "it is not in the folder" if isinstance(error, FileNotFoundError) else "it is damaged or too large"
+        why = "run  pip install 'rlacd[view]'" if isinstance(error, ImportError) else why
         warnings.warn(f"the picture {name!r:.100} was left out: {why}", UserWarning, stacklevel=2)
         return None
