@@ -86,8 +86,8 @@ def describe_text(facts: dict[str, Any]) -> str:
     """Format the result of `describe` as a few lines of text."""
     size = [high - low for low, high in zip(*facts["bounds"], strict=True)]
     bodies = facts["repair"]
-    count = f"{len(bodies)} bod{'y' if len(bodies) == 1 else 'ies'}"
-    lines = [facts["file"], f"  holds    {facts['faces']} triangles, {facts['vertices']} vertices, {count}"]
+    held = f"{len(bodies)} bod{'y' if len(bodies) == 1 else 'ies'}"
+    lines = [facts["file"], f"  holds    {facts['faces']} triangles, {facts['vertices']} vertices, {held}"]
     lines.append(f"  size     {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g}")
     lines.append(f"  repaired {facts['solid']['faces']} triangles, volume {facts['solid']['volume']:.6g}")
     for step, count in Counter(body["step"] for body in bodies).most_common():

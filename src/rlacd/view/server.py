@@ -85,7 +85,7 @@ class ViewServer(BoundedServer):
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making, self._opening = threading.Lock(), threading.Lock()
         self.uploaded: tempfile.TemporaryDirectory[str] | None = None
-        config = {"options": options, "formats": list(READ), "version": __version__}
+        config: dict[str, Any] = {"options": options, "formats": list(READ), "version": __version__}
         config["downloads"] = [asdict(offer) for offer in offered()]
         config["presets"] = [{"name": name, **preset_words(name)} for name in PRESETS]
         page, policy = live_page(subject.name, config)

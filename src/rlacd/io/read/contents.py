@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from rlacd.errors import MeshDataError, MeshFileError
 from rlacd.options.output import Axis
@@ -37,7 +38,7 @@ class Triangles(NamedTuple):
     """Triangles without looks; points if there are no faces. To make a `trimesh.Trimesh` takes longer than a hull."""
 
     vertices: FloatArray
-    faces: IntArray
+    faces: npt.NDArray[Any]
 
 
 class Contents(NamedTuple):

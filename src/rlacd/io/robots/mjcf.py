@@ -348,9 +348,9 @@ def _mesh_name(mesh: Element, defaults: Defaults) -> str:
 
 
 def _caveats(root: Element, geoms: list[_Geom]) -> Iterator[str]:
-    for kind in ("model", "attach"):
-        if any(element.tag == kind for element in root.walk()):
-            yield f"What <{kind}> brings in is left unchanged: rewrite that file too."
+    for tag in ("model", "attach"):
+        if any(element.tag == tag for element in root.walk()):
+            yield f"What <{tag}> brings in is left unchanged: rewrite that file too."
     names = {geom.element.attributes.get("name") for geom in geoms} - {None}
     for element in root.walk():
         for attribute, kind in NAMED_BY.items():

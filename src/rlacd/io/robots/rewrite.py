@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError
+from rlacd.io.read.contents import Triangles
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
@@ -25,7 +26,6 @@ from rlacd.io.robots.urdf import MeshUse, Plan, plan_urdf
 from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
-from rlacd.io.write.single_precision import Triangles
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
 from rlacd.options import LENGTHS
 from rlacd.options.fields import checked, path_like, read, shown

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from rlacd.io.read.contents import Triangles
 from rlacd.io.read.gltf import BINARY_CHUNK, JSON_CHUNK, MAGIC
-from rlacd.io.write.single_precision import Triangles
 
 ROUGHNESS = 0.8
 

@@ -18,11 +18,12 @@ import numpy as np
 import trimesh
 
 from rlacd.io.read.beside import DATA, IMAGES, FolderFiles
+from rlacd.io.read.contents import Triangles
 from rlacd.io.read.gltf import split
 from rlacd.io.write.converted import converted, nodes_of
 from rlacd.io.write.glb import GltfFile, Placed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import Triangles, required_hull
+from rlacd.io.write.single_precision import required_hull
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh

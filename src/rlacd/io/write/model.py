@@ -12,8 +12,9 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OutputError
+from rlacd.io.read.contents import Triangles
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
-from rlacd.io.write.single_precision import Triangles, placed_mesh, required_hull
+from rlacd.io.write.single_precision import placed_mesh, required_hull
 from rlacd.options.names import UNITS, PrimitiveKind
 from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.result import Result
