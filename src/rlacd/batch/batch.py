@@ -23,7 +23,6 @@ from rlacd.pool import Pool, ProcessLimits, WorkerDiedError
 MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 
 Redo = Literal["none", "failed", "all"]
-REDO: tuple[Redo, ...] = ("none", "failed", "all")
 
 
 WRITERS = 4

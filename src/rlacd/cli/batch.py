@@ -18,6 +18,8 @@ from rlacd.plain_json import printable
 if TYPE_CHECKING:
     from rlacd.batch import Batch
 
+Redo = Literal["none", "failed", "all"]
+
 WRITTEN = ("density", "mass", "up", "one_mesh", "keep_input")
 """Options of `rlacd decompose` that describe how hulls are written."""
 
@@ -51,7 +53,7 @@ class BatchOptions:
     glob: str = option("**", usual="")
     fallback: bool = option(True, usual="fallback")
     folders: bool = option(False)
-    redo: Literal["none", "failed", "all"] = option("none", one_of=("none", "failed", "all"))
+    redo: Redo = option("none", one_of=Redo)
     file_format: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
     threads: int = option(1, least=1)
     dry_run: bool = option(False)

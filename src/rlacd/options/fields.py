@@ -261,7 +261,7 @@ def check_fields(options: Any) -> None:
         object.__setattr__(options, field.name, checked(options, field.name, getattr(options, field.name)))
 
 
-def checked(options: Any, name: str, value: Any, *, called: str | None = None) -> Any:
+def checked(options: Any, name: str, value: Any) -> Any:
     """Get the plain value of what was given for an option of a dataclass.
 
     Raises
@@ -270,9 +270,7 @@ def checked(options: Any, name: str, value: Any, *, called: str | None = None) -
         It is of the wrong type or out of its range.
     """
     known = about(options, name)
-    if value is None and known.optional:
-        return None
-    return read(known.kind, called or name, value)
+    return None if value is None and known.optional else read(known.kind, name, value)
 
 
 def read(kind: Kind, name: str, value: Any) -> Any:

@@ -60,9 +60,10 @@ def policy_name(policy: object) -> str:
 
 def is_policy(name: object) -> bool:
     """Tell whether this is the name of a policy, or may be the path of one."""
+    if not isinstance(name, str) or name in POLICIES:
+        return isinstance(name, str)
     try:
-        is_path = isinstance(name, str) and name.endswith(WEIGHTS_ENDING) and b"\0" not in os.fsencode(name)
-        return is_path or (isinstance(name, str) and name in POLICIES)
+        return name.endswith(WEIGHTS_ENDING) and b"\0" not in os.fsencode(name)
     except UnicodeError:
         return False
 

@@ -124,7 +124,7 @@ def rewrite_robot(
         return rewrite_stage(usd.read_colliders(source), place, options, keep_input=keep_input)
     if keep_input:
         raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
-    packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
+    packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     kind, root, folder = _opened(source, place)
     _check_options(options)
     references = References(source, packages)
