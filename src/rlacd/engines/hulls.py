@@ -10,9 +10,8 @@ import numpy as np
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
-from rlacd.io.read.contents import Triangles
 from rlacd.io.write.encode import hull_name
-from rlacd.io.write.single_precision import required_hull
+from rlacd.io.write.single_precision import Triangles, required_hull
 
 
 def hulls_of(

@@ -10,7 +10,7 @@ import trimesh
 
 from rlacd._native import convex_hull, mesh_volume
 from rlacd.errors import OutputError
-from rlacd.io.read.contents import Triangles
+from rlacd.io.read.contents import Triangles as Triangles
 
 # A hull keeps its shape if its volume changes by less than this share: a flat or tiny hull far from the origin loses
 # much more, or all of it, when float32 has no digits left for its thickness.
