@@ -15,7 +15,7 @@ from rlacd.errors import sentence_of
 from rlacd.result import Result
 from rlacd.run import Progress
 
-Run = Callable[..., Result]
+Decompose = Callable[..., Result]
 """Takes ``progress`` and the options, returns a decomposition: `rlacd.decompose` with the mesh bound."""
 
 
@@ -59,7 +59,7 @@ class Session:
         Called with ``progress`` and the requested options.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Decompose) -> None:
         self._run = run
         self._changed = threading.Condition()
         self._state = SessionState()
