@@ -114,7 +114,7 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
         fewer = "fewer hulls" if least == parts else f"fewer than {least} hulls"
         lines.append(f"  no decomposition to this tolerance has {fewer}")
     kinds = Counter(shape.kind for shape in result.primitives if shape is not None)
-    words = [counted(kinds[kind], kind, PLURALS.get(kind, f"{kind}s")) for kind in sorted(kinds)]
+    words = [counted(kinds[kind], kind, "boxes" if kind == "box" else f"{kind}s") for kind in sorted(kinds)]
     lines += [f"  of them {', '.join(words)}"] if words else []
     lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
     return "\n".join(lines)
@@ -135,9 +135,6 @@ def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
 def counted(count: int, one: str, many: str) -> str:
     """Format a count with the singular or plural noun."""
     return f"{count} {one if count == 1 else many}"
-
-
-PLURALS = {"box": "boxes"}
 
 
 STOPPED = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}
