@@ -11,7 +11,8 @@ import numpy as np
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, answer_of, served
 from rlacd.io.read.contents import Contents, damaged
-from rlacd.io.read.gltf import JSON_CHUNK, MAGIC, read_gltf, split
+from rlacd.io.read.gltf import read_gltf, split
+from rlacd.io.read.open_file import JSON_CHUNK, MAGIC
 from rlacd.options.names import UNITS
 from rlacd.pool import Blobs, Values
 

@@ -16,12 +16,11 @@ from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
+from rlacd.io.read.open_file import JSON_CHUNK, MAGIC
 from rlacd.io.read.polygons import fan_triangles, strip_triangles
 from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
-
-MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 
 INSTANCES = "EXT_mesh_gpu_instancing"
 

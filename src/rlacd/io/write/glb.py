@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd.io.read.contents import Triangles
-from rlacd.io.read.gltf import BINARY_CHUNK, JSON_CHUNK, MAGIC
+from rlacd.io.read.open_file import BINARY_CHUNK, JSON_CHUNK, MAGIC
 
 ROUGHNESS = 0.8
 
