@@ -26,7 +26,7 @@ from click.testing import CliRunner
 
 import rlacd
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.learn.options import PRESETS
+from rlacd.learn.options import TRAIN_PRESETS
 from rlacd.policies import make_policy
 from rlacd.pool import ProcessLimits
 from rlacd.solid.component import Component
@@ -394,7 +394,9 @@ def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
     arms = dict(list(ARMS.items())[:2])
     monkeypatch.setattr("benchmarks.training.ARMS", arms)
-    monkeypatch.setattr("rlacd.learn.options.PRESETS", {"two-cores": {**PRESETS["two-cores"], "validation": 2}})
+    monkeypatch.setattr(
+        "rlacd.learn.options.TRAIN_PRESETS", {"two-cores": {**TRAIN_PRESETS["two-cores"], "validation": 2}}
+    )
     said: list[str] = []
     given = (folder, tmp_path / "run", "two-cores", 40, 2, said.append)
     page = train_arms(*given)

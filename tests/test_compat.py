@@ -11,10 +11,9 @@ import pytest
 import trimesh
 
 import rlacd
+from rlacd.compat import UnusedOptionWarning
 from rlacd.compat import coacd as our_coacd
-from rlacd.compat import unused
 from rlacd.compat.trimesh import convex_decomposition
-from rlacd.compat.unused import UnusedOptionWarning
 from rlacd.compat.vhacd import compute_vhacd
 from rlacd.errors import MeshDataError, OptionError
 from tests.hulls import assert_convex_hull
@@ -23,7 +22,7 @@ from tests.models import table
 
 @pytest.fixture(autouse=True)
 def nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(unused, "_WARNED", set())
+    monkeypatch.setattr("rlacd.compat._WARNED", set())
 
 
 def triangles_with_threes(mesh: trimesh.Trimesh) -> np.ndarray:

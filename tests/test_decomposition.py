@@ -79,10 +79,10 @@ def test_show_opens_a_page_in_the_browser(real: Decomposition, monkeypatch: pyte
 def test_it_describes_itself_in_one_line() -> None:
     cup = result(2)
     faces = sum(len(hull.faces) for hull in cup)
-    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} faces, max concavity 0.0312>"
+    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} triangles, max concavity 0.0312>"
     assert "1 hull of" in repr(result(1))
-    assert "stopped by timeout" in repr(result(2, complete=False, stopped_by="timeout"))
-    assert repr(Decomposition([], {}, SOURCE)) == "<Decomposition: 0 hulls of mesh, 0 faces>"
+    assert "stopped early by timeout" in repr(result(2, complete=False, stopped_by="timeout"))
+    assert repr(Decomposition([], {}, SOURCE)) == "<Decomposition: 0 hulls of mesh, 0 triangles>"
 
 
 def test_it_cannot_be_changed_and_is_compared_by_identity() -> None:

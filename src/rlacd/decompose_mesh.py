@@ -18,7 +18,6 @@ from rlacd.errors import OptionError
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report
-from rlacd.io.read.conventions import UNITS
 from rlacd.io.read.load import load_mesh
 from rlacd.options import (
     OPTION_NAMES,
@@ -32,7 +31,7 @@ from rlacd.options import (
     VolumeOf,
 )
 from rlacd.options.fields import check_callback
-from rlacd.options.names import PrimitiveKind
+from rlacd.options.names import UNITS, PrimitiveKind
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy

@@ -153,17 +153,8 @@ class Decomposition(Result):
         """
         from rlacd.io.write import save
 
-        return save(
-            self,
-            path,
-            file_format=file_format,
-            density=density,
-            mass=mass,
-            up=up,
-            one_mesh=one_mesh,
-            keep_input=keep_input,
-            scene=scene,
-        )
+        more = {"one_mesh": one_mesh, "keep_input": keep_input, "scene": scene}
+        return save(self, path, file_format=file_format, density=density, mass=mass, up=up, **more)
 
     def save_balls(self, path: str | os.PathLike[str]) -> Path:
         """Write the balls that no hull touches.

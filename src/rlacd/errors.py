@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+from typing import Any
+
 
 class RlacdError(Exception):
     """Base of every error this package raises on purpose."""
@@ -51,11 +54,25 @@ class ImplausibleBodyWarning(UserWarning):
     """A simulator's file describes a body whose size or mass suggests another unit, or a hollow shell."""
 
 
+def import_extra(module: str, what: str, extra: str) -> Any:
+    """Import a module that an extra installs; raises MissingExtraError, which says what needs it and how to get it."""
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(extra_needed(what, extra)) from error
+    except ImportError as error:  # a system library is missing, such as libatomic in a container without a compiler
+        raise MissingExtraError(f"{what} needs {module}, which does not load here ({error}); install that.") from error
+
+
+def extra_needed(what: str, extra: str) -> str:
+    """Say in a sentence how to install an extra."""
+    return f"{what} needs an extra: run  pip install 'rlacd[{extra}]'  and try again."
+
+
 def sentence_of(error: BaseException) -> str:
     """Say in one sentence why something failed; what is no error of this package is told as a bug."""
     if isinstance(error, MemoryError):
         return "there is not enough memory for this mesh; simplify it or use a larger machine."
     said = (str(error).strip().splitlines() or ["no message"])[0]
-    return (
-        said if isinstance(error, RlacdError) else f"a bug in rlacd ({type(error).__name__}: {said}); please report it."
-    )
+    bug = f"a bug in rlacd ({type(error).__name__}: {said}); please report it."
+    return said if isinstance(error, RlacdError) else bug

@@ -36,10 +36,8 @@ def require_memory(triangles: int, bytes_each: int, name: str) -> None:
     need = triangles * bytes_each
     if need < _UNQUESTIONED or need <= (left := memory_left()):
         return
-    raise MeshDataError(
-        f"{name} has {triangles:,} triangles, which need about {need / 2**30:.1f} GB of memory, but {left / 2**30:.1f} "
-        "GB are left: simplify it first, or make room"
-    )
+    said = f"{name} has {triangles:,} triangles, which need about {need / 2**30:.1f} GB of memory"
+    raise MeshDataError(f"{said}, but {left / 2**30:.1f} GB are left: simplify it first, or make room")
 
 
 def memory_left() -> int:

@@ -56,14 +56,15 @@ class Result:
     def __iter__(self) -> Iterator[trimesh.Trimesh]:
         return iter(self.hulls)
 
+    def facts(self) -> list[str]:
+        """Say how many hulls and triangles there are and how well they fit, in words that are the same everywhere."""
+        shapes, fit = Counter(each.kind for each in self.primitives if each is not None), Fit.of(self.report)
+        words = [f"{len(self)} hull{'s' * (len(self) != 1)}"]
+        words += [f"{shapes[kind]} as {kind}" for kind in PRIMITIVE_KINDS if shapes[kind]]
+        words.append(f"{sum(len(hull.faces) for hull in self.hulls)} triangles")
+        words += [said] if fit is not None and (said := fit.words()) else []
+        return words + ([] if self.report.get("complete", True) else [f"stopped early by {self.report['stopped_by']}"])
+
     def __repr__(self) -> str:
-        faces = sum(len(hull.faces) for hull in self.hulls)
-        words = [f"{len(self)} hull{'s' * (len(self) != 1)} of {self.name}", f"{faces} faces"]
-        shapes = Counter(each.kind for each in self.primitives if each is not None)
-        words[1:1] = [f"{shapes[kind]} as {kind}" for kind in PRIMITIVE_KINDS if shapes[kind]]
-        fit = Fit.of(self.report)
-        if fit is not None and (said := fit.words()):
-            words.append(said)
-        if not self.report.get("complete", True):
-            words.append(f"stopped by {self.report.get('stopped_by')}")
-        return f"<{type(self).__name__}: {', '.join(words)}>"
+        count, *others = self.facts()
+        return f"<{type(self).__name__}: {', '.join([f'{count} of {self.name}', *others])}>"

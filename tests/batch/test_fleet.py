@@ -151,7 +151,7 @@ def test_a_batch_takes_every_option_of_a_decomposition() -> None:
 def test_an_order_survives_the_way_to_another_process() -> None:
     space = NavigableSpace(0.1, 0.2, seeds=[(1, 2, 3)], closed_planes=[((0, 0, 1), 0)])
     spec = JobSpec.of({"criterion": space, "max_vertices": 32}, file_format="urdf", density=2.0, up="y")
-    again = JobSpec(**json.loads(json.dumps(spec.as_plain())))
+    again = JobSpec(**json.loads(json.dumps(dataclasses.asdict(spec))))
     assert Options(**again.options).criterion == space
     assert again.key("c", "a.obj") == spec.key("c", "a.obj")
 

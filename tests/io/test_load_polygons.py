@@ -228,7 +228,7 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
     assert warned == ()
     assert solid.volume == pytest.approx(4)
     skew, lookat = b"<skew>45 1 0 0 0 2 0</skew>", b"<lookat>0 0 0 1 0 0 0 0 1</lookat>"
-    for moved in (skew, lookat):
+    for moved in (skew, lookat, b"<matrix>1 0 0</matrix>", b"<scale>2 x 2</scale>"):
         with pytest.raises(MeshError, match=r"a <skew> or <lookat> there is not read"):
             load(box.replace(b"<node>", b"<node>" + moved))
     holed = b"<polygons><ph><p>0 0</p><h>0 0</h></ph></polygons>"

@@ -15,7 +15,8 @@ from lxml import etree
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import OptionError
-from rlacd.io.write.model import SHEET, SHEET_THICKNESS
+from rlacd.io.write.model import SHEET
+from rlacd.solid.frame import HALF_THICKNESS
 from tests.assets import write_mesh
 from tests.models import TABLE_VOLUME, decomposed_table, fall_in_mujoco, table
 
@@ -120,7 +121,7 @@ def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> N
     walls.update_faces(walls.face_normals[:, 2] < 0.5)
     shell = rlacd.decompose(walls, open="thin", quality="fast", threads=1)
     assert [body["step"] for body in shell.report["repair"]] == [SHEET]
-    assert shell.report["mass"]["volume_abs"] == pytest.approx(5 * 0.2**2 * SHEET_THICKNESS * 0.1, rel=0.02)
+    assert shell.report["mass"]["volume_abs"] == pytest.approx(5 * 0.2**2 * 2 * HALF_THICKNESS * 0.1, rel=0.02)
     with pytest.warns(rlacd.ImplausibleBodyWarning, match=r"hollow shell .* walls 0.0002 thick"):
         shell.save(tmp_path / "shell.xml")
     with warnings.catch_warnings():

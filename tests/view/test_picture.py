@@ -14,7 +14,7 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
-from rlacd.view.picture import caption, check_picture, draw_picture
+from rlacd.view.picture import check_picture, draw_picture
 from tests.hulls import hull_of, moved
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
@@ -80,10 +80,10 @@ def test_a_single_point_like_hull_and_a_sheet_as_input_can_be_drawn(tmp_path: Pa
 
 
 def test_the_caption_tells_the_numbers_that_are_known() -> None:
-    assert caption(towers()) == "   ·   ".join(["4 hulls", "48 triangles", "max concavity 0.04 (threshold 0.05)"])
+    assert towers().facts() == ["4 hulls", "48 triangles", "max concavity 0.04 (threshold 0.05)"]
     one = towers()
     bare = Decomposition(one.hulls[:1], {"complete": False, "stopped_by": "timeout"}, one.source)
-    assert caption(bare) == "   ·   ".join(["1 hull", "12 triangles", "stopped early by timeout"])
+    assert bare.facts() == ["1 hull", "12 triangles", "stopped early by timeout"]
 
 
 def test_bad_places_and_options_are_refused_before_drawing(tmp_path: Path) -> None:

@@ -239,7 +239,7 @@ def test_another_mesh_is_opened(viewer: ViewServer) -> None:
     settled(viewer, run=2)
     scene = ask(viewer, "GET", "/scene").json
     assert (scene["name"], scene["up"], scene["unit"], len(scene["parts"])) == ("a ball", "y", "m", 1)
-    folder = viewer.folder
+    folder = viewer.subject.path.parent
     assert [path.name for path in folder.iterdir()] == ["a ball.glb"]
     command = shlex.split(ask(viewer, "POST", "/command", {}).json["command"])
     assert command[2] == "a ball.glb", "the folder goes with the viewer"

@@ -131,7 +131,7 @@ def test_quiet_is_reported_and_closing_releases_every_waiter(work: Work) -> None
 
 
 def test_a_draft_is_shown_until_better_hulls_come(session: Session, work: Work) -> None:
-    session.decompose({"quality": "best"}, {"quality": "fast"})
+    session.decompose({"quality": "fast"}, {"quality": "best"})
     work.go_on(3)
     state = until(session, "working", draft=True)
     assert (state.run, state.version) == (None, 1)
@@ -143,7 +143,7 @@ def test_a_draft_is_shown_until_better_hulls_come(session: Session, work: Work) 
 
 
 def test_stopping_keeps_the_draft_rather_than_less(session: Session, work: Work) -> None:
-    session.decompose({"quality": "best"}, {"quality": "fast"})
+    session.decompose({"quality": "fast"}, {"quality": "best"})
     work.go_on(3)
     until(session, "working", draft=True)
     work.wait_until_it_began()

@@ -35,12 +35,9 @@ EVERYTHING = "**"
 HULLS = "_hulls"
 """What `rlacd decompose` appends to a mesh's name to name its hulls."""
 
-# How files written by rlacd begin, within the first bytes.
-_MARKS = {
-    ".glb": f'"generator":"{GENERATOR}"'.encode(),
-    ".obj": f"# {GENERATOR}".encode(),
-    ".ply": f"comment {GENERATOR}".encode(),
-}
+_MARKS = f'"generator":"{GENERATOR}"', f"# {GENERATOR}", f"comment {GENERATOR}"
+"""What GLB, OBJ and PLY files written by rlacd say, within the first bytes."""
+
 _MARK_BYTES = 128
 
 
@@ -142,11 +139,8 @@ def find_assets(
 def other_files(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = None) -> Counter[str]:
     """Count the files that `find_assets` skips though `glob` selects them, by their endings."""
     kinds = {"ours": "written by rlacd", "other": ""}
-    return Counter(
-        kinds[kind] or PurePosixPath(name).suffix.lower() or "no ending"
-        for name, kind in _files(folder, leave_out)
-        if kind != "asset" and _matches(name, glob)
-    )
+    files = [(name, kind) for name, kind in _files(folder, leave_out) if kind != "asset" and _matches(name, glob)]
+    return Counter(kinds[kind] or PurePosixPath(name).suffix.lower() or "no ending" for name, kind in files)
 
 
 def _files(folder: Path, leave_out: Path | None) -> Iterator[tuple[str, Literal["asset", "ours", "other"]]]:
@@ -158,16 +152,10 @@ def _files(folder: Path, leave_out: Path | None) -> Iterator[tuple[str, Literal[
         folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != skipped]
         hulls = _written_hulls(here, files)
         for file in (file for file in files if not file.startswith(".")):
-            name = (here / file).relative_to(folder).as_posix()
-            if not _is_asset(here / file):
-                yield name, "other"
-            else:
-                yield name, "ours" if file in hulls or _is_written(here / file) else "asset"
-
-
-def _is_asset(path: Path) -> bool:
-    ending = path.suffix.lower()
-    return ending in (*ENDINGS, ".urdf") or (ending == ".xml" and _root(path) == "mujoco")
+            path, ending = here / file, PurePosixPath(file).suffix.lower()
+            is_asset = ending in (*ENDINGS, ".urdf") or (ending == ".xml" and _root(path) == "mujoco")
+            is_ours = is_asset and (file in hulls or _is_written(path))
+            yield path.relative_to(folder).as_posix(), "ours" if is_ours else "asset" if is_asset else "other"
 
 
 _COMMENT, _TAG = re.compile(rb"<!--.*?-->", re.DOTALL), re.compile(rb"<([A-Za-z_][\w.:-]*)")
@@ -197,14 +185,11 @@ def _is_written(path: Path) -> bool:
     if path.suffix.lower() in ROBOTS:  # the hulls of models and rewritten robots are listed in a folder beside them
         kind = "mjcf" if path.suffix.lower() == ".xml" else "urdf"
         return any(path.with_name(f"{path.stem}_{kind}").glob(f"*{HULLS}.json"))
-    mark = _MARKS.get(path.suffix.lower())
-    if mark is None or not path.is_file():
-        return False
-    try:
-        with path.open("rb") as file:
-            return mark in file.read(_MARK_BYTES)
-    except OSError:  # reported when the mesh is read
-        return False
+    if path.is_file():  # what cannot be opened is reported when the mesh is read
+        with contextlib.suppress(OSError), path.open("rb") as file:
+            head = file.read(_MARK_BYTES).decode("latin-1")
+            return any(mark in head for mark in _MARKS)
+    return False
 
 
 def _refuse(error: OSError) -> None:
@@ -235,7 +220,8 @@ def _places(names: Sequence[str], ending: str) -> dict[str, str]:
             for name, result in results.items()
             if count[result] > 1 or (result in folders and result_ending(name, ending))
         ]
-        fuller = {name: _free(name) if places[name] != _free(name) else f"{name}-{_digest(name)}" for name in shared}
+        digests = {name: hashlib.sha256(os.fsencode(name)).hexdigest()[:8] for name in shared}
+        fuller = {n: _free(n) if places[n] != _free(n) else f"{n}-{digest}" for n, digest in digests.items()}
         if fuller.items() <= places.items():  # what still clashes is reported where it is written
             return places
         places |= fuller
@@ -249,7 +235,3 @@ def result_ending(name: str, ending: str) -> str:
 
 def _free(place: str) -> str:
     return f"_{place}" if place.partition("/")[0].casefold() in RESERVED else place
-
-
-def _digest(name: str) -> str:
-    return hashlib.sha256(os.fsencode(name)).hexdigest()[:8]

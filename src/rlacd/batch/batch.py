@@ -23,7 +23,6 @@ from rlacd.pool import Pool, ProcessLimits, WorkerDiedError
 MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 
 Redo = Literal["none", "failed", "all"]
-REDO: tuple[Redo, ...] = ("none", "failed", "all")
 
 
 WRITERS = 4
@@ -93,7 +92,7 @@ def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcom
     with ThreadPoolExecutor(1024) as threads:  # they start as needed, and wait for answers
         try:
             while True:
-                room = max(1, work.pool.room // work.spec.threads)
+                room = max(1, work.pool.room // work.spec.options["threads"])
                 while len(running) < room + WRITERS and sum(not writing for _, writing in running.values()) < room:
                     if (task := next(tasks, None)) is None:
                         break
@@ -239,20 +238,8 @@ class Batch:
         assets = find_assets(self.assets, self.glob, here, self.spec.ending)
         if not assets:
             which = "" if self.glob == EVERYTHING else f" whose name fits {self.glob!r}"
-            raise MeshFileError(
-                f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, ... files."
-            )
-        if here is not None:
-            self._refuse_results_over_meshes(assets, here)
+            raise MeshFileError(f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, ....")
         return assets
-
-    def _refuse_results_over_meshes(self, assets: list[Asset], here: Path) -> None:
-        """The folder of results may hold that of the meshes, in which a folder may have the same name again."""
-        places = {here.resolve() / asset.place for asset in assets}
-        for asset in assets if self.glob == EVERYTHING else find_assets(self.assets, EVERYTHING, here):
-            for path in (asset.path, asset.path.resolve()):
-                if path.parent.resolve() / path.stem in places:
-                    raise OptionError(f"a result would overwrite the input {asset.path}; choose another folder.")
 
     def _task(self, asset: Asset, manifest: Ledger, store: ResultStore) -> tuple[Task, bool]:
         """Return the mesh with the key of its result, and whether that result exists."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -72,18 +72,14 @@ class JobSpec:
         """
         checked = Options(**{"threads": 1, **options})
         if not isinstance(checked.first_policy, str):
-            raise OptionError(
-                "in a batch, policy has to be a name or a file: an object cannot be sent to other processes."
-            )
+            raise OptionError("in a batch, policy has to be a name or a file: objects stay in their process.")
         make_policy(checked.first_policy)
         asked = OutputOptions(**written)
         ending, file_format = file_kind(asked.file_format, checked.preset)
         if folders:
             ending, file_format = "", FOLDER_FORMAT if asked.file_format is None else asked.file_format
             if file_format not in FORMATS:
-                raise OptionError(
-                    f"{file_format} cannot be written as a folder per mesh; use one of {', '.join(FORMATS)}."
-                )
+                raise OptionError(f"{file_format} cannot be a folder per mesh; use one of {', '.join(FORMATS)}.")
         asked = replace(asked, file_format=file_format)
         with TemporaryDirectory() as folder:
             hull_target(f"{folder}/mesh{ending or '/'}", asked)
@@ -93,11 +89,6 @@ class JobSpec:
         if ending == f".{file_format}":
             saved["file_format"] = None  # the same as not given
         return cls(plain, ending, saved, _weights(checked.first_policy))
-
-    @property
-    def threads(self) -> int:
-        """Number of threads for one mesh."""
-        return int(self.options["threads"])
 
     def key(self, content: str, name: str) -> str:
         """Name the result of a mesh with this content by everything that determines its bytes.
@@ -118,10 +109,6 @@ class JobSpec:
         if not policy.endswith(WEIGHTS_ENDING):
             return {}
         return {POLICY: Shared({"network": Path(policy).read_bytes()}, key=self.weights)}
-
-    def as_plain(self) -> dict[str, Any]:
-        """Convert to plain values; ``JobSpec(**plain)`` restores the job."""
-        return asdict(self)
 
 
 def _weights(policy: str) -> str:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import PurePosixPath
 from types import TracebackType
 from typing import Any, TypeAlias
 
-from rlacd.batch.store import Journal, ResultStore
+from rlacd.batch.store import PRIVATE, ResultStore
 from rlacd.errors import OutputError
 
 Row: TypeAlias = dict[str, Any]
 """``mesh``, the asset's name, and facts about it; in the manifest also ``outputs``, the length of each of its files."""
 
 
-class Ledger:
+class Ledger(AbstractContextManager["Ledger"]):
     """The rows of a folder of results; rows of meshes outside this run are kept.
 
     Parameters
@@ -31,14 +33,13 @@ class Ledger:
     """
 
     def __init__(self, store: ResultStore, name: str) -> None:
-        self._store = store
-        self._name = name
-        self._journal = Journal(store, name)
+        self._store, self._name, self._journal = store, name, f"{PRIVATE}/{name}"
+        self._waiting: list[bytes] = []  # for the journal, for as long as the store says
+        self._written = time.monotonic()
         self._rows: dict[str, Row] = {}
         self._owner: dict[str, str] = {}
-        for row in _read(name, (store.read(name) or b"").splitlines()):
-            self._put(row)
-        for row in _read(f"the journal of {name}", self._journal.lines()):
+        kept = {name: store.read(name) or b"", f"the journal of {name}": store.appended(self._journal)}
+        for row in (row for where, content in kept.items() for row in _read(where, content.splitlines())):
             self._put(row)
 
     def get(self, mesh: str) -> Row | None:
@@ -54,21 +55,25 @@ class Ledger:
         old = self._rows.get(row["mesh"], {})
         for output in sorted(set(old.get("outputs", {})) - set(row.get("outputs", {}))):
             self._store.remove(output)
-        self._journal.add(_line(row))
         self._put(row)
-
-    def __enter__(self) -> Ledger:
-        return self
+        self._waiting.append(_line(row))
+        if time.monotonic() - self._written >= self._store.append_every:
+            self._write_journal()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """Write the sorted file and remove the journal; after an error, leave the journal for the next run."""
         if error is not None:
-            self._journal.close()
-            return
+            return self._write_journal()
         content = b"".join(_line(self._rows[mesh]) for mesh in sorted(self._rows))
         if content != (self._store.read(self._name) or b""):
             self._store.write(self._name, content)
-        self._journal.remove()
+        self._store.remove_appended(self._journal)
+
+    def _write_journal(self) -> None:
+        """Write the lines that wait."""
+        if self._waiting:
+            self._store.append(self._journal, b"".join(self._waiting))
+        self._waiting, self._written = [], time.monotonic()
 
     def _put(self, row: Row) -> None:
         """Store a row, and drop the row of any other mesh (deleted since) that claims the same outputs."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
 from rlacd.batch.assets import Asset
 from rlacd.batch.job_spec import JobSpec
 from rlacd.batch.server import SERVER
-from rlacd.batch.store import ResultStore, put_files, under
+from rlacd.batch.store import ResultStore, put_files
 from rlacd.errors import MeshFileError, OutputNameError
 from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError
 
@@ -66,11 +66,6 @@ class Task:
     asset: Asset
     key: str
 
-    @property
-    def parent(self) -> str:
-        """Folder of its result."""
-        return str(PurePosixPath(self.asset.place).parent)
-
 
 @dataclass
 class Outcome:
@@ -109,12 +104,11 @@ class Outcome:
     def put(self, work: Work) -> Outcome:
         """Write the files; a name that cannot be used fails this mesh only."""
         try:
-            self.outputs |= put_files(work.store, self.files, work.owns)
+            outputs = put_files(work.store, self.files, work.owns)
         except OutputNameError as error:
             said = str(error).replace(f"{Path(work.out)}{os.sep}", "")  # the same wherever the results are
             return Outcome("failed", error=said, name_taken=True, timing=self.timing)
-        self.files = {}
-        return self
+        return replace(self, files={}, outputs=outputs)
 
 
 def process(task: Task, work: Work, died: WorkerDiedError | None = None) -> Outcome:
@@ -152,19 +146,11 @@ def process(task: Task, work: Work, died: WorkerDiedError | None = None) -> Outc
 
 
 def _request(task: Task, work: Work) -> Request:
-    """Other machines get the mesh's files, and write results for a place that they can reach."""
-    brought = work.pool.many_machines
-    values = {
-        "spec": work.spec.as_plain(),
-        "path": None if brought else str(task.asset.path),
-        "name": task.asset.name,
-        "stem": PurePosixPath(task.asset.place).name,
-        "parent": task.parent,
-        "hull_only": False,
-        "out": work.out if brought and work.store.shared else None,
-    }
-    files = task.asset.files() if brought else {}
-    return Request(SERVER, values, files, work.shared, work.limits, work.spec.threads)
+    """Other machines get the mesh's files."""
+    brought, stem = work.pool.many_machines, PurePosixPath(task.asset.place).name
+    path, files = (None, task.asset.files()) if brought else (str(task.asset.path), {})
+    values = {"spec": asdict(work.spec), "path": path, "name": task.asset.name, "stem": stem, "hull_only": False}
+    return Request(SERVER, values, files, work.shared, work.limits, work.spec.options["threads"])
 
 
 def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerDiedError | None]:
@@ -176,10 +162,10 @@ def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerD
     values = answer.values
     timing = {**{what: values[what] for what in ("seconds", "cpu", "peak_mb")}, "worker": answer.worker}
     if "error" in values:
-        unusable = values.get("unusable", False)
-        return Outcome("failed", error=values["error"], unusable=unusable, timing=timing), None
-    files, outputs = under(task.parent, answer.blobs), values.get("outputs", {})
-    return Outcome("done", values["report"], files=files, outputs=outputs, timing=timing), None
+        return Outcome("failed", error=values["error"], unusable=values["unusable"], timing=timing), None
+    parent = PurePosixPath(task.asset.place).parent
+    files = {str(parent / name): data for name, data in answer.blobs.items()}
+    return Outcome("done", values["report"], files=files, timing=timing), None
 
 
 def _as_hull(failed: Outcome, request: Request, task: Task, work: Work, lost_time: bool) -> Outcome:

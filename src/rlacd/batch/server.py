@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 import warnings
 from collections.abc import Mapping
@@ -15,10 +14,9 @@ import numpy as np
 import trimesh
 
 from rlacd.batch.job_spec import POLICY, JobSpec
-from rlacd.batch.store import open_store, put_files, under
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import ImplausibleBodyWarning, MeshError, OutputNameError, sentence_of
+from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
 from rlacd.fit import LENGTHS, Fit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
@@ -150,8 +148,7 @@ class MeshServer:
         ----------
         values : dict
             ``spec``, as plain values; the mesh's ``path`` if it can be read from this machine; its ``name``, for
-            messages; the ``stem`` of its result, and ``hull_only``: see `make`; ``out``, an address to write the files
-            to from this process, with the result's ``parent`` folder in it.
+            messages; the ``stem`` of its result, and ``hull_only``: see `make`.
         blobs : dict of bytes
             The files of the mesh (`rlacd.io.read.beside.mesh_files`), if it cannot be read from this machine.
         shared : dict of Shared
@@ -160,15 +157,10 @@ class MeshServer:
         Returns
         -------
         dict
-            ``report`` and ``outputs``, the lengths of files written from this process; or ``error``, and ``unusable``,
-            whether the mesh is at fault. Always ``seconds``, ``cpu`` and ``peak_mb``, the peak of this process so far.
+            ``report``; or ``error``, and ``unusable``, whether the mesh is at fault. Always ``seconds``, ``cpu`` and
+            ``peak_mb``, the peak of this process so far.
         dict of bytes
-            The files left to write.
-
-        Raises
-        ------
-        OutputError
-            Files cannot be written.
+            The files to write.
         """
         wall, cpu = time.perf_counter(), time.process_time()
         files: dict[str, bytes] = {}
@@ -181,15 +173,8 @@ class MeshServer:
             except Exception as error:
                 said = sentence_of(error).replace(str(path), values["name"]).replace(str(self._staging), "")
                 answer = {"error": said, "unusable": isinstance(error, MeshError)}
-        if values["out"] is not None:
-            with contextlib.suppress(OutputNameError):  # left to the batch, which knows what it owns
-                there = under(values["parent"], files)
-                answer["outputs"] = put_files(open_store(values["out"]), there, lambda name: False)
-                files = {}
-        answer["seconds"] = round(time.perf_counter() - wall, 4)
-        answer["cpu"] = round(time.process_time() - cpu, 4)
-        answer["peak_mb"] = peak_memory() // 2**20
-        return answer, files
+        spent = {"seconds": round(time.perf_counter() - wall, 4), "cpu": round(time.process_time() - cpu, 4)}
+        return {**answer, **spent, "peak_mb": peak_memory() // 2**20}, files
 
     def _spec(self, plain: dict[str, Any], shared: Mapping[str, Shared]) -> JobSpec:
         spec = JobSpec(**plain)

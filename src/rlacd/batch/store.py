@@ -5,15 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from filelock import FileLock
 
-from rlacd.errors import MissingExtraError, OptionError, OutputError, OutputNameError
+from rlacd.errors import MissingExtraError, OptionError, OutputError, OutputNameError, import_extra
 from rlacd.io.read.open_file import read_file
 from rlacd.io.write.atomic import lock_folder, output_errors, write_file
 
@@ -34,16 +33,8 @@ def open_store(place: str) -> ResultStore:
     OptionError
         fsspec does not support the address.
     """
-    if "://" not in place:
-        return FolderStore(Path(place))
-    if place.startswith("file://"):
-        return FolderStore(Path(place.removeprefix("file://")))
-    return AddressStore(place)
-
-
-def under(parent: str, files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Prefix file names with their folder."""
-    return {str(PurePosixPath(parent) / name): data for name, data in files.items()}
+    folder = place.removeprefix("file://")
+    return AddressStore(place) if "://" in folder else FolderStore(Path(folder))
 
 
 def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[str], bool]) -> dict[str, int]:
@@ -57,10 +48,7 @@ def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[st
     """
     for name, data in files.items():
         if not owns(name) and store.read(name) not in (None, data):
-            raise OutputNameError(
-                f"{name} is there already, and no row of the manifest says that this batch wrote it; "
-                "move it away or choose another folder."
-            )
+            raise OutputNameError(f"{name} is there already, and in no row of the manifest; move it or choose another.")
     for name, data in files.items():
         store.write(name, data)
     return {name: len(data) for name, data in files.items()}
@@ -71,13 +59,10 @@ class FolderStore:
 
     Attributes
     ----------
-    shared : bool
-        Whether every machine can reach the store under the same address.
     append_every : float
         Seconds that lines of a journal may wait.
     """
 
-    shared = False
     append_every = 0.0
 
     def __init__(self, folder: Path) -> None:
@@ -171,23 +156,16 @@ class FolderStore:
 class AddressStore:
     """Any address that fsspec has a driver for; the driver finds credentials its usual way (environment, files)."""
 
-    shared = True
     append_every = APPEND_SECONDS
 
     def __init__(self, address: str) -> None:
-        try:
-            import fsspec
-        except ImportError as error:
-            raise MissingExtraError(
-                "results at an address need an extra: run  pip install 'rlacd[fleet]'  and try again."
-            ) from error
+        fsspec = import_extra("fsspec", "an address", "fleet")
         try:
             self._system, self._root = fsspec.core.url_to_fs(address)
         except ImportError as error:
             raise MissingExtraError(f"{address} needs another package: {str(error).splitlines()[0]}") from error
         except ValueError as error:
             raise OptionError(f"{address} is not an address that fsspec knows: {error}.") from error
-        self.shared = not address.startswith("memory://")
 
     def write(self, name: str, data: bytes) -> None:
         """See `FolderStore`; atomic where the system writes objects atomically, as all object stores do."""
@@ -253,34 +231,3 @@ class AddressStore:
 
 
 ResultStore: TypeAlias = FolderStore | AddressStore
-
-
-class Journal:
-    """Lines that survive a kill of the process that writes them, but at an address those of the last few seconds."""
-
-    def __init__(self, store: ResultStore, name: str) -> None:
-        self._store, self._name = store, f"{PRIVATE}/{name}"
-        self._waiting: list[bytes] = []
-        self._written = time.monotonic()
-
-    def lines(self) -> list[bytes]:
-        """All lines that are there."""
-        return self._store.appended(self._name).splitlines()
-
-    def add(self, line: bytes) -> None:
-        """Add a line."""
-        self._waiting.append(line)
-        if time.monotonic() - self._written >= self._store.append_every:
-            self.close()
-
-    def close(self) -> None:
-        """Write the lines that wait."""
-        if self._waiting:
-            self._store.append(self._name, b"".join(self._waiting))
-        self._waiting.clear()
-        self._written = time.monotonic()
-
-    def remove(self) -> None:
-        """Remove all lines."""
-        self._waiting.clear()
-        self._store.remove_appended(self._name)

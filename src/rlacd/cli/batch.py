@@ -18,6 +18,8 @@ from rlacd.plain_json import printable
 if TYPE_CHECKING:
     from rlacd.batch import Batch
 
+Redo = Literal["none", "failed", "all"]
+
 WRITTEN = ("density", "mass", "up", "one_mesh", "keep_input")
 """Options of `rlacd decompose` that describe how hulls are written."""
 
@@ -51,7 +53,7 @@ class BatchOptions:
     glob: str = option("**", usual="")
     fallback: bool = option(True, usual="fallback")
     folders: bool = option(False)
-    redo: Literal["none", "failed", "all"] = option("none", one_of=("none", "failed", "all"))
+    redo: Redo = option("none", one_of=Redo)
     file_format: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
     threads: int = option(1, least=1)
     dry_run: bool = option(False)
@@ -96,12 +98,12 @@ def _print_plan(batch: Batch) -> None:
     from rlacd.cli.terminal import counted
 
     plan = batch.plan()
-    for asset, finished in plan:
-        if not finished:
-            result = asset.place + (result_ending(asset.name, batch.spec.ending) or "/")
-            give(printable(f"{asset.name} -> {result}") + "\n")
-    done = sum(finished for _, finished in plan)
-    say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(plan) - done} to do; nothing was written")
+    todo = [asset for asset, finished in plan if not finished]
+    for asset in todo:
+        result = asset.place + (result_ending(asset.name, batch.spec.ending) or "/")
+        give(printable(f"{asset.name} -> {result}") + "\n")
+    done = len(plan) - len(todo)
+    say(f"{counted(len(plan), 'mesh', 'meshes')}: {done} done, {len(todo)} to do; nothing was written")
 
 
 def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:

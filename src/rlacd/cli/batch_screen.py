@@ -62,7 +62,7 @@ class Screen:
         self._running.pop(row["mesh"], None)
         self._update(advance=1, state=self._state(), running=self._names())
         if row["status"] != "done":
-            line = printable(failure_line(row))
+            line = failure_line(row)
             say(line) if self._bar is None else self._bar.console.print(line, markup=False, highlight=False)
         elif self._bar is None and not self._quiet and time.monotonic() - self._reported > 30:
             self._reported = time.monotonic()
@@ -90,7 +90,7 @@ class Screen:
 def failure_line(row: Row) -> str:
     """Describe the failure of a mesh in one line."""
     instead = " (given its convex hull)" if row["status"] == "fallback" else ""
-    return f"  {row['mesh']}: {row['error']}{instead}"
+    return printable(f"  {row['mesh']}: {row['error']}{instead}")
 
 
 def summary_lines(summary: Summary, out: str) -> list[str]:
@@ -100,18 +100,14 @@ def summary_lines(summary: Summary, out: str) -> list[str]:
     words = [f"{summary.status['done']} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
     words += [f"{summary.status[status]} {status}" for status in ("fallback", "failed") if summary.status[status]]
     rate = f", {60 * made / summary.seconds:.0f} a minute" if made and summary.seconds > 0 else ""
-    lines = [
-        f"{out}: {', '.join(words)}",
-        f"  {made} now in {duration(summary.seconds)}{rate}; {summary.passed_over} were done before",
-    ]
-    lines += [printable(failure_line(row)) for row in summary.failures[:LISTED]]
+    now = f"  {made} now in {duration(summary.seconds)}{rate}; {summary.passed_over} were done before"
+    lines = [f"{out}: {', '.join(words)}", now, *map(failure_line, summary.failures[:LISTED])]
     if len(summary.failures) > LISTED:
         lines.append(f"  ... and {len(summary.failures) - LISTED} more: see manifest.jsonl")
     if summary.others:
         kinds = ", ".join(f"{count} {ending}" for ending, count in summary.others.most_common())
-        lines.append(
-            printable(f"  passed over, since not meshes: {counted(summary.others.total(), 'file', 'files')} ({kinds})")
-        )
+        files = counted(summary.others.total(), "file", "files")
+        lines.append(printable(f"  passed over, since not meshes: {files} ({kinds})"))
     if summary.slowest:
         lines.append(printable("  slowest: " + ", ".join(f"{name} {spent:.1f} s" for name, spent in summary.slowest)))
     if summary.stopped:

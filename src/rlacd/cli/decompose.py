@@ -56,7 +56,9 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
     Ctrl-C once stops and writes the result so far; twice quits at once.
     """
     asked = OutputOptions(**taken(how, OutputOptions))
-    _check_single(mesh)
+    if more := click.get_current_context().args:
+        many = f"rlacd batch {mesh.parent} -o hulls/ --glob '*{mesh.suffix or '.obj'}'"
+        raise OptionError(f"decompose takes one mesh, not {1 + len(more)}; for many, put them in a folder: {many}.")
     if asked.output is None and str(mesh) == STDIO:
         if sys.stdout is not None and sys.stdout.isatty():
             raise OptionError("the hulls would go to the terminal: give -o a file name, or - to print them anyway.")
@@ -208,16 +210,6 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")
             raise OptionError(f"--{spelled} is for a single mesh; leave it out for a robot.")
-
-
-def _check_single(mesh: Path) -> None:
-    """Reject more than one input."""
-    if more := click.get_current_context().args:
-        ending = f"'*{mesh.suffix}'" if mesh.suffix else "'*.obj'"
-        raise OptionError(
-            f"decompose takes one mesh, not {1 + len(more)}; for many, put them in a folder: "
-            f"rlacd batch {mesh.parent} -o hulls/ --glob {ending}."
-        )
 
 
 def _check_input(mesh: Path) -> None:

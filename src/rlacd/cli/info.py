@@ -86,18 +86,13 @@ def describe_text(facts: dict[str, Any]) -> str:
     """Format the result of `describe` as a few lines of text."""
     size = [high - low for low, high in zip(*facts["bounds"], strict=True)]
     bodies = facts["repair"]
-    lines = [
-        facts["file"],
-        f"  holds    {facts['faces']} triangles, {facts['vertices']} vertices, "
-        f"{len(bodies)} bod{'y' if len(bodies) == 1 else 'ies'}",
-        f"  size     {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g}",
-        f"  repaired {facts['solid']['faces']} triangles, volume {facts['solid']['volume']:.6g}",
-    ]
-    worst: dict[str, float] = {}
-    for body in bodies:
-        worst[body["step"]] = max(worst.get(body["step"], 0.0), body["deviation"])
+    held = f"{len(bodies)} bod{'y' if len(bodies) == 1 else 'ies'}"
+    lines = [facts["file"], f"  holds    {facts['faces']} triangles, {facts['vertices']} vertices, {held}"]
+    lines.append(f"  size     {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g}")
+    lines.append(f"  repaired {facts['solid']['faces']} triangles, volume {facts['solid']['volume']:.6g}")
     for step, count in Counter(body["step"] for body in bodies).most_common():
-        moved = f", surface moved by up to {worst[step] / facts['scale']:.3g}" if worst[step] > 0 else ""
+        worst = max(body["deviation"] for body in bodies if body["step"] == step)
+        moved = f", surface moved by up to {worst / facts['scale']:.3g}" if worst > 0 else ""
         lines.append(f"    {count:5d} x {step}{moved}")
     lines += [f"  warning: {warning}" for warning in facts["warnings"]]
     return "\n".join(lines) + "\n"

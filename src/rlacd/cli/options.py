@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
-from rlacd.io.read.conventions import UNITS as METRES
 from rlacd.options import OPTION_NAMES, Options, with_criterion
 from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, stated
+from rlacd.options.names import UNITS
 from rlacd.options.navigable import NavigableSpace
 
 if TYPE_CHECKING:
@@ -105,10 +105,8 @@ def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
         flag, found = name.replace("_", "-"), _LENGTH.fullmatch(word.strip())
         value, unit = (_number(found[1]), found[2]) if found else (_number(word), None)
         if value is None:
-            raise OptionError(
-                f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length in metres."
-            )
-        if unit not in METRES:
+            raise OptionError(f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length.")
+        if unit not in UNITS:
             taken[name] = value / 100 * longest if unit == "%" else value
             continue
         if metres is None or f"{name}_abs" not in _ABSOLUTE:
@@ -121,7 +119,7 @@ def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
         if f"{name}_abs" in taken:
             raise OptionError(f"--{flag} and --{flag}-abs are both lengths; give one of the two.")
         del taken[name]
-        taken[f"{name}_abs"] = value * METRES[unit]
+        taken[f"{name}_abs"] = value * UNITS[unit]
     return taken
 
 
@@ -141,7 +139,5 @@ def _number(word: str) -> float | None:
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     values = [value for word in text.split(",") if (value := _number(word)) is not None]
     if not len(values) == len(text.split(",")) == count:
-        raise OptionError(
-            f"{option} is {text!r}; it takes {count} numbers separated by commas, such as {'0,0,1,0'[: 2 * count - 1]}."
-        )
+        raise OptionError(f"{option} is {text!r}; it takes {count} numbers with commas: {'0,0,1,0'[: 2 * count - 1]}.")
     return tuple(values)

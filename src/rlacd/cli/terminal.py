@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
 from rlacd.fit import Fit
-from rlacd.io.read.conventions import UNITS as METRES
+from rlacd.options.names import UNITS
 from rlacd.run import Progress, ProgressCallback
 
 if TYPE_CHECKING:
@@ -105,33 +105,29 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
     """Summarise the result in a few lines: its size, its quality, and any warnings."""
     report = result.report
     triangles = sum(len(hull.faces) for hull in result)
-    lines = [f"{written}: {_count(len(result))}, {triangles} triangles{_time(report)}"]
+    total = report.get("seconds", {}).get("total")
+    time = ("" if total is None else f", {total:.2f} s") + STOPPED[report.get("stopped_by")]
+    lines = [f"{written}: {counted(len(result), 'hull', 'hulls')}, {triangles} triangles{time}"]
     lines += [f"  {fit}" for fit in [_fit(report, unit)] if fit]
-    lines += [f"  {bound}" for bound in [_at_least(report)] if bound]
-    lines += [f"  of them {kinds}" for kinds in [_primitives(result)] if kinds]
+    least, parts = report.get("at_least") or 1, report["parts"]
+    if 1 < least <= parts:
+        fewer = "fewer hulls" if least == parts else f"fewer than {least} hulls"
+        lines.append(f"  no decomposition to this tolerance has {fewer}")
+    kinds = Counter(shape.kind for shape in result.primitives if shape is not None)
+    words = [counted(kinds[kind], kind, "boxes" if kind == "box" else f"{kind}s") for kind in sorted(kinds)]
+    lines += [f"  of them {', '.join(words)}"] if words else []
     lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
     return "\n".join(lines)
 
 
-def _at_least(report: dict[str, Any]) -> str:
-    """What is proved about the number of hulls, where that is more than one."""
-    least, parts = report.get("at_least") or 1, report["parts"]
-    if not 1 < least <= parts:
-        return ""
-    if least == parts:
-        return "no decomposition to this tolerance has fewer hulls"
-    return f"no decomposition to this tolerance has fewer than {least} hulls"
-
-
 def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
     """Summarise the result for a robot: its meshes, each with its number of hulls."""
-    total = sum(len(mesh.files) for mesh in done.meshes)
-    lines = [f"{done.path}: {counted(len(done.meshes), 'mesh', 'meshes')}, {_count(total)} in {done.folder}"]
-    if not done.meshes:
-        lines = [f"{done.path}: written"]
-    lines += [
-        f"  {mesh.path.name}: {_count(len(mesh.files))}; {_fit(mesh.result.report, unit)}" for mesh in done.meshes
-    ]
+    total = counted(sum(len(mesh.files) for mesh in done.meshes), "hull", "hulls")
+    made = f"{counted(len(done.meshes), 'mesh', 'meshes')}, {total} in {done.folder}" if done.meshes else "written"
+    lines = [f"{done.path}: {made}"]
+    for mesh in done.meshes:
+        hulls = counted(len(mesh.files), "hull", "hulls")
+        lines.append(f"  {mesh.path.name}: {hulls}; {_fit(mesh.result.report, unit)}")
     lines += [f"  warning: {warning}" for warning in done.warnings]
     return "\n".join(lines)
 
@@ -141,35 +137,14 @@ def counted(count: int, one: str, many: str) -> str:
     return f"{count} {one if count == 1 else many}"
 
 
-def _primitives(result: Decomposition) -> str:
-    """How many parts are primitives, by kind."""
-    kinds = Counter(shape.kind for shape in result.primitives if shape is not None)
-    words = [counted(kinds[kind], kind, PLURALS.get(kind, f"{kind}s")) for kind in sorted(kinds)]
-    return ", ".join(words)
-
-
-PLURALS = {"box": "boxes"}
-
-
-def _count(hulls: int) -> str:
-    return counted(hulls, "hull", "hulls")
-
-
-def _time(report: dict[str, Any]) -> str:
-    total = report.get("seconds", {}).get("total")
-    reason = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}[
-        report.get("stopped_by")
-    ]
-    return ("" if total is None else f", {total:.2f} s") + reason
+STOPPED = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}
 
 
 def _fit(report: dict[str, Any], unit: str | None = None) -> str:
     """How well the hulls fit; lengths in `unit`, in the input's if the threshold was given in that, or in the frame."""
-    words = []
     scale, in_words = _unit(report, unit)
     fit = Fit.of(report)
-    if fit is not None and (said := fit.words(scale)):
-        words.append(said)
+    words = [said] if fit is not None and (said := fit.words(scale)) else []
     reach = report.get("hausdorff", {})
     if reach.get("over") is not None:
         missed = reach["under"] / scale
@@ -183,7 +158,7 @@ def _unit(report: dict[str, Any], unit: str | None) -> tuple[float, str]:
     if unit == "%":
         return 0.02, "in % of the longest side"
     if unit is not None:
-        return report["scale"] * METRES[unit], f"in {unit}"
+        return report["scale"] * UNITS[unit], f"in {unit}"
     if report.get("options", {}).get("threshold_abs") is not None:
         return report["scale"], "in the input's unit"
     return 1.0, "longest side = 2"

@@ -9,8 +9,8 @@ import click
 
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of, taken
 from rlacd.cli.options import PoolOptions
-from rlacd.errors import MissingExtraError, OptionError
-from rlacd.learn.options import PRESETS, TrainOptions
+from rlacd.errors import OptionError, import_extra
+from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
 
 DEFAULT_PRESET = "two-cores"
 
@@ -34,12 +34,9 @@ def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> 
     options = TrainOptions.preset(preset, **chosen(given))
     if run.exists() and not run.is_dir():
         raise OptionError(f"--run {run} is a file; give a folder.")
-    try:
-        from rlacd.learn.train import train
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] != "torch":
-            raise
-        raise MissingExtraError("training needs an extra: run  pip install 'rlacd[train]'  and try again.") from error
+    import_extra("torch", "training", "train")
+    from rlacd.learn.train import train
+
     with where.open(1) as pool:
         train(meshes, run, options, resume=resume, say=click.echo, pool=pool, limits=where.limits())
 
@@ -50,10 +47,10 @@ COMMAND = Command(
     [
         Argument("meshes", "MESHES", "A folder of meshes, of any depth."),
         Option("--run", "-o", type=click.Path(path_type=Path), required=True, help="The folder of this run."),
-        Option("--preset", default=DEFAULT_PRESET, show_default=True, help=f"One of {', '.join(PRESETS)}."),
+        Option("--preset", default=DEFAULT_PRESET, show_default=True, help=f"One of {', '.join(TRAIN_PRESETS)}."),
         Option("--resume", is_flag=True, default=False, help="Continue from the run's last checkpoint."),
         Option("--jobs", type=int, panel="Processes", help="Processes that play episodes.  [default: 1]"),
         *options_of(PoolOptions, only=("ray", "limit", "memory")),
-        *options_of(TrainOptions, note="without a preset: "),
+        *options_of(TrainOptions, note="the preset's, or "),
     ],
 )

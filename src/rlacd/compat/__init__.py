@@ -3,3 +3,30 @@
 Each module is named after the one it replaces, and imports nothing of it: ``rlacd.compat.coacd``,
 ``rlacd.compat.vhacd`` (the package vhacdx) and ``rlacd.compat.trimesh``.
 """
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+_WARNED: set[tuple[str, str]] = set()
+
+
+class UnusedOptionWarning(UserWarning):
+    """An option of the other tool that has no meaning in rlacd."""
+
+
+def warn_unused(function: Callable[..., Any], given: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
+    """Warn about the options in `reasons` that differ from their default, each once per process."""
+    for name, reason in reasons.items():
+        default, known = inspect.signature(function).parameters[name].default, (function.__name__, name)
+        if not _same(given[name], default) and known not in _WARNED:
+            _WARNED.add(known)
+            warnings.warn(f"{function.__name__}: rlacd ignores {name}: {reason}.", UnusedOptionWarning, stacklevel=3)
+
+
+def _same(given: Any, default: Any) -> bool:
+    """Tell whether an option has its default value; an array never does."""
+    return isinstance(given, (str, bool, int, float)) and bool(given == default)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.compat.unused import warn_unused
+from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import flag, integer, number, one_of, read

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.compat.unused import warn_unused
+from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
 from rlacd.options.fields import flag, integer, number, read
@@ -91,7 +91,5 @@ def _triangles(faces: Any) -> npt.NDArray[np.int64]:
     if array.ndim == 1 and len(array) % 4 == 0 and (array[::4] == 3).all():
         array = array.reshape(-1, 4)[:, 1:]
     if array.ndim == 1 and len(array) % 3:
-        raise MeshDataError(
-            "flat faces are neither 3, a, b, c, 3, ... nor a, b, c, a, ...: triangulate the polygons first."
-        )
+        raise MeshDataError("flat faces are neither 3, a, b, c, 3, ... nor a, b, c, a, ...: triangulate them first.")
     return (array if array.ndim > 1 else array.reshape(-1, 3)).astype(np.int64)

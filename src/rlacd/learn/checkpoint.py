@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from collections.abc import Mapping
@@ -12,33 +13,43 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from rlacd.errors import OutputError, TrainingError
-from rlacd.learn.files import packed, save_bytes
-
-FORMAT = 5
+from rlacd._version import __version__
+from rlacd.errors import TrainingError
+from rlacd.io.write.atomic import write_file
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
-def save_checkpoint(path: Path, arrays: Arrays, state: Mapping[str, Any]) -> None:
-    """Write arrays and plain JSON values; if the process dies at any moment, the old file or the new one remains.
+def packed(arrays: Arrays) -> bytes:
+    """Pack arrays as the content of an .npz file."""
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def unpacked(content: bytes) -> dict[str, NDArray[Any]]:
+    """Unpack the content of an .npz file."""
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def save_checkpoint(path: Path, arrays: Mapping[str, Mapping[str, Any]], state: Mapping[str, Any]) -> None:
+    """Write arrays or tensors by owner and name, and plain JSON values; at any moment the old file or the new is whole.
 
     Raises
     ------
     OutputError
         The disk is full or the folder is not writable.
     """
-    text = np.frombuffer(json.dumps({"format": FORMAT, **state}).encode(), np.uint8)
-    try:
-        save_bytes(path, packed({"state": text, **arrays}))
-    except OSError as error:
-        raise OutputError(
-            f"the checkpoint {path} cannot be written ({error}); free some space and use --resume."
-        ) from error
+    plain = {"state": np.frombuffer(json.dumps({"version": __version__, **state}).encode(), np.uint8)}
+    for owner, own in arrays.items():
+        for name, value in own.items():
+            plain[f"{owner}.{name}"] = value.cpu().numpy() if isinstance(value, torch.Tensor) else value
+    write_file(path, packed(plain))
 
 
-def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
-    """Read a checkpoint; None if there is none.
+def load_checkpoint(path: Path) -> tuple[dict[str, dict[str, NDArray[Any]]], dict[str, Any]] | None:
+    """Read the arrays by owner and name, and the plain values; None if there is no checkpoint.
 
     Raises
     ------
@@ -53,25 +64,17 @@ def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]
             if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
                 raise ValueError("it is compressed")  # a small file must not expand in memory
         with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        state = json.loads(arrays.pop("state").tobytes())
-        version = state["format"]
+            state = json.loads(file["state"].tobytes())
+            arrays: dict[str, dict[str, NDArray[Any]]] = {}
+            for whole in file.files:
+                owner, _, name = whole.partition(".")
+                arrays.setdefault(owner, {})[name] = file[whole]
+        version = state["version"]
     except damage as error:
         raise TrainingError(f"the checkpoint {path} is damaged ({error}); remove it to train again.") from error
-    if version != FORMAT:
-        raise TrainingError(f"{path} has format {version}, not {FORMAT}; train again from the beginning.")
+    if version != __version__:
+        raise TrainingError(f"{path} is of rlacd {version}, not {__version__}; train again from the beginning.")
     return arrays, state
-
-
-def under(prefix: str, arrays: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """The same arrays or tensors, with a prefix to their names."""
-    plain = {k: v.detach().cpu().numpy() if isinstance(v, torch.Tensor) else v for k, v in arrays.items()}
-    return {f"{prefix}.{name}": np.asarray(value) for name, value in plain.items()}
-
-
-def of(prefix: str, arrays: Arrays) -> dict[str, NDArray[Any]]:
-    """The arrays whose names have a prefix, without it."""
-    return {k.removeprefix(f"{prefix}."): v for k, v in arrays.items() if k.startswith(f"{prefix}.")}
 
 
 def tensors(arrays: Arrays) -> dict[str, torch.Tensor]:

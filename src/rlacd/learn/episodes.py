@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rlacd.learn.checkpoint import packed, unpacked
 from rlacd.learn.encoders import Encoder
-from rlacd.learn.files import packed, unpacked
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.process import CutProcess
 from rlacd.planes.sweep import valid_planes
@@ -105,7 +105,7 @@ class Player:
         cutting, numbers = self.cutting, {c: i for i, c in enumerate(self.cutting.unfinished)}
         cuts: list[tuple[int, int, float]] = []
         children: list[tuple[int, int, float]] = []
-        while not (ended := self._ended(len(cuts))):
+        while cutting.unfinished and not (cuts and len(cutting.all) >= self.options.max_parts):
             component = cutting.unfinished[cutting.largest()]
             plane = self._choose(component)
             cut = cutting.cut(cutting.largest(), cutting.candidates(component).plane(plane))
@@ -121,13 +121,8 @@ class Player:
             np.stack([mask for _, mask in seen]),
             *(state, planes, rewards, of_child.astype(np.int64), owner.astype(np.int64), discounts),
             parts=len(cutting.all),
-            ended=ended,
+            ended="cap" if cutting.unfinished else "terminal" if cutting.terminal else "stuck",
         )
-
-    def _ended(self, cuts: int) -> str:
-        if not self.cutting.unfinished:
-            return "terminal" if self.cutting.terminal else "stuck"
-        return "cap" if cuts and len(self.cutting.all) >= self.options.max_parts else ""
 
     def _see(self, component: Component) -> tuple[Float32Array, BoolArray]:
         """Features, as exact as they are stored, and valid planes."""

@@ -13,7 +13,8 @@ from manifold3d import Manifold, Mesh64
 
 from rlacd.errors import RlacdError, TrainingError
 from rlacd.io.read.load import load_mesh
-from rlacd.learn.files import packed, save_bytes, unpacked
+from rlacd.io.write.atomic import write_file
+from rlacd.learn.checkpoint import packed, unpacked
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from rlacd.solid.frame import Frame
@@ -62,10 +63,9 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
         else:
             names.append(path.relative_to(folder).as_posix())
     if len(names) <= validation:
-        raise TrainingError(
-            f"{folder} holds {len(names)} meshes to learn on ({unreadable} cannot be read, {too_large} have more than "
-            f"{max_faces} triangles); more than {validation} are needed, since that many are held out for validation."
-        )
+        left_out = f"{unreadable} cannot be read, {too_large} have more than {max_faces} triangles"
+        said = f"{folder} holds {len(names)} meshes to learn on ({left_out})"
+        raise TrainingError(f"{said}; more than {validation} are needed: that many are held out for validation.")
     drawn = [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
     return MeshList(tuple(sorted(drawn[validation:])), tuple(sorted(drawn[:validation])), unreadable, too_large)
 
@@ -96,7 +96,11 @@ def turned(content: bytes, axis: int, degrees: float) -> Component | None:
     if not len(arrays["faces"]):
         return None
     solid = Manifold(Mesh64(arrays["vertices"], arrays["faces"]))
-    return Component(_framed(solid.rotate([degrees if i == axis else 0.0 for i in range(3)])) if degrees else solid)
+    if degrees:
+        solid = solid.rotate([degrees if i == axis else 0.0 for i in range(3)])
+        frame = Frame.of(np.asarray(solid.bounding_box(), dtype=np.float64).reshape(2, 3))
+        solid = solid.translate([float(-x) for x in frame.center]).scale([frame.scale] * 3)
+    return Component(solid)
 
 
 class Solids:
@@ -129,12 +133,5 @@ class Solids:
         except (RlacdError, ValueError):  # flat or empty: nothing to cut
             vertices, faces = np.empty((0, 3)), np.empty((0, 3), np.uint64)
         content = packed({"vertices": vertices, "faces": faces})
-        save_bytes(place, content)
+        write_file(place, content)
         return content
-
-
-def _framed(solid: Manifold) -> Manifold:
-    """Move and scale a solid so that its box is centred and its longest side is 2."""
-    box = np.asarray(solid.bounding_box(), dtype=np.float64).reshape(2, 3)
-    frame = Frame.of(box)
-    return solid.translate([float(-x) for x in frame.center]).scale([frame.scale] * 3)

@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from rlacd.errors import RlacdError
 from rlacd.solid.arrays import BoolArray
 
-KEY = 16
-"""Bytes of a component's key."""
-
 
 @dataclass(eq=False)
 class Seen:
@@ -70,7 +67,7 @@ class Replay:
 
     def seen(self, features: NDArray[np.float16], mask: BoolArray) -> Seen:
         """Get what is known of a component: the same for all with the same features."""
-        key = hashlib.blake2b(features.tobytes(), digest_size=KEY).digest()
+        key = hashlib.sha256(features.tobytes()).digest()
         known = self._seen.get(key)
         if known is None:
             known = self._seen[key] = Seen(key, features if self._values else features[:0, ..., :0], mask)
@@ -129,7 +126,7 @@ class Replay:
         links = [(i, number[c], d) for i, t in enumerate(self._held) for c, d in t.children]
         cuts = [(number[t.state], t.plane, t.reward) for t in self._held]
         return {
-            "keys": np.frombuffer(b"".join(seen.key for seen in number), np.uint8).reshape(-1, KEY),
+            "keys": np.array([[*seen.key] for seen in number], np.uint8),
             "features": np.array([seen.features for seen in number], np.float16),
             "masks": np.array([np.packbits(seen.mask) for seen in number], np.uint8),
             "fewest": np.array([seen.fewest for seen in number]),

@@ -12,7 +12,6 @@ import json
 from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,17 +37,6 @@ SOLIDS_TRIED = 1000
 
 REMEMBERED = 10_000
 """Number of components of which a process remembers the cuts: a few hundred megabytes."""
-
-MESH, ACT = 1, 2
-"""Random streams of an episode."""
-
-
-@dataclass(frozen=True)
-class Acting:
-    """How cuts are chosen: the file of a network, None for random cuts; and the fraction that is random anyway."""
-
-    network: Shared | None
-    epsilon: float
 
 
 class Rollouts:
@@ -86,10 +74,18 @@ class Rollouts:
         self._ahead: deque[tuple[int, str, Future[Answer]] | Episode] = deque()
         self._begun = self._without_cuts = self._lost = 0
 
-    def begin(self, acting: Acting) -> None:
-        """Start episodes until the required number is ahead."""
+    def begin(self, network: Shared | None, epsilon: float) -> None:
+        """Start episodes until the required number is ahead.
+
+        Parameters
+        ----------
+        network : Shared or None
+            The file of the one that chooses cuts; None for random cuts.
+        epsilon : float
+            The share of cuts that are random anyway.
+        """
         while len(self._ahead) < self._options.environments:
-            self._ahead.append(self._start(self._begun, acting))
+            self._ahead.append(self._start(self._begun, network, epsilon))
             self._begun += 1
 
     def take(self) -> Episode:
@@ -106,15 +102,11 @@ class Rollouts:
         self._without_cuts = 0 if len(episode.planes) else self._without_cuts + 1
         self._lost = self._lost + 1 if episode.ended == "lost" else 0
         if self._lost == LOST_IN_A_ROW:
-            raise TrainingError(
-                f"{LOST_IN_A_ROW} episodes in a row were lost with their processes; give more --memory or a longer "
-                "--limit, or fewer --jobs, and use --resume."
-            )
+            said = f"{LOST_IN_A_ROW} episodes in a row were lost with their processes; give more --memory or a longer"
+            raise TrainingError(f"{said} --limit, or fewer --jobs, and use --resume.")
         if self._without_cuts == SOLIDS_TRIED:
-            raise TrainingError(
-                f"none of {SOLIDS_TRIED} solids drawn from {len(self._names)} meshes needs a cut; give other meshes, "
-                "or a smaller threshold."
-            )
+            said = f"none of {SOLIDS_TRIED} solids drawn from {len(self._names)} meshes needs a cut"
+            raise TrainingError(f"{said}; give other meshes, or a smaller threshold.")
         return episode
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -128,18 +120,13 @@ class Rollouts:
         self._begun, ahead, self._without_cuts = (int(count) for count in arrays["counts"])
         self._ahead = deque(Episode.from_bytes(arrays[f"ahead.{i}"].tobytes()) for i in range(ahead))
 
-    def _start(self, number: int, acting: Acting) -> tuple[int, str, Future[Answer]]:
+    def _start(self, number: int, network: Shared | None, epsilon: float) -> tuple[int, str, Future[Answer]]:
         options = self._options
-        rng = np.random.default_rng([options.seed, MESH, number])
+        rng = np.random.default_rng([options.seed, 1, number])  # 1 draws the mesh, 2 the cuts
         name, axis, turn = self._names[int(rng.integers(len(self._names)))], int(rng.integers(3)), int(rng.integers(4))
-        values = {
-            "name": name,
-            "axis": axis,
-            "degrees": TURNS[turn] if options.rotate else 0.0,
-            "epsilon": acting.epsilon,
-            "seed": [options.seed, ACT, number],
-        }
-        shared = {"setting": self._setting} | ({} if acting.network is None else {"network": acting.network})
+        values = {"name": name, "axis": axis, "degrees": TURNS[turn] if options.rotate else 0.0}
+        values |= {"epsilon": epsilon, "seed": [options.seed, 2, number]}
+        shared = {"setting": self._setting} | ({} if network is None else {"network": network})
         blobs = {"solid": self._solids.packed(name)}
         request = Request(SERVER, values, blobs, shared, self._limits, tries=2)
         return number, name, self._pool.submit(request)
@@ -188,8 +175,8 @@ class RolloutServer:
         blobs : dict of bytes
             ``solid``: see `rlacd.learn.meshes.Solids.packed`.
         shared : dict of Shared
-            ``setting``: ``options`` as JSON, and the ``encoder``'s file of weights if it has one. ``network``: that of
-            `Acting`.
+            ``setting``: ``options`` as JSON, and the ``encoder``'s file of weights if it has one. ``network``: see
+            `Rollouts.begin`.
 
         Returns
         -------

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -19,26 +19,24 @@ import numpy as np
 import torch
 
 from rlacd.criteria import Concavity
+from rlacd.cut import CutTree
+from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError, TrainingError
-from rlacd.learn.checkpoint import adam_state, load_checkpoint, of, restore_adam, save_checkpoint, tensors, under
+from rlacd.io.write.atomic import write_file
+from rlacd.learn.checkpoint import adam_state, load_checkpoint, restore_adam, save_checkpoint, tensors
 from rlacd.learn.encoders import Encoder, make_encoder, pick_device
 from rlacd.learn.episodes import Episode
-from rlacd.learn.files import save_bytes
 from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.parts import count_parts, mean_ratio
 from rlacd.learn.q_network import QNetwork, bellman_loss, dual_state_target, policy_of, soft_value
 from rlacd.learn.replay import Replay, Transition
-from rlacd.learn.rollouts import Acting, Rollouts
-from rlacd.options.fields import require_same
+from rlacd.learn.rollouts import Rollouts
 from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import RandomShortlist
 from rlacd.policies.network import KIND, SHORTLIST
 from rlacd.pool import Pool, ProcessLimits, Shared
 from rlacd.pool.local import InProcessPool
-
-VALIDATED = 16
-"""At most this many solids are validated with."""
+from rlacd.run import Run
 
 
 def train(
@@ -85,11 +83,9 @@ def train(
     if (run / "checkpoint.npz").exists() and not resume:
         raise OptionError(f"{run} holds a run already; use --resume to go on with it, or another folder.")
     listed = list_once(meshes, run, options.max_faces, options.validation, options.seed)
-    save_bytes(run / "options.json", json.dumps(dataclasses.asdict(options), indent=1).encode())
-    say(
-        f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; "
-        f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
-    )
+    write_file(run / "options.json", json.dumps(dataclasses.asdict(options), indent=1).encode())
+    left_out = f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
+    say(f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; {left_out}")
     with ExitStack() as stack:
         where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
         rollouts = Rollouts(where, solids, listed.training, options, limits or ProcessLimits(), say)
@@ -123,7 +119,7 @@ class Training:
         self.cuts = self.learned = 0
         self.best = np.inf
         self.seconds = 0.0
-        self.sums: dict[str, float] = {}  # since the last point of the curves, with their counts
+        self.seen: dict[str, list[float]] = {}  # since the last point of the curves
 
     # The algorithm
 
@@ -132,7 +128,7 @@ class Training:
         options, saved, before = self.options, time.perf_counter(), time.perf_counter() - self.seconds
         while self.cuts < options.iterations:
             cuts = self.cuts
-            self.rollouts.begin(self.acting())
+            self.rollouts.begin(*self.acting())
             self.learn_from(self.rollouts.take())
             self.seconds = time.perf_counter() - before
             if self.cuts // options.log_every > cuts // options.log_every:
@@ -147,13 +143,13 @@ class Training:
         self.save()
         self.say(self.validation.verdict(self.best, self.folder, options))
 
-    def acting(self) -> Acting:
-        """How new episodes are played (4.1): at random at first, then epsilon-greedily."""
+    def acting(self) -> tuple[Shared | None, float]:
+        """How new episodes are played (4.1): at random at first, then epsilon-greedily; see `Rollouts.begin`."""
         if self.cuts < self.options.warmup:
-            return Acting(None, 1.0)
+            return None, 1.0
         thousands = (self.cuts - self.options.warmup) // 1000
         network = Shared({"network": self.network.plain({"threshold": 1.0}).to_bytes()})
-        return Acting(network, self.options.epsilon * self.options.epsilon_decay**thousands)
+        return network, self.options.epsilon * self.options.epsilon_decay**thousands
 
     def learn_from(self, episode: Episode) -> None:
         """Add an episode to the replay buffer cut by cut, and learn after each."""
@@ -193,10 +189,8 @@ class Training:
 
     def log(self) -> None:
         """Append a point to the curves: means since the last one; for ways to end, counts."""
-        counts = {name: self.sums[f"n {name}"] for name in self.sums if not name.startswith("n ")}
-        means = {k: self.sums[k] if k.startswith("ended_") else self.sums[k] / n for k, n in counts.items()}
-        self.sums = {}
-        self._point(means)
+        self._point({k: sum(v) if k.startswith("ended_") else sum(v) / len(v) for k, v in self.seen.items()})
+        self.seen = {}
 
     def validate(self) -> None:
         """Count the parts of the validation's solids; the network with the fewest is kept as the best."""
@@ -205,14 +199,13 @@ class Training:
         if ratios["own_plane"] <= self.best:
             self.best = ratios["own_plane"]
             about = {"kind": KIND, "threshold": self.options.threshold, "encoder": self.options.encoder}
-            save_bytes(self.folder / "policy.npz", self.network.plain(about).to_bytes())
+            write_file(self.folder / "policy.npz", self.network.plain(about).to_bytes())
 
     def save(self) -> None:
         """Write a checkpoint."""
-        arrays = under("network", self.network.state_dict()) | under("target", self.target.state_dict())
-        arrays |= under("adam", adam_state(self.optimizer)) | under("replay", self.replay.state())
-        arrays |= under("rollouts", self.rollouts.state())
-        state = {name: getattr(self, name) for name in ("cuts", "learned", "seconds", "sums", "best")}
+        arrays = {"network": self.network.state_dict(), "target": self.target.state_dict()}
+        arrays |= {"adam": adam_state(self.optimizer), "replay": self.replay.state(), "rollouts": self.rollouts.state()}
+        state = {name: getattr(self, name) for name in ("cuts", "learned", "seconds", "seen", "best")}
         state |= {"options": dataclasses.asdict(self.options), "encoder": self.encoder.digest}
         save_checkpoint(self.folder / "checkpoint.npz", arrays, {**state, "generator": self.rng.bit_generator.state})
 
@@ -224,19 +217,18 @@ class Training:
             curves.write_text("", encoding="utf-8")
             return
         arrays, state = found
-        require_same(state["options"], self.options, MAY_CHANGE)
+        for name, value in dataclasses.asdict(self.options).items():
+            if name not in MAY_CHANGE and (was := state["options"][name]) != value:
+                raise OptionError(f"{name} is {value!r}, but was {was!r} when the run began: resume with that.")
         if state["encoder"] != self.encoder.digest:
-            raise OptionError(
-                f"{self.options.encoder_weights} holds other weights than the run began with; give the same "
-                "--encoder-weights, or begin another run."
-            )
-        self.network.load_state_dict(tensors(of("network", arrays)))
-        self.target.load_state_dict(tensors(of("target", arrays)))
-        restore_adam(self.optimizer, tensors(of("adam", arrays)))
-        self.replay.restore(of("replay", arrays))
-        self.rollouts.restore(of("rollouts", arrays))
+            raise OptionError(f"{self.options.encoder_weights} holds other weights than the run began with.")
+        self.network.load_state_dict(tensors(arrays["network"]))
+        self.target.load_state_dict(tensors(arrays["target"]))
+        restore_adam(self.optimizer, tensors(arrays["adam"]))
+        self.replay.restore(arrays["replay"])
+        self.rollouts.restore(arrays["rollouts"])
         self.cuts, self.learned, self.seconds, self.best = (state[k] for k in ("cuts", "learned", "seconds", "best"))
-        self.sums, self.rng.bit_generator.state = state["sums"], state["generator"]
+        self.seen, self.rng.bit_generator.state = state["seen"], state["generator"]
         kept = [line for line in curves.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
         curves.write_text("".join(x for x in kept if json.loads(x)["cuts"] <= self.cuts), encoding="utf-8")
         self.say(f"resuming at cut {self.cuts}")
@@ -244,21 +236,18 @@ class Training:
     def _point(self, values: dict[str, float]) -> None:
         with open(self.folder / "curves.jsonl", "a", encoding="utf-8") as file:
             file.write(json.dumps({"cuts": self.cuts, **values, "seconds": round(self.seconds, 3)}) + "\n")
-        self.say(
-            f"cut {self.cuts}  " + "  ".join(f"{k} {v:.4g}" for k, v in values.items()) + f"  {self.seconds:.0f} s"
-        )
+        self.say("  ".join([f"cut {self.cuts}", *(f"{k} {v:.4g}" for k, v in values.items()), f"{self.seconds:.0f} s"]))
 
     def _add(self, **values: float) -> None:
         for name, value in values.items():
-            self.sums[name] = self.sums.get(name, 0.0) + value
-            self.sums[f"n {name}"] = self.sums.get(f"n {name}", 0) + 1
+            self.seen.setdefault(name, []).append(value)
 
 
 class Validation:
     """Raw parts of a few solids, as geometric means of their ratios to greedy's over the 150 planes alone."""
 
     def __init__(self, listed: MeshList, solids: Solids, options: TrainOptions) -> None:
-        names = (listed.validation or listed.training)[:VALIDATED]
+        names = listed.validation or listed.training[: TrainOptions.validation]
         self._solids = [solid for name in names if (solid := solids.get(name)) is not None]
         if not self._solids:
             raise TrainingError("none of the meshes held out for validation can be repaired; hold out more.")
@@ -270,22 +259,20 @@ class Validation:
     def ratios(self, network: QNetwork, encoder: Encoder) -> dict[str, float]:
         """Ratios of the network's own plane, its ten best, and of random planes."""
         own, ten = (self._parts(policy_of(network, encoder, shortlist=n)) for n in (1, SHORTLIST))
-        return {
-            "parts": sum(own) / len(own),
-            "own_plane": mean_ratio(own, self._greedy),
-            "ten_best": mean_ratio(ten, self._greedy),
-            "random": self._random,
-        }
+        ratios = {"own_plane": mean_ratio(own, self._greedy), "ten_best": mean_ratio(ten, self._greedy)}
+        return {"parts": sum(own) / len(own), **ratios, "random": self._random}
 
     def _parts(self, policy: Policy) -> list[int]:
-        return count_parts(policy, self._solids, self._criterion, self._most)
+        """Count the parts of each solid, without merging; a decomposition stops where an episode would."""
+        with Run(1) as run:
+            trees = [CutTree(solid, policy, run) for solid in self._solids]
+            cuts = [cut_and_merge(tree, self._criterion, run, merge=False, most=self._most) for tree in trees]
+        return [len(one.pieces) for one in cuts]
 
     def verdict(self, best: float, folder: Path, options: TrainOptions) -> str:
         """Say what the run has reached, and the next command."""
         where = "solids it has not seen" if self._held_out else "the solids it learned from"
-        text = (
-            f"On {where}, the network's own plane leaves {best:.3f} times greedy's parts (random: {self._random:.3f}). "
-        )
+        text = f"On {where}, the network's plane leaves {best:.3f} times greedy's parts (random: {self._random:.3f}). "
         if best > 1:
             return f"{text}Greedy is better: go on with  --resume --iterations {2 * options.iterations}  in {folder}."
         if options.encoder == "i2p-mae":
@@ -293,7 +280,10 @@ class Validation:
         return f"{text}Use it:  rlacd decompose MESH --policy {folder / 'policy.npz'}"
 
 
-MAY_CHANGE = frozenset(
-    {"iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"}
-)
+def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
+    """Get the geometric mean of the ratios; a count of 0 is taken as 1."""
+    return float(np.exp(np.mean(np.log(np.maximum(counts, 1) / np.maximum(others, 1)))))
+
+
+MAY_CHANGE = ["iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"]
 """Options that may change when a run is resumed: its length, its logging, its place and files."""

@@ -13,7 +13,7 @@ import inspect
 import math
 import numbers
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -116,14 +116,9 @@ def one_of(names: Any, *, rule: str | None = None) -> Kind:
     return custom(rule or f"one of {', '.join(words)}", lambda given: words[words.index(_text(given))], " ".join(words))
 
 
-def text(rule: str = "a string") -> Kind:
-    """A string."""
-    return custom(rule, _text)
-
-
-def path_like(rule: str = "a path") -> Kind:
+def path_like() -> Kind:
     """Where a file is."""
-    return custom(rule, lambda value: _text(os.fspath(value)), typed=Path)
+    return custom("a path", lambda value: _text(os.fspath(value)), typed=Path)
 
 
 def custom(rule: str, read: Callable[[Any], Any], values: str = "", *, typed: type = str) -> Kind:
@@ -201,17 +196,14 @@ def option(
     return dataclasses.field(default=default, kw_only=keyword, metadata={"option": known})
 
 
-def _kind_of(default: Any, one_of: Any = (), **bounds: Any) -> Kind:
-    if one_of:
-        return _one_of(one_of)
+def _kind_of(default: Any, **bounds: Any) -> Kind:
+    if "one_of" in bounds:
+        return one_of(bounds["one_of"])
     if isinstance(default, bool):
         return flag()
     if isinstance(default, float):
         return number(**bounds)
-    return integer(**bounds) if isinstance(default, int) or bounds else text()
-
-
-_one_of = one_of
+    return integer(**bounds) if isinstance(default, int) or bounds else custom("a string", _text)
 
 
 def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[Stated]], type[Stated]]:
@@ -269,7 +261,7 @@ def check_fields(options: Any) -> None:
         object.__setattr__(options, field.name, checked(options, field.name, getattr(options, field.name)))
 
 
-def checked(options: Any, name: str, value: Any, *, called: str | None = None) -> Any:
+def checked(options: Any, name: str, value: Any) -> Any:
     """Get the plain value of what was given for an option of a dataclass.
 
     Raises
@@ -278,9 +270,7 @@ def checked(options: Any, name: str, value: Any, *, called: str | None = None) -
         It is of the wrong type or out of its range.
     """
     known = about(options, name)
-    if value is None and known.optional:
-        return None
-    return read(known.kind, called or name, value)
+    return None if value is None and known.optional else read(known.kind, name, value)
 
 
 def read(kind: Kind, name: str, value: Any) -> Any:
@@ -318,47 +308,14 @@ def check_callback(name: str, value: Any, taken: str) -> None:
     OptionError
         It is not.
     """
-    if value is None:
-        return
-    fits = callable(value) and not inspect.iscoroutinefunction(value)
+    fits = value is None or (callable(value) and not inspect.iscoroutinefunction(value))
     try:
-        if fits:
+        if fits and value is not None:
             inspect.signature(value).bind(None)
-    except ValueError:  # a function written in C that does not say what it takes
-        fits = not isinstance(value, type)
-    except Exception:
-        fits = False
+    except Exception as error:  # a function written in C may not say what it takes
+        fits = isinstance(error, ValueError) and not isinstance(value, type)
     if not fits:
         raise OptionError(f"{name} is {shown(value)}; it has to be a function that takes {taken}.")
-
-
-def require_same(before: Mapping[str, Any], now: Any, may_change: Collection[str]) -> None:
-    """Refuse options that differ from those a run began with; an option that the run is older than had its default.
-
-    Raises
-    ------
-    OptionError
-        One that may not change does.
-    """
-    for name, value in dataclasses.asdict(now).items():
-        was = before.get(name, getattr(type(now), name))
-        if name not in may_change and was != value:
-            raise OptionError(
-                f"{name} is {value!r}, but was {was!r} when the run began; "
-                "resume with the same options, or begin another run."
-            )
-
-
-def refuse_unknown(known: Any, given: Mapping[str, Any], command: str) -> None:
-    """Refuse names that are no fields of the dataclass `known`.
-
-    Raises
-    ------
-    OptionError
-        There is one.
-    """
-    for unknown in sorted(set(given) - {field.name for field in dataclasses.fields(known)}):
-        raise OptionError(f"there is no option {unknown!r}; see `rlacd {command} --help`.")
 
 
 LONGEST_SIDE = {"threshold": 2.0, "overlap": 1.0, "gap": 1.0, "radius": 1.0, "tolerance": 1.0, "keep_open": 1.0}
@@ -378,10 +335,7 @@ def relative(name: str, length: float, scale: float, bounds: tuple[float, float]
     side = LONGEST_SIDE[name]
     number, (least, most) = length * scale * side / 2, bounds
     if not least <= number <= most:
-        unit = scale * side / 2
-        raise OptionError(
-            f"{name}_abs (--{name.replace('_', '-')} as a length) is {length!r}; for this object it has to be between "
-            f"{least / unit:.4g} and {most / unit:.4g} ({100 * least / side:g} % and {100 * most / side:g} % of its "
-            "longest side)."
-        )
+        unit, percent = scale * side / 2, f"{100 * least / side:g} % and {100 * most / side:g} % of its longest side"
+        given = f"{name}_abs (--{name.replace('_', '-')} as a length) is {length!r}; for this object it has to be"
+        raise OptionError(f"{given} between {least / unit:.4g} and {most / unit:.4g} ({percent}).")
     return number

@@ -29,6 +29,9 @@ LEARNED = ("learned", "rl-acd")
 
 POLICIES = ("greedy", *LEARNED, *AS_PUBLISHED, *CONTROLS)
 
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+"""Metres of each unit that a mesh may be said to be in."""
+
 WEIGHTS_ENDING = ".npz"
 """A policy's name that ends so is the path of a network."""
 
@@ -57,12 +60,10 @@ def policy_name(policy: object) -> str:
 
 def is_policy(name: object) -> bool:
     """Tell whether this is the name of a policy, or may be the path of one."""
-    return isinstance(name, str) and (name in POLICIES or (name.endswith(WEIGHTS_ENDING) and _can_be_a_path(name)))
-
-
-def _can_be_a_path(name: str) -> bool:
+    if not isinstance(name, str) or name in POLICIES:
+        return isinstance(name, str)
     try:
-        return b"\0" not in os.fsencode(name)
+        return name.endswith(WEIGHTS_ENDING) and b"\0" not in os.fsencode(name)
     except UnicodeError:
         return False
 

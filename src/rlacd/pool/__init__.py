@@ -11,15 +11,14 @@ the children of a process (pebble). Here every process has its own pipe, so that
 from __future__ import annotations
 
 import uuid
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeAlias, TypeVar
-
-from rlacd.errors import OptionError
+from typing import Any, TypeAlias
 
 Values: TypeAlias = dict[str, Any]
 """Values that JSON can represent."""
@@ -37,21 +36,10 @@ class ProcessLimits:
         Wall time.
     memory : int
         Bytes of main memory that the process may hold; 0 for no limit.
-
-    Raises
-    ------
-    OptionError
-        A limit is not positive.
     """
 
     seconds: float = 600.0
     memory: int = 4 * 2**30
-
-    def __post_init__(self) -> None:
-        if not self.seconds > 0:
-            raise OptionError(f"the limit of time is {self.seconds!r}; it has to be a positive number of seconds.")
-        if self.memory < 0:
-            raise OptionError(f"the limit of memory is {self.memory!r}; it has to be positive, or 0 for none.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,10 +145,7 @@ class MachineLostError(WorkerDiedError):
     """The request was lost with its machine, again and again."""
 
 
-_Opened = TypeVar("_Opened", bound="Pool")
-
-
-class Pool(ABC):
+class Pool(AbstractContextManager["Pool"]):
     """Where requests are answered; a context that ends all processes. They start only when needed.
 
     Attributes
@@ -187,9 +172,6 @@ class Pool(ABC):
     @abstractmethod
     def close(self) -> None:
         """End all processes, even busy ones; what was submitted and not answered fails."""
-
-    def __enter__(self: _Opened) -> _Opened:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()

@@ -2,8 +2,8 @@
 
 Requests come through stdin and answers leave through what stdout was at the start: pipes that every system has. A
 request that crashes, hangs, exhausts memory or makes a library print does so here. The process exits when its parent
-does or, where a library that hangs holds the interpreter, `GRACE` seconds after the limit of its request. A message is
-a JSON header that names its blobs, then the blobs.
+does or, where a library that hangs holds the interpreter, `END_SECONDS` after the limit of its request. A message is a
+JSON header that names its blobs, then the blobs.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from rlacd.pool import Blobs, MakeServer, Shared, Values
 READY = {"ready": True}
 """Header of the first message, sent when requests may come."""
 
-GRACE = 5.0
-"""Seconds after the limit of a request until its process ends itself, should nobody else have done so."""
+END_SECONDS = 10.0
+"""Seconds for a process to be gone after it was told to, and after the limit of a request until it ends itself."""
 
 _LENGTH = struct.Struct("<Q")
 
@@ -103,7 +103,7 @@ def main() -> None:
             shared[header["shares"]] = Shared(blobs, header["key"])
             continue
         shared = {name: shared[name] for name in header["shared"]}
-        faulthandler.dump_traceback_later(min(header["seconds"] + GRACE, threading.TIMEOUT_MAX - 1), exit=True)
+        faulthandler.dump_traceback_later(min(header["seconds"] + END_SECONDS, threading.TIMEOUT_MAX - 1), exit=True)
         try:
             values, files = serve(header["values"], blobs, shared)
         except RlacdError as error:

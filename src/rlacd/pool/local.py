@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ import psutil
 from rlacd import errors
 from rlacd.errors import OptionError, RlacdError
 from rlacd.pool import Answer, Pool, Request, Server, TimeLimitError, Values, WorkerDiedError
-from rlacd.pool.child import READY, find_server, receive, send
+from rlacd.pool.child import END_SECONDS, READY, find_server, receive, send
 from rlacd.pool.process import kill_group, start, why_it_ended
 
 LOOK_EVERY = 0.05
@@ -27,9 +27,6 @@ LOOK_EVERY = 0.05
 
 START_SECONDS = 300.0
 """Seconds a process may take to start, on a busy machine."""
-
-END_SECONDS = 10.0
-"""Seconds for a process to be gone after its pipe was closed, and for the thread that watches it to notice."""
 
 Message = tuple[Values, dict[str, bytes]]
 
@@ -207,12 +204,11 @@ class LocalPool(Pool):
     def __init__(self, jobs: int) -> None:
         if jobs < 1:
             raise OptionError(f"jobs is {jobs!r}; it has to be at least 1.")
-        self._waiting: queue.SimpleQueue[tuple[Request, Future[Answer]] | None] = queue.SimpleQueue()
-        self._closed = False
         self._workers = [Worker() for _ in range(jobs)]
-        self._threads = [threading.Thread(target=self._serve, args=(w,), daemon=True) for w in self._workers]
-        for thread in self._threads:
-            thread.start()
+        self._idle: queue.LifoQueue[Worker] = queue.LifoQueue()  # who has worked has a process already
+        for worker in self._workers:
+            self._idle.put(worker)
+        self._threads = ThreadPoolExecutor(jobs)
 
     @property
     def room(self) -> int:
@@ -221,32 +217,23 @@ class LocalPool(Pool):
 
     def submit(self, request: Request) -> Future[Answer]:
         """See `Pool`."""
-        future: Future[Answer] = Future()
-        if self._closed:
-            future.cancel()
-        self._waiting.put((request, future))
-        return future
+        return self._threads.submit(self._ask, request)
 
     def close(self) -> None:
         """See `Pool`."""
-        self._closed = True
+        self._threads.shutdown(wait=False, cancel_futures=True)
         for worker in self._workers:
             worker.kill()
-            self._waiting.put(None)
-        for thread in self._threads:
-            thread.join(END_SECONDS)
+        self._threads.shutdown()
+        for worker in self._workers:
+            worker.close()
 
-    def _serve(self, worker: Worker) -> None:
-        while (waiting := self._waiting.get()) is not None:
-            request, future = waiting
-            if self._closed:
-                future.cancel()
-            elif future.set_running_or_notify_cancel():
-                try:
-                    future.set_result(worker.ask(request))
-                except BaseException as error:
-                    future.set_exception(error)
-        worker.close()
+    def _ask(self, request: Request) -> Answer:
+        worker = self._idle.get()
+        try:
+            return worker.ask(request)
+        finally:
+            self._idle.put(worker)
 
 
 class InProcessPool(Pool):

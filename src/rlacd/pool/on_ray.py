@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from rlacd._version import __version__
-from rlacd.errors import MissingExtraError, OptionError
+from rlacd.errors import OptionError, import_extra
 from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared
 from rlacd.pool.local import Worker
 
@@ -51,12 +51,7 @@ class RayPool(Pool):
 
     def __init__(self, address: str, jobs: int | None = None) -> None:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # disables usage reports
-        try:
-            import ray
-        except ImportError as error:
-            raise MissingExtraError(
-                "a cluster needs an extra: run  pip install 'rlacd[fleet]'  and try again."
-            ) from error
+        ray = import_extra("ray", "a cluster", "fleet")
         if jobs is not None and address != LOCAL:
             raise OptionError("--jobs belongs to one machine; a cluster knows how many processors it has.")
         if jobs is not None and jobs < 1:
@@ -70,9 +65,7 @@ class RayPool(Pool):
                 ray.init(address=address, log_to_driver=False, logging_level="ERROR", **size)
             except (ConnectionError, ValueError, RuntimeError) as error:
                 reason = (str(error).strip().splitlines() or ["no answer"])[0]
-                raise OptionError(
-                    f"there is no Ray cluster at {address} ({reason}); start one or use local."
-                ) from error
+                raise OptionError(f"there is no Ray cluster at {address} ({reason}); use local.") from error
         self._remote = ray.remote(max_retries=MACHINES, retry_exceptions=False)(_do)
         self._running: set[Any] = set()
         self._stored: weakref.WeakKeyDictionary[Shared, Any] = weakref.WeakKeyDictionary()
@@ -159,9 +152,7 @@ def _do(
     """Run a request on the current machine, with plain values in and out."""
     global _fetched
     if version != __version__:
-        raise OptionError(
-            f"a machine of the cluster has rlacd {__version__}, not {version}: install the same everywhere."
-        )
+        raise OptionError(f"a machine of the cluster has rlacd {__version__}, not {version}: install the same.")
     _fetched = {name: _fetch(name, *given) for name, given in shared.items()}
     answer = _worker.ask(Request(**plain, shared=_fetched, limits=ProcessLimits(*limits)))
     return answer.values, answer.blobs, answer.worker

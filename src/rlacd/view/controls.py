@@ -25,9 +25,8 @@ _NAMES = (
 _USUAL, _SPACE = Options(), NavigableSpace()
 _NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
 
-CONTROLS: dict[str, Any] = {name: getattr(_SPACE if hasattr(_SPACE, name) else _USUAL, name) for name in _NAMES} | {
-    "primitives": False
-}
+CONTROLS: dict[str, Any] = {name: getattr(_SPACE if hasattr(_SPACE, name) else _USUAL, name) for name in _NAMES}
+CONTROLS["primitives"] = False
 """The page's controls, by the names of options, with their first values."""
 
 
@@ -53,9 +52,9 @@ def options_of(controls: dict[str, Any]) -> dict[str, Any]:
     return with_criterion({name: value for name, value in controls.items() if name not in others})
 
 
-def draft_of(controls: dict[str, Any]) -> dict[str, Any] | None:
-    """Get the options of a quick first pass; None if the requested options are already quick."""
-    return None if controls["quality"] == FAST else options_of({**controls, "quality": FAST})
+def passes_of(controls: dict[str, Any]) -> list[dict[str, Any]]:
+    """Get the options of each pass: a quick one first, unless those requested are quick already."""
+    return [options_of({**controls, "quality": quality}) for quality in dict.fromkeys((FAST, controls["quality"]))]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,11 +10,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import cast
 
-from rlacd.errors import OptionError
+from rlacd.errors import OptionError, extra_needed
 from rlacd.io.write import FORMATS, MODELS, file_stem, save
 from rlacd.io.write.balls import save_balls
 from rlacd.io.write.target import WITH_MESHES
-from rlacd.io.write.usd import NEEDS_EXTRA
 from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
 from rlacd.result import Result
@@ -74,7 +73,7 @@ def offered() -> list[Offer]:
                 f"The mesh with its hulls as collision shapes, for {_MODEL_NAMES[model][1]}"
                 f" (.{MODELS[model][0]}{' and its meshes, zipped' if model in WITH_MESHES else ''}).",
                 "Models",
-                NEEDS_EXTRA if model == "usd" and find_spec("pxr") is None else None,
+                extra_needed("USD", "usd") if model == "usd" and find_spec("pxr") is None else None,
             )
             for model in MODELS
         ),

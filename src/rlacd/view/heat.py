@@ -6,7 +6,7 @@ is an inner wall of the union and not an error: those vertices are marked instea
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import manifold3d
 import numpy as np
@@ -27,8 +27,7 @@ ON_HULL = 1e-5
 """A point this close to another hull lies on an inner wall: above rounding error, below what is visible."""
 
 
-@dataclass(frozen=True, eq=False)
-class HeatMesh:
+class HeatMesh(NamedTuple):
     """A hull's surface, subdivided, with its distances to the input's surface.
 
     Attributes

@@ -56,38 +56,21 @@ def still_page(title: str, config: dict[str, Any], scene: dict[str, Any]) -> str
     scene : dict
         The result of `rlacd.view.scene.scene`, with ``heat`` and ``picture`` if available.
     """
-    imports = {f"page/{name}": _data_address(_asset(f"{name}.js")) for name in MODULES}
+    scripts = {name: base64.b64encode(_asset(f"{name}.js").encode()).decode("ascii") for name in MODULES}
+    imports = {f"page/{name}": f"data:text/javascript;base64,{script}" for name, script in scripts.items()}
     return _page(title, {"live": False, **config}, scene, imports, modules="data:", connect="'none'")[0]
 
 
 def _page(
-    title: str,
-    config: dict[str, Any],
-    data: dict[str, Any] | None,
-    imports: dict[str, str],
-    *,
-    modules: str,
-    connect: str,
+    title: str, config: dict[str, Any], data: dict[str, Any] | None, imports: dict[str, str], **sources: str
 ) -> tuple[str, str]:
     # No time stamp in the gzip header, so that the same data gives the same bytes.
     packed = b"" if data is None else gzip.compress(to_json(data, indent=None).encode(), mtime=0)
-    style = _asset("style.css")
-    scripts = {
-        "three": _asset("vendor/three.min.js"),
-        "imports": _inert(to_json({"imports": imports}, indent=None)),
-        "main": _asset("main.js"),
-    }
-    policy = POLICY.format(
-        modules=modules, connect=connect, styles=_hash(style), scripts=" ".join(map(_hash, scripts.values()))
-    )
-    values = {
-        "policy": policy,
-        "title": html.escape(title),
-        "style": style,
-        **scripts,
-        "config": _inert(to_json(config, indent=None)),
-        "data": base64.b64encode(packed).decode("ascii"),
-    }
+    style, plain = _asset("style.css"), _inert(to_json({"imports": imports}, indent=None))
+    scripts = {"three": _asset("vendor/three.min.js"), "imports": plain, "main": _asset("main.js")}
+    policy = POLICY.format(styles=_hash(style), scripts=" ".join(map(_hash, scripts.values())), **sources)
+    values = {"policy": policy, "title": html.escape(title), "style": style, **scripts}
+    values |= {"config": _inert(to_json(config, indent=None)), "data": base64.b64encode(packed).decode("ascii")}
     # All in one pass, so that no inserted value is searched for placeholders.
     return re.sub(r"\{\{(\w+)\}\}", lambda match: values[match[1]], _asset("page.html")), policy
 
@@ -99,10 +82,6 @@ def _hash(text: str) -> str:
 
 def _asset(name: str) -> str:
     return (resources.files("rlacd.view") / "web" / name).read_text(encoding="utf-8")
-
-
-def _data_address(script: str) -> str:
-    return "data:text/javascript;base64," + base64.b64encode(script.encode()).decode("ascii")
 
 
 def _inert(json_text: str) -> str:

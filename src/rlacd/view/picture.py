@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd._native import PointTree
-from rlacd.fit import Fit
+from rlacd.errors import import_extra
 from rlacd.io.write import write_file
 from rlacd.io.write.palette import linear_from_srgb
 from rlacd.io.write.target import checked_place
@@ -20,9 +19,8 @@ from rlacd.options.fields import checked, integer, read
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.primitive import Balls
-from rlacd.view.apart import render_apart
 from rlacd.view.coloring import color_hulls
-from rlacd.view.render import Body, Spheres, require_extra
+from rlacd.view.render import Body, Spheres, render_apart
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
@@ -49,7 +47,7 @@ def check_picture(path: str | os.PathLike[str], up: str | None = None) -> Path:
     check_up(up)
     place = checked_place(path, "the picture", [".png"])
     for module in ("mitsuba", "PIL"):
-        require_extra(module)
+        import_extra(module, "a picture", "view")
     return place
 
 
@@ -115,8 +113,8 @@ def picture_bytes(
     width = read(integer(300, 8000, rule="a number of pixels between 300 and 8000"), "width", width)
     samples = read(integer(1, 10_000), "samples", samples)
 
-    image = require_extra("PIL.Image")
-    require_extra("mitsuba")  # before a process is started that needs it
+    image = import_extra("PIL.Image", "a picture", "view")
+    import_extra("mitsuba", "a picture", "view")  # before a process is started that needs it
     up = decomposition.up_axis(up)
     panels: list[tuple[str, list[Body], Spheres | None]] = [
         ("input", [_body(decomposition.source.triangles, INPUT_COLOR, up)], None),
@@ -127,11 +125,9 @@ def picture_bytes(
         some = apart(decomposition.balls)
         spheres = Spheres(some.centres @ TO_Z_UP[up].T, some.radii, BALL_COLOR)
         panels.insert(2, ("some of the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
-    columns = 3 if len(panels) == 3 else 2
-    rows = math.ceil(len(panels) / columns)
-    panel_width = width // columns
-    panel_height = round(panel_width * 0.92 if rows == 1 else panel_width * 0.62)
-    unit = width / 1600
+    columns, rows = (3, 1) if len(panels) == 3 else (2, 2)
+    panel_width, unit = width // columns, width / 1600
+    panel_height = round(panel_width * (0.92 if rows == 1 else 0.62))
     header, footer = 0 if clear else round(104 * unit), round(44 * unit)
     size = width, header + rows * (panel_height + footer)
     sheet = image.new("RGBA", size, (*PAPER, 0 if clear else 255))
@@ -145,24 +141,12 @@ def picture_bytes(
     if not clear:
         margin = round(32 * unit)
         _write(sheet, decomposition.name, (margin, round(40 * unit)), round(34 * unit), INK, anchor="lm")
-        _write(sheet, caption(decomposition), (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
+        facts = "   ·   ".join(decomposition.facts())
+        _write(sheet, facts, (margin, round(79 * unit)), round(21 * unit), FADED, anchor="lm")
 
     encoded = io.BytesIO()
     (sheet if clear else sheet.convert("RGB")).save(encoded, format="PNG")
     return encoded.getvalue()
-
-
-def caption(decomposition: Result) -> str:
-    """One line of numbers: hulls, faces, how well they fit; the same on every machine."""
-    report = decomposition.report
-    count = len(decomposition)
-    words = [f"{count} hull{'s' * (count != 1)}", f"{sum(len(hull.faces) for hull in decomposition)} triangles"]
-    fit = Fit.of(report)
-    if fit is not None and (said := fit.words()):
-        words.append(said)
-    if not report.get("complete", True):
-        words.append(f"stopped early by {report.get('stopped_by')}")
-    return "   ·   ".join(words)
 
 
 def apart(balls: Balls) -> Balls:
@@ -185,10 +169,8 @@ def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:
     corners = np.concatenate([hull.bounds for hull in decomposition])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
     colors = linear_from_srgb(color_hulls(decomposition.hulls)[0])
-    return [
-        _body(hull.triangles + pull * (hull.bounds.mean(axis=0) - middle), color, up)
-        for hull, color in zip(decomposition, colors, strict=True)
-    ]
+    moved = [hull.triangles + pull * (hull.bounds.mean(axis=0) - middle) for hull in decomposition]
+    return [_body(triangles, color, up) for triangles, color in zip(moved, colors, strict=True)]
 
 
 def _body(triangles: npt.ArrayLike, color: npt.NDArray[np.float64], up: str) -> Body:

@@ -1,12 +1,13 @@
 """Path-traced pictures of meshes on a transparent background, on any CPU.
 
 Mitsuba 3 renders without a display, GPU or OpenGL library, so it also works in a bare container, where VTK's wheels
-find no OpenGL and abort the process.
+find no OpenGL and abort the process. It runs in a process of its own: the renderer keeps Python's lock, and all other
+threads would stand still; and other libraries disturb it: CoACD hides its plugins.
 """
 
 from __future__ import annotations
 
-import importlib
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,8 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.errors import MissingExtraError
+from rlacd.errors import OutputError, import_extra
+from rlacd.io.read.apart import Answered, served
 from rlacd.io.write.palette import srgb_from_linear
+from rlacd.pool import Blobs, ProcessLimits, Request, Values, WorkerDiedError
+from rlacd.pool.local import Worker
 
 FIELD_OF_VIEW = 22.0  # degrees, vertical; narrow, so that perspective barely changes the size of equal hulls
 ELEVATION, AZIMUTH = np.deg2rad(24.0), np.deg2rad(-58.0)
@@ -36,17 +40,6 @@ class Spheres:
     centres: npt.NDArray[np.float64]
     radii: npt.NDArray[np.float64]
     color: npt.NDArray[np.float64]
-
-
-def require_extra(module: str) -> Any:
-    """Import a module of the extra ``view``, or raise an error that says how to get it."""
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("pictures need an extra: run  pip install 'rlacd[view]'  and try again.") from error
-    except ImportError as error:
-        # Installed, but a system library is missing, such as libatomic in a container without a compiler.
-        raise MissingExtraError(f"pictures need {module}, which does not load here ({error}); install that.") from error
 
 
 def render(
@@ -75,7 +68,7 @@ def render(
     MissingExtraError
         Mitsuba is not installed.
     """
-    mi = require_extra("mitsuba")
+    mi = import_extra("mitsuba", "a picture", "view")
     mi.set_variant("scalar_rgb")  # needs no compiler at run time
     points = np.concatenate([body.triangles.reshape(-1, 3) for body in bodies])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -117,6 +110,7 @@ def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.floa
 
 
 def _sensor(mi: Any, eye: npt.NDArray[np.float64], width: int, height: int) -> dict[str, Any]:
+    film: dict[str, Any] = {"type": "hdrfilm", "pixel_format": "rgba", "rfilter": {"type": "gaussian"}}
     return {
         "type": "perspective",
         "fov": FIELD_OF_VIEW,
@@ -124,13 +118,7 @@ def _sensor(mi: Any, eye: npt.NDArray[np.float64], width: int, height: int) -> d
         "near_clip": 1e-3,
         "far_clip": 1e4,
         "to_world": mi.ScalarTransform4f().look_at(origin=eye.tolist(), target=[0, 0, 0], up=[0, 0, 1]),
-        "film": {
-            "type": "hdrfilm",
-            "width": width,
-            "height": height,
-            "pixel_format": "rgba",
-            "rfilter": {"type": "gaussian"},
-        },
+        "film": film | {"width": width, "height": height},
         "sampler": {"type": "multijitter"},
     }
 
@@ -139,11 +127,8 @@ def _lamp(mi: Any) -> dict[str, Any]:
     """Beside the uniform sky, one lamp gives the shadows a direction."""
     position = [1.2, -2.2, 3.2]
     facing = mi.ScalarTransform4f().look_at(origin=position, target=[0, 0, 0], up=[0, 1, 0])
-    return {
-        "type": "rectangle",
-        "to_world": facing @ mi.ScalarTransform4f().scale(1.1),
-        "light": {"type": "area", "radiance": {"type": "rgb", "value": 12.0}},
-    }
+    light = {"type": "area", "radiance": {"type": "rgb", "value": 12.0}}
+    return {"type": "rectangle", "to_world": facing @ mi.ScalarTransform4f().scale(1.1), "light": light}
 
 
 def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.float64]) -> Any:
@@ -158,3 +143,51 @@ def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.flo
     arrays["faces"] = np.arange(3 * len(triangles), dtype=np.uint32)
     arrays.update()
     return mesh
+
+
+SERVER = "rlacd.view.render:draw"
+
+
+def render_apart(
+    scenes: Sequence[tuple[Sequence[Body], Spheres | None]], width: int, height: int, samples: int
+) -> list[npt.NDArray[np.uint8]]:
+    """Do what `render` does for each scene; spheres are half transparent.
+
+    Raises
+    ------
+    MissingExtraError
+        Mitsuba is not installed.
+    OutputError
+        The process died.
+    """
+    how = {"width": width, "height": height, "samples": samples}
+    worker, drawn = Worker(), []
+    try:
+        for bodies, spheres in scenes:
+            arrays = [*bodies, *([] if spheres is None else [spheres])]
+            blobs = {
+                f"{i} {name}": array.tobytes() for i, body in enumerate(arrays) for name, array in vars(body).items()
+            }
+            values = {"bodies": len(bodies), "spheres": spheres is not None, "how": how}
+            pixels = worker.ask(Request(SERVER, values, blobs, limits=ProcessLimits(memory=0))).blobs["pixels"]
+            drawn.append(np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 4))
+    except WorkerDiedError as died:
+        raise OutputError(f"the picture could not be drawn: {died}.") from died
+    finally:
+        worker.close()
+    return drawn
+
+
+@served
+def draw(values: Values, blobs: Blobs) -> Answered:
+    """Render one scene, and leave processors to whoever else needs them."""
+    if hasattr(os, "nice") and os.nice(0) == 0:
+        os.nice(10)
+    arrays = {name: np.frombuffer(blob) for name, blob in blobs.items()}
+    count = values["bodies"]
+    bodies = [Body(arrays[f"{i} triangles"].reshape(-1, 3, 3), arrays[f"{i} color"]) for i in range(count)]
+    pixels = render(bodies, **values["how"])
+    if values["spheres"]:
+        balls = Spheres(*(arrays[f"{count} {name}"] for name in ("centres", "radii", "color")))
+        pixels = ((pixels.astype(np.uint16) + render(bodies, spheres=balls, **values["how"]) + 1) // 2).astype(np.uint8)
+    return {}, {"pixels": pixels.tobytes()}

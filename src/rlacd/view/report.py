@@ -32,28 +32,17 @@ def save_report_page(
     return place
 
 
-def report_page(
-    decomposition: Result,
-    *,
-    up: str | None = None,
-    picture: bool = True,
-) -> str:
+def report_page(decomposition: Result, *, up: str | None = None, picture: bool = True) -> str:
     """Build the text of the report; see `save_report_page`."""
     up = decomposition.up_axis(up)
     unit = "" if decomposition.input is None else decomposition.input.unit
     # The heat map gets that many triangles, up to a few times as many: about half a megabyte.
-    data: dict[str, Any] = {
-        **scene(decomposition, up, unit=unit),
-        "heat": heat_scene(heat_map(decomposition, triangles=16_000)),
-        **(_picture(decomposition, up) if picture else {}),
-    }
+    heat = heat_scene(heat_map(decomposition, triangles=16_000))
+    data: dict[str, Any] = {**scene(decomposition, up, unit=unit), "heat": heat}
+    if picture:
+        try:
+            png = picture_bytes(decomposition, width=1500, up=up, clear=True)
+            data["picture"] = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+        except MissingExtraError as error:
+            data["note"] = f"The picture is left out: {error}"
     return still_page(f"{decomposition.name}: convex hulls", {"version": __version__}, data)
-
-
-def _picture(decomposition: Result, up: str) -> dict[str, str]:
-    """The picture as a data URL, or a note that explains its absence."""
-    try:
-        png = picture_bytes(decomposition, width=1500, up=up, clear=True)
-    except MissingExtraError as error:
-        return {"note": f"The picture is left out: {error}"}
-    return {"picture": "data:image/png;base64," + base64.b64encode(png).decode("ascii")}

@@ -42,18 +42,16 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     """
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
-    errors = _errors(report, len(decomposition))
+    fit = Fit.of(report)
+    errors: list[float | None] = list((fit and fit.per_part) or [])
+    errors = errors if len(errors) == len(decomposition) else [None] * len(decomposition)
     rgb, ranks = color_hulls(decomposition.hulls)
     balls = None
     if decomposition.balls is not None and len(decomposition.balls):
         some = apart(decomposition.balls)
         shown = min(len(some), 4000)  # more are slow to draw
-        balls = {
-            "centres": floats(frame.to_frame(some.centres[:shown])),
-            "radii": floats(some.radii[:shown] * frame.scale),
-            "shown": shown,
-            "of": len(decomposition.balls),
-        }
+        centres, radii = frame.to_frame(some.centres[:shown]), some.radii[:shown] * frame.scale
+        balls = {"centres": floats(centres), "radii": floats(radii), "shown": shown, "of": len(decomposition.balls)}
     return {
         **input_scene(decomposition.name, source.vertices, source.faces, up, unit=unit, frame=frame),
         "report": report,
@@ -112,10 +110,3 @@ def floats(values: ArrayLike) -> str:
 def _mesh(vertices: ArrayLike, faces: ArrayLike) -> dict[str, str]:
     corners = np.asarray(faces).astype("<u4").tobytes()
     return {"vertices": floats(vertices), "faces": base64.b64encode(corners).decode("ascii")}
-
-
-def _errors(report: dict[str, Any], count: int) -> list[float | None]:
-    """The criterion's measurement of each part."""
-    fit = Fit.of(report)
-    per_part = (fit and fit.per_part) or []
-    return list(per_part) if len(per_part) == count else [None] * count

@@ -21,6 +21,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import math
 import re
 import tempfile
 import threading
@@ -35,12 +36,12 @@ from typing import Any
 from rlacd._version import __version__
 from rlacd.errors import OptionError, RlacdError, sentence_of
 from rlacd.io.read.load import FORMATS as READ
-from rlacd.io.write import MODELS
+from rlacd.io.write.target import MODEL_OF
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.connections import ANSWER_SECONDS, FOREVER, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
-from rlacd.view.controls import Subject, as_command, draft_of, options_of, read_controls, read_subject
+from rlacd.view.connections import ANSWER_SECONDS, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
+from rlacd.view.controls import Subject, as_command, passes_of, read_controls, read_subject
 from rlacd.view.downloads import download, offered
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
@@ -77,31 +78,17 @@ class ViewServer(BoundedServer):
         The port is in use, forbidden, or out of range.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        subject: Subject,
-        *,
-        port: int | None,
-        options: dict[str, Any],
-    ) -> None:
+    def __init__(self, session: Session, subject: Subject, *, port: int | None, options: dict[str, Any]) -> None:
         self.session, self.subject = session, subject
         self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
         self.uploads = threading.BoundedSemaphore(UPLOADS)
         self._made: dict[str, tuple[int, bytes]] = {}
-        self._making = threading.Lock()
-        self._opening = threading.Lock()
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
-        page, policy = live_page(
-            subject.name,
-            {
-                "options": options,
-                "downloads": [asdict(offer) for offer in offered()],
-                "presets": [{"name": name, **preset_words(name)} for name in PRESETS],
-                "formats": list(READ),
-                "version": __version__,
-            },
-        )
+        self._making, self._opening = threading.Lock(), threading.Lock()
+        self.uploaded: tempfile.TemporaryDirectory[str] | None = None
+        config: dict[str, Any] = {"options": options, "formats": list(READ), "version": __version__}
+        config["downloads"] = [asdict(offer) for offer in offered()]
+        config["presets"] = [{"name": name, **preset_words(name)} for name in PRESETS]
+        page, policy = live_page(subject.name, config)
         self.page, self.policy = page.encode(), f"{policy}; frame-ancestors 'none'"
         self._bind(port)
         self._thread = threading.Thread(target=self.serve_forever, args=(0.1,), name="rlacd-view-server", daemon=True)
@@ -111,11 +98,6 @@ class ViewServer(BoundedServer):
     def address(self) -> str:
         """URL of the page."""
         return f"http://{ADDRESS}:{self.server_address[1]}/"
-
-    @property
-    def folder(self) -> Path | None:
-        """Folder of an uploaded mesh; None if there is none."""
-        return None if self._folder is None else Path(self._folder.name)
 
     @property
     def at_work(self) -> bool:
@@ -130,11 +112,8 @@ class ViewServer(BoundedServer):
 
     def decompose(self, controls: dict[str, Any], *, other_input: bool = False) -> None:
         """Decompose the subject next: first a draft, then with the requested options."""
-        mesh = {"mesh": self.subject.path}
-        draft = draft_of(controls)
-        self.session.decompose(
-            {**mesh, **options_of(controls)}, None if draft is None else {**mesh, **draft}, other_input=other_input
-        )
+        passes = [{"mesh": self.subject.path, **options} for options in passes_of(controls)]
+        self.session.decompose(*passes, other_input=other_input)
 
     def open_mesh(self, name: str, content: bytes, controls: dict[str, Any]) -> None:
         """Replace the subject by an uploaded file.
@@ -154,15 +133,15 @@ class ViewServer(BoundedServer):
                 folder.cleanup()
                 raise
             self.decompose(controls, other_input=True)
-            if self._folder is not None:
-                self._folder.cleanup()
-            self._folder = folder
+            if self.uploaded is not None:
+                self.uploaded.cleanup()
+            self.uploaded = folder
 
     def server_close(self) -> None:
         """Stop listening, and remove uploaded files."""
         super().server_close()
-        if self._folder is not None:
-            self._folder.cleanup()
+        if self.uploaded is not None:
+            self.uploaded.cleanup()
 
     def scene(self) -> bytes:
         """Return the scene as JSON; computed once per subject or result."""
@@ -193,9 +172,7 @@ class ViewServer(BoundedServer):
                 super().__init__((ADDRESS, 0), _Handler)
                 return
             why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be listened on ({error.strerror})"
-            raise OptionError(
-                f"port {port} {why}; choose another with --port, or leave it out to get a free one."
-            ) from error
+            raise OptionError(f"port {port} {why}; choose another with --port, or leave it out.") from error
 
 
 class _Handler(BoundedHandler):
@@ -237,7 +214,9 @@ class _Handler(BoundedHandler):
             elif place.path == "/decompose":
                 self.server.decompose(read_controls(self._body()))
             elif place.path == "/command":
-                answer["command"] = self._command(self._body())
+                path = self.server.subject.path  # an uploaded mesh has no place but a copy that goes with the viewer
+                where = path if self.server.uploaded is None else path.name
+                answer["command"] = as_command(where, read_controls(self._body()))
             elif place.path == "/cancel":
                 self._body()
                 self.server.session.stop()
@@ -254,16 +233,10 @@ class _Handler(BoundedHandler):
         with self.server.heavy:
             self.server.open_mesh(query.get("name", [""])[0], content, controls)
 
-    def _command(self, given: dict[str, Any]) -> str:
-        controls = read_controls(given)
-        # An uploaded mesh has no place but the copy kept here, which goes with the viewer.
-        path = self.server.subject.path
-        return as_command(path if self.server.folder is None else path.name, controls)
-
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
         """Turn errors into answers that the page shows."""
-        self.server.expect(self.connection, FOREVER)
+        self.server.expect(self.connection, math.inf)
         try:
             yield
         except (TimeoutError, ConnectionError):
@@ -301,7 +274,7 @@ class _Handler(BoundedHandler):
             raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
         self.server.expect(self.connection, seconds)
         content = self.rfile.read(int(length))
-        self.server.expect(self.connection, FOREVER)
+        self.server.expect(self.connection, math.inf)
         if len(content) != int(length):
             raise ConnectionError("the request ended early")
         return content
@@ -400,7 +373,6 @@ def preset_words(name: str) -> dict[str, Any]:
     """Describe a preset for the page: its engine, limits and format."""
     preset = PRESETS[name]
     ending = preset.ending.lstrip(".")
-    model = next((model for model, endings in MODELS.items() if ending in endings), ending)
     stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
-    limits = [f"{limit} {what}" for what, limit in stated.items() if limit]
-    return {"engine": preset.engine, "format": preset.file_format or model, "limits": " and ".join(limits)}
+    limits = " and ".join(f"{limit} {what}" for what, limit in stated.items() if limit)
+    return {"engine": preset.engine, "format": preset.file_format or MODEL_OF.get(ending, ending), "limits": limits}

@@ -15,7 +15,7 @@ from rlacd.errors import sentence_of
 from rlacd.result import Result
 from rlacd.run import Progress
 
-Run = Callable[..., Result]
+Decompose = Callable[..., Result]
 """Takes ``progress`` and the options, returns a decomposition: `rlacd.decompose` with the mesh bound."""
 
 
@@ -59,12 +59,12 @@ class Session:
         Called with ``progress`` and the requested options.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Decompose) -> None:
         self._run = run
         self._changed = threading.Condition()
         self._state = SessionState()
         self._count = 0  # number of state changes so far
-        self._wanted: list[dict[str, Any]] | None = None  # options of the draft, if any, and of the result
+        self._wanted: list[dict[str, Any]] | None = None
         self._stopped = False
         self._result: Result | None = None
         self._thread = threading.Thread(target=self._work, name="rlacd-view", daemon=True)
@@ -87,22 +87,18 @@ class Session:
         """Whether the session is closed and its work has ended."""
         return not self._thread.is_alive()
 
-    def decompose(
-        self, options: dict[str, Any], draft: dict[str, Any] | None = None, *, other_input: bool = False
-    ) -> None:
+    def decompose(self, *passes: dict[str, Any], other_input: bool = False) -> None:
         """Cancel the current work and decompose with these options instead.
 
         Parameters
         ----------
-        options : dict
-        draft : dict, optional
-            Options of a quick first pass, whose hulls are shown until better ones are ready.
+        *passes : dict
+            Options of each: the hulls of one are shown until those of the next are ready.
         other_input : bool
             Drop the current hulls, which belong to another input.
         """
         with self._changed:
-            self._wanted, self._stopped = [dict(draft)] if draft else [], False
-            self._wanted.append(dict(options))
+            self._wanted, self._stopped = list(passes), False
             now = SessionState("working", run=self._state.run, version=self._state.version, draft=self._state.draft)
             if other_input:
                 self._result = None
@@ -155,7 +151,8 @@ class Session:
                     return
                 is_last = number == len(passes) or self._stopped or error is not None
                 # A pass that was stopped before its search is worth less than the finished draft.
-                if number > 1 and result is not None and _is_cut_short(result):
+                report = {} if result is None else result.report
+                if number > 1 and report.get("complete") is False and report.get("search") is None:
                     result = None
                 state = self._state
                 if result is not None:
@@ -186,8 +183,3 @@ class Session:
         self._state = state
         self._count += 1
         self._changed.notify_all()
-
-
-def _is_cut_short(result: Result) -> bool:
-    """Tell whether the work was stopped during its first pass."""
-    return result.report.get("complete") is False and result.report.get("search") is None

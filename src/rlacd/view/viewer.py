@@ -13,7 +13,7 @@ from rlacd.options import Options
 from rlacd.view.controls import read_controls, read_subject
 from rlacd.view.picture import check_up
 from rlacd.view.server import ViewServer
-from rlacd.view.session import Run, Session
+from rlacd.view.session import Decompose, Session
 
 AT_EXIT = 30.0
 """Seconds that work may take to end when Python exits."""
@@ -22,7 +22,7 @@ AT_EXIT = 30.0
 @contextlib.contextmanager
 def open_viewer(
     mesh: str | os.PathLike[str],
-    decompose: Run,
+    decompose: Decompose,
     options: dict[str, Any] | None = None,
     *,
     up: str | None = None,

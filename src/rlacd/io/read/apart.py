@@ -9,9 +9,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeAlias
 
-from rlacd.errors import MeshFileError, MissingExtraError
+from rlacd.errors import MeshFileError, MissingExtraError, extra_needed
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
+from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles, damaged
 from rlacd.memory import memory_left
 from rlacd.pool import Answer, Blobs, MakeServer, ProcessLimits, Request, Server, Values, WorkerDiedError
 from rlacd.pool.local import Worker
@@ -67,15 +67,13 @@ def answer_of(server: str, path: Path, kind: str, values: Values, blobs: Blobs) 
     """
     package, extra = EXTRAS.get(server, ("", ""))
     if package and find_spec(package) is None:
-        raise MissingExtraError(f"{path} needs an extra: run  pip install 'rlacd[{extra}]'  and try again.")
+        raise MissingExtraError(extra_needed(str(path), extra))
     worker = Worker()
     limits = replace(LIMITS, memory=max(min(LIMITS.memory or 0, memory_left()), 1))
     try:
         return worker.ask(Request(server, values, blobs, limits=limits))
     except WorkerDiedError as error:
-        raise MeshFileError(
-            f"{path} cannot be read as {kind}: it is damaged or cut off ({error.reason}); export it again"
-        ) from error
+        raise damaged(path, kind, error.reason) from error
     finally:
         worker.close()
 

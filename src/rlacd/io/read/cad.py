@@ -10,8 +10,10 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, answer_of, served
-from rlacd.io.read.contents import Contents
-from rlacd.io.read.gltf import JSON_CHUNK, MAGIC, read_gltf, split
+from rlacd.io.read.contents import Contents, damaged
+from rlacd.io.read.gltf import read_gltf, split
+from rlacd.io.read.open_file import JSON_CHUNK, MAGIC
+from rlacd.options.names import UNITS
 from rlacd.pool import Blobs, Values
 
 SERVER = "rlacd.io.read.cad:triangulate"
@@ -24,8 +26,6 @@ ANGLE = 0.5
 
 ROUGH = 0.1
 """The same as a share of the edge that a surface ends at, where only its size is wanted."""
-
-MILLIMETRE = 1e-3
 
 
 def read_cad(path: Path, content: bytes) -> Contents:
@@ -42,9 +42,7 @@ def read_cad(path: Path, content: bytes) -> Contents:
     glb = answer_of(SERVER, path, kind.upper(), {"path": str(path), "kind": kind}, {"file": content}).blobs["glb"]
     contents = read_gltf(path, glb)
     if not contents.geometry:
-        raise MeshFileError(
-            f"{path} holds no surfaces: if its parts lie in other files, export them all into one, as solids"
-        )
+        raise MeshFileError(f"{path} holds no surfaces: if its parts lie elsewhere, export them all into one file")
     empty = sum("mesh" not in node and not node.get("children") for node in split(glb)[0]["nodes"])
     said = f"parts of {path.name} without surfaces, or that lie in other files, were left out: {empty}"
     return contents._replace(warnings=(*contents.warnings, *([said] if empty else [])), up="z")
@@ -59,16 +57,13 @@ def triangulate(values: Values, blobs: Blobs) -> Answered:
         how = {"file_type": values["kind"], "tol_angular": ANGLE, "use_parallel": False, **tolerance}
         if glb := cascadio.load(blobs["file"], **how):
             return bytes(glb)
-        raise MeshFileError(
-            f"{values['path']} cannot be read as {values['kind'].upper()}: it is damaged or cut off, or holds no "
-            "surfaces; export it again"
-        )
+        raise damaged(Path(values["path"]), values["kind"].upper(), "or it holds no surfaces")
 
     glb = converted(tol_linear=ROUGH, tol_relative=True)
     if size := _size(read_gltf(Path(values["path"]), glb)):
-        unit = 1.0 if values["kind"] == "iges" else MILLIMETRE  # STEP is written in metres, and IGES as it is
+        unit = 1.0 if values["kind"] == "iges" else UNITS["mm"]  # STEP is written in metres, and IGES as it is
         glb = converted(tol_linear=DEVIATION * size / unit)
-    return {}, {"glb": _scaled(glb, MILLIMETRE) if values["kind"] == "iges" else glb}
+    return {}, {"glb": _scaled(glb, UNITS["mm"]) if values["kind"] == "iges" else glb}
 
 
 def _size(contents: Contents) -> float:

@@ -15,12 +15,12 @@ from lxml import etree
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import PICTURES, FolderFiles
-from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
-from rlacd.io.read.conventions import COLLADA_HEAD, collada
+from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, Contents, Triangles, check_places
 from rlacd.io.read.looks import opened_picture, painted
 from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles
 from rlacd.io.read.text import rows_of, whole
 from rlacd.io.read.xml import open_archive, parse_xml
+from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
@@ -56,9 +56,7 @@ class _Document:
     def __init__(self, path: Path, content: bytes) -> None:
         self._path = path
         self.root = parse_xml(path, content)
-        self.named: dict[Any, Any] = {
-            element.get("id"): element for element in self.root.iter("{*}*") if element.get("id")
-        }
+        self.named = {one.get("id"): one for one in self.root.iter("{*}*") if one.get("id")}
         tags = {etree.QName(element).localname for element in self.root.iter("{*}*")}
         self.warnings = [said.format(path.name) for tag, said in _UNREAD.items() if tag in tags]
         self.placed: dict[str, _Placed] = {}
@@ -73,6 +71,17 @@ class _Document:
         for node in scene.iterchildren("{*}node"):
             self._place(node, np.eye(4), 0)
 
+    @property
+    def axis_and_unit(self) -> tuple[Axis, float | None]:
+        """What points up, z if nothing is said, and the unit in metres."""
+        up, unit = self.root.findtext("{*}asset/{*}up_axis", ""), self.root.find("{*}asset/{*}unit")
+        axes: dict[str, Axis] = {"X_UP": "x", "Y_UP": "y"}
+        try:
+            metres = 0.0 if unit is None else float(unit.get("meter", 0.0))
+        except ValueError:
+            metres = 0.0
+        return axes.get(up.strip(), "z"), metres if 0 < metres < np.inf else None
+
     def at(self, element: Any, attribute: str = "url") -> Any:
         """What an element refers to; None if that is not there."""
         return None if element is None else self.named.get(element.get(attribute, "").removeprefix("#"))
@@ -84,15 +93,10 @@ class _Document:
         return source
 
     def _place(self, node: Any, transform: FloatArray, depth: int) -> None:
-        if depth > DEEPEST_PART:
-            raise MeshFileError(
-                f"{self._path} places parts inside parts, or in itself, more than {DEEPEST_PART} deep: export it again"
-            )
         here = transform @ _transform(node)
         for child in node.iterchildren("{*}*"):
             self._count += 1
-            if self._count > MOST_PLACES:
-                raise MeshFileError(f"{self._path} has more than {MOST_PLACES} places for its parts: simplify it first")
+            check_places(self._path, self._count, depth)
             target = self.at(child)
             match etree.QName(child).localname:
                 case "node":
@@ -120,7 +124,7 @@ class _Document:
     def _add(self, node: Any, instance: Any, geometry: Any, transform: FloatArray) -> None:
         missing = geometry is None or etree.QName(geometry).localname != "geometry"
         if missing or np.isnan(transform).any():
-            why = "is missing" if missing else "is left out: a <skew> or <lookat> there is not read; apply transforms"
+            why = "is missing" if missing else "is left out: a bad matrix, or a <skew> or <lookat> there is not read"
             self.warnings.append(f"{instance.get('url')!r:.80}, which a node of {self._path.name} places, {why}")
             return
         own = geometry.get("id", "")
@@ -140,9 +144,8 @@ class _Document:
                 try:
                     found.append(self._primitive(primitive))
                 except (ValueError, LookupError, TypeError, OverflowError) as error:
-                    self.warnings.append(
-                        f"faces of {name!r:.80} of {self._path.name} were left out: they are damaged ({error!s:.100})"
-                    )
+                    said = f"faces of {name!r:.80} of {self._path.name} were left out: they are damaged"
+                    self.warnings.append(f"{said} ({error!s:.100})")
         return found
 
     def _primitive(self, primitive: Any) -> _Primitive:
@@ -160,9 +163,8 @@ class _Document:
         if min(offsets) < 0:
             raise ValueError("an offset below zero")
         corners = _corners(primitive, points, offset, max(offsets) + 1)
-        return _Primitive(
-            primitive.get("material", ""), {name: (rows, corners[..., at]) for name, (rows, at) in arrays.items()}
-        )
+        used = {name: (rows, corners[..., at]) for name, (rows, at) in arrays.items()}
+        return _Primitive(primitive.get("material", ""), used)
 
     def _rows(self, source: Any) -> FloatArray:
         """The numbers of an array that its accessor uses, a row for each of its steps."""
@@ -176,11 +178,8 @@ class _Document:
             used = [at for at, param in enumerate(params) if param.get("name")] or list(range(len(params)))
             offset, stride = int(accessor.get("offset", 0)), int(accessor.get("stride", len(params)))
             count = int(accessor.get("count", (len(values) - offset) // max(stride, 1)))
-            if (
-                min(offset, count) < 0
-                or stride < len(params)
-                or offset + (count - 1) * stride + len(params) > len(values)
-            ):
+            end = offset + (count - 1) * stride + len(params)
+            if min(offset, count) < 0 or stride < len(params) or end > len(values):
                 raise ValueError(f"an accessor of {count} rows leads out of its array")
             self._sources[name] = values[offset + stride * np.arange(count)[:, None] + np.array(used)]
         return self._sources[name]
@@ -256,27 +255,28 @@ def _integers(text: str | None, width: int) -> IntArray:
 
 
 def _transform(node: Any) -> FloatArray:
-    """The product of all transforms of a node, in their order."""
+    """The product of all transforms of a node, in their order; NaN where one is not read."""
     matrix = np.eye(4)
-    for one in node.iterchildren("{*}matrix", "{*}translate", "{*}rotate", "{*}scale", "{*}skew", "{*}lookat"):
-        matrix = matrix @ _MOVES[etree.QName(one).localname](_numbers(one.text))
+    try:
+        for one in node.iterchildren(*(f"{{*}}{tag}" for tag in _MOVES)):
+            matrix = matrix @ _MOVES[etree.QName(one).localname](_numbers(one.text))
+    except (ValueError, LookupError):
+        return np.full((4, 4), np.nan)
     return matrix
 
 
 def _rotation(values: FloatArray) -> FloatArray:
-    *axis, angle = values.tolist()
-    if not any(axis):
-        return np.eye(4)
-    return np.asarray(trimesh.transformations.rotation_matrix(np.radians(angle), axis))
+    *axis, angle = values.reshape(4).tolist()
+    return np.asarray(trimesh.transformations.rotation_matrix(np.radians(angle), axis)) if any(axis) else np.eye(4)
 
 
 _MOVES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "matrix": lambda values: values.reshape(4, 4),
-    "translate": lambda values: np.asarray(trimesh.transformations.translation_matrix(values)),
+    "translate": lambda values: np.asarray(trimesh.transformations.translation_matrix(values.reshape(3))),
     "rotate": _rotation,
     "scale": lambda values: np.diag([*values.reshape(3), 1.0]),
-    "skew": lambda values: np.full((4, 4), np.nan) if values[0] else np.eye(4),
-    "lookat": lambda _: np.full((4, 4), np.nan),  # of cameras and lights; a mesh there is left out, with a warning
+    "skew": lambda values: {0.0: np.eye(4)}[values[0]],
+    "lookat": lambda _: np.full((4, 4), np.nan),  # of cameras and lights
 }
 
 
@@ -289,7 +289,6 @@ def read_collada(path: Path, content: bytes) -> Contents:
         The file is damaged, or would multiply to more than is reasonable.
     """
     content = _unpacked(path, content)
-    up, metres = collada(content[:COLLADA_HEAD])
     document = _Document(path, content)
     geometry = []
     for one in document.placed.values():
@@ -303,7 +302,8 @@ def read_collada(path: Path, content: bytes) -> Contents:
             geometry.append((one.node, Triangles(np.concatenate(vertices), np.concatenate(faces))))
     if not geometry and document.warnings:
         raise MeshFileError(f"{path} holds nothing that is read: {document.warnings[-1]}; export it again")
-    return Contents(geometry, list(dict.fromkeys(document.warnings)), up, metres, Asset(content, path, "dae"))
+    warnings, asset = list(dict.fromkeys(document.warnings)), Asset(content, path, "dae")
+    return Contents(geometry, warnings, *document.axis_and_unit, asset)
 
 
 def _unpacked(path: Path, content: bytes) -> bytes:

@@ -7,13 +7,15 @@ names, those that engines go by and `--keep-input` gives, tell them.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from rlacd.errors import MeshDataError
+from rlacd.errors import MeshDataError, MeshFileError
 from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
@@ -26,22 +28,17 @@ MOST_PLACES = 100_000
 """Nodes of a scene, and instances of its geometries; parsers take about a kilobyte for each."""
 
 LONGEST_NAME = 1000
-"""Instances of one part. Each gets a unique name by a counting suffix."""
+"""Characters of a node's name that are kept."""
 
 DEEPEST_PART = 20
 """Depth of nested instances: the cost of an instance grows with the cube of its depth."""
 
 
-def most_in_memory(given: int) -> int:
-    """Bytes of arrays that a file of this size may need: an index byte becomes eight, some are used repeatedly."""
-    return 2**29 + 16 * given
-
-
 class Triangles(NamedTuple):
-    """Triangles as a node places them; points if there are no faces."""
+    """Triangles without looks; points if there are no faces. To make a `trimesh.Trimesh` takes longer than a hull."""
 
     vertices: FloatArray
-    faces: IntArray
+    faces: npt.NDArray[Any]
 
 
 class Contents(NamedTuple):
@@ -72,6 +69,20 @@ def one_shape(name: str, vertices: FloatArray, faces: IntArray | None = None) ->
     return [(SourceNode(name, name, np.eye(4)), Triangles(vertices, faces))]
 
 
+def damaged(path: Path, kind: str, why: str = "") -> MeshFileError:
+    """The error for a file that its parser refuses, with what the parser says."""
+    said = f" ({why.splitlines()[0][:200]})" if why else ""
+    return MeshFileError(f"{path} cannot be read as {kind}: it is damaged or cut off{said}; export it again")
+
+
+def check_places(path: Path, count: int, depth: int) -> None:
+    """Refuse a file whose parts are placed too often, or inside each other too deeply, such as in themselves."""
+    if depth > DEEPEST_PART:
+        raise MeshFileError(f"{path} places parts inside parts more than {DEEPEST_PART} deep: export it again")
+    if count > MOST_PLACES:
+        raise MeshFileError(f"{path} has more than {MOST_PLACES} places for its parts: simplify it first")
+
+
 def require_few(shapes: Iterable[tuple[Any, Any]], name: str) -> None:
     """Refuse too many faces and points; points count at three for a triangle: it may be that no face uses them."""
     count = sum(max(len(faces), len(points) // 3) for faces, points in shapes)
@@ -91,7 +102,9 @@ def without_engine_hulls(mesh: InputMesh) -> InputMesh:
     A mesh of hulls and nothing else stays as it is: then they are what was meant.
     """
     names = {node.name for node in mesh.nodes}
-    hulls = np.array([_is_hull(node.name, names) for node in mesh.nodes], dtype=bool)
+    kept = [_KEPT.fullmatch(node.name) for node in mesh.nodes]
+    pairs = zip(mesh.nodes, kept, strict=True)
+    hulls = np.array([_ENGINE.fullmatch(n.name) or (k and k[1] in names) for n, k in pairs], dtype=bool)
     if mesh.node_of is None or not hulls.any() or hulls.all():
         return mesh
     gone = hulls[mesh.node_of]
@@ -109,10 +122,3 @@ def without_engine_hulls(mesh: InputMesh) -> InputMesh:
         node_of=(np.cumsum(~hulls) - 1)[mesh.node_of[~gone]],
         left_out=left_out,
     )
-
-
-def _is_hull(name: str, names: Collection[str]) -> bool:
-    if _ENGINE.fullmatch(name):
-        return True
-    kept = _KEPT.fullmatch(name)
-    return kept is not None and kept[1] in names

@@ -12,7 +12,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, answer_of, served
-from rlacd.io.read.contents import MOST_TRIANGLES
+from rlacd.io.read.contents import MOST_TRIANGLES, damaged
 from rlacd.io.read.gltf_arrays import ITEMS, Arrays, Json, as_floats
 from rlacd.pool import Blobs, Values
 
@@ -43,64 +43,58 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
         The extra ``draco`` is not installed.
     """
     streams: dict[str, bytes] = {}
-    asked: dict[str, tuple[int, bool, int]] = {}
-    users: list[tuple[Json, dict[str, str]]] = []
-    for primitive in primitives:
+    asked: dict[str, dict[str, tuple[int, bool, int]]] = {}
+    for at, primitive in enumerate(primitives):
         compressed = primitive.get("extensions", {}).get(DRACO)
         if compressed is None:
             continue
         accessors = {name: arrays.accessor(index) for name, index in primitive["attributes"].items()}
         if not required and "bufferView" in accessors["POSITION"]:
             continue  # the same triangles, not compressed
-        names: dict[str, str] = {}
-        for attribute, number in compressed["attributes"].items():
-            if attribute.startswith(("POSITION", "JOINTS_", "WEIGHTS_")):
-                of = accessors[attribute]
-                name = f"{compressed['bufferView']}.{number}.{of.get('normalized')}.{of['type']}"
-                names[attribute] = name
-                if name not in streams:
-                    asked[name] = int(number), bool(of.get("normalized")), ITEMS[of["type"]]
-                    view = arrays.view(compressed["bufferView"])
-                    arrays.need(len(view))
-                    streams[name] = bytes(view)
-        users.append((primitive, names))
+        asked[str(at)] = {
+            attribute: (int(number), bool(accessors[attribute].get("normalized")), ITEMS[accessors[attribute]["type"]])
+            for attribute, number in compressed["attributes"].items()
+            if attribute.startswith(("POSITION", "JOINTS_", "WEIGHTS_"))
+        }
+        view = arrays.view(compressed["bufferView"])
+        arrays.need(len(view))
+        streams[str(at)] = bytes(view)
     if not streams:
         return False
     blobs = answer_of(DECODER, path, "glTF", {"path": str(path), "asked": asked}, streams).blobs
-    added: dict[str, int] = {}
-    for name in streams:
-        added[f"{name}.points"] = arrays.add(np.frombuffer(blobs[f"{name}.points"], "<f4"))
-        added[f"{name}.corners"] = arrays.add(np.frombuffer(blobs[f"{name}.corners"], "<u4"))
-    for primitive, names in users:
-        primitive["attributes"] |= {attribute: added[f"{name}.points"] for attribute, name in names.items()}
-        primitive["indices"], primitive["mode"] = added[f"{names['POSITION']}.corners"], 4
+    for name, attributes in asked.items():
+        primitive = primitives[int(name)]
+        for attribute in attributes:
+            primitive["attributes"][attribute] = arrays.add(np.frombuffer(blobs[f"{name}.{attribute}"], "<f4"))
+        primitive["indices"], primitive["mode"] = arrays.add(np.frombuffer(blobs[f"{name}.corners"], "<u4")), 4
     return True
 
 
 @served
 def decode(values: Values, blobs: Blobs) -> Answered:
-    """Decode each stream: an attribute as ``NAME.points``, and ``NAME.corners``.
+    """Decode each stream: what is ``asked`` of it as ``NAME.ATTRIBUTE``, and ``NAME.corners``.
 
-    What is ``asked`` of a stream are the attribute, whether its integers are normalised, and its width.
+    What is asked of an attribute are its number, whether its integers are normalised, and its width.
     """
     import DracoPy
 
     arrays: dict[str, bytes] = {}
     for name, stream in blobs.items():
-        attribute, normalized, width = values["asked"][name]
         try:
             mesh = DracoPy.decode(stream)
-            points = np.asarray(mesh.get_attribute_by_unique_id(attribute)["data"])
             corners = np.asarray(mesh.faces).reshape(-1, 3)
+            found = {
+                attribute: np.asarray(mesh.get_attribute_by_unique_id(number)["data"])
+                for attribute, (number, _, _) in values["asked"][name].items()
+            }
         except Exception as error:
-            raise MeshFileError(
-                f"{values['path']} holds triangles that Draco cannot decode ({error!s:.100}): it is damaged; "
-                "export it again"
-            ) from error
-        if points.shape != (len(points), width) or (len(corners) and corners.max() >= len(points)):
-            raise MeshFileError(f"{values['path']} holds triangles without points: export it again")
+            raise damaged(Path(values["path"]), "Draco", str(error)) from error
         if len(corners) > MOST_TRIANGLES:
             raise MeshFileError(f"{values['path']} holds more than {MOST_TRIANGLES} triangles: simplify it first")
-        arrays[f"{name}.points"] = as_floats(points, normalized).astype("<f4").tobytes()
+        for attribute, (_, normalized, width) in values["asked"][name].items():
+            rows = found[attribute]
+            if rows.shape != (len(rows), width) or (len(corners) and corners.max() >= len(rows)):
+                raise MeshFileError(f"{values['path']} holds triangles without points: export it again")
+            arrays[f"{name}.{attribute}"] = as_floats(rows, normalized).astype("<f4").tobytes()
         arrays[f"{name}.corners"] = corners.astype("<u4").tobytes()
     return {}, arrays

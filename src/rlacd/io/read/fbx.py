@@ -10,7 +10,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, ToldNodes, read_apart, served
-from rlacd.io.read.contents import Contents, Triangles
+from rlacd.io.read.contents import Contents, Triangles, damaged
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Values
 
@@ -53,9 +53,7 @@ def read_scene(values: Values, blobs: Blobs) -> Answered:
     except MeshFileError:
         raise
     except Exception as error:  # of ufbx, or of a description that does not fit its arrays
-        raise MeshFileError(
-            f"{path} cannot be read as FBX: it is damaged or cut off ({error!s:.100}); export it again"
-        ) from error
+        raise damaged(path, "FBX", str(error)) from error
 
 
 def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
@@ -63,10 +61,8 @@ def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
     import ufbx
 
     # A file may also be left-handed, or point up along a negative axis, which no option can say.
-    given: dict[str, Any] = {
-        "file_format": ufbx.FileFormat.FBX,
-        "index_error_handling": ufbx.IndexErrorHandling.ABORT_LOADING,
-    }
+    strict = ufbx.IndexErrorHandling.ABORT_LOADING
+    given: dict[str, Any] = {"file_format": ufbx.FileFormat.FBX, "index_error_handling": strict}
     scene = ufbx.load_memory(content, **given)
     axes = np.array(scene.settings.axes)
     if not _is_plain(axes):

@@ -16,12 +16,11 @@ from rlacd.io.read.beside import FolderFiles
 from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
 from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
+from rlacd.io.read.open_file import JSON_CHUNK, MAGIC
 from rlacd.io.read.polygons import fan_triangles, strip_triangles
 from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.input_mesh import Asset, SourceNode
 from rlacd.solid.topology import IntArray
-
-MAGIC, JSON_CHUNK = b"glTF", b"JSON"
 
 INSTANCES = "EXT_mesh_gpu_instancing"
 
@@ -30,9 +29,6 @@ READ = re.compile(
     rf"|EXT_(mesh_features|instance_features|structural_metadata)|VRM\w*|{INSTANCES}"
 )
 """Extensions that leave the triangles as they are, or that are read."""
-
-ENCODED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-"""Extensions that encode the triangles and are not read: without the decoder, the file holds zeros in their place."""
 
 POINTS, LINES, SURFACES = (0,), (1, 2, 3), (TRIANGLES := 4, STRIP := 5, FAN := 6)
 """Modes of primitives."""
@@ -64,7 +60,7 @@ def read_gltf(path: Path, content: bytes) -> Contents:
     arrays = Arrays(header, rest, len(content), FolderFiles(path.parent).get)
     required = DRACO in header.get("extensionsRequired", [])
     if not decode_draco(path, primitives, required, arrays) and required:
-        raise _hidden(path, DRACO)
+        raise _unread(path, DRACO)
     with np.errstate(all="ignore"):  # what is not finite is left out, with a warning
         geometry, warnings = _Scene(header, arrays).read()
     return Contents(geometry, warnings, "y", 1.0, Asset(content, path, "gltf"))
@@ -94,10 +90,8 @@ def split(content: bytes) -> tuple[Json, bytes | None]:
 def _checked(path: Path, header: Json) -> list[Json]:
     """Refuse extensions that are not read, and more than is reasonable; returns all primitives."""
     for name in header.get("extensionsRequired", []):
-        if name in ENCODED:
-            raise _hidden(path, name)
         if READ.fullmatch(str(name)) is None:
-            raise MeshFileError(f"{path} requires the extension {name!r:.60}, which is not read: export it without it")
+            raise _unread(path, name)
     nodes = header.get("nodes", [])
     primitives = [primitive for mesh in header.get("meshes", []) for primitive in mesh["primitives"]]
     edges = sum(len(node.get("children", [])) for node in nodes)
@@ -109,11 +103,9 @@ def _checked(path: Path, header: Json) -> list[Json]:
     return primitives
 
 
-def _hidden(path: Path, extension: str) -> MeshFileError:
-    return MeshFileError(
-        f"{path} hides its triangles by {extension}, which is not read: export it again without that compression, "
-        "or run  npx @gltf-transform/cli copy IN.glb OUT.glb"
-    )
+def _unread(path: Path, extension: str) -> MeshFileError:
+    how = "export it without, or, if that compresses it, run  npx @gltf-transform/cli copy IN.glb OUT.glb"
+    return MeshFileError(f"{path} requires the extension {extension!r:.60}, which is not read: {how}")
 
 
 class _Scene:
@@ -251,16 +243,14 @@ class _Scene:
     def _repeated(self, shape: Triangles, attributes: Json) -> Triangles:
         """All instances of a shape within its node."""
         kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+        floats = self._arrays.floats
         (count,) = {self._arrays.accessor(index)["count"] for index in attributes.values()}
         self._instances += count
         if self._instances > MOST_PLACES:
             raise ValueError(f"{self._instances} instances, more than {MOST_PLACES}")
         self._arrays.need(count * (shape.vertices.nbytes + shape.faces.nbytes))
-        given = [
-            self._arrays.floats(attributes[name], kind) if name in attributes else np.array([at])
-            for (name, kind), at in zip(kinds.items(), UNMOVED, strict=True)
-        ]
-        moves = _placements(*given)
+        given = {name: floats(attributes[name], kind) for name, kind in kinds.items() if name in attributes}
+        moves = _placements(*(given.get(name, np.array([at])) for name, at in zip(kinds, UNMOVED, strict=True)))
         vertices, faces = [shape.vertices[:0]], [shape.faces[:0]]
         for number, move in enumerate(np.broadcast_to(moves, (count, 4, 4))):
             vertices.append(heights(shape.vertices, move[:3, :3]) + move[:3, 3])

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.io.read.contents import MOST_PLACES, most_in_memory
+from rlacd.io.read.contents import MOST_PLACES
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
@@ -55,7 +55,11 @@ class Arrays:
         self._accessors: list[Json] = list(header.get("accessors", []))
         self._content: dict[int, bytes] = {}
         self._added: dict[int, npt.NDArray[Any]] = {}
-        self._most = most_in_memory(given + self._bytes_beside())
+        if len(self._buffers) > MOST_PLACES:
+            raise ValueError(f"{len(self._buffers)} buffers, more than {MOST_PLACES}")
+        uris = {buffer.get("uri", "data:") for buffer in self._buffers}
+        given += sum(len(beside(uri)) for uri in sorted(uris) if not uri.startswith("data:"))
+        self._most = 2**29 + 16 * given  # bytes: an index of one becomes eight, and some are used repeatedly
 
     def need(self, count: int) -> None:
         """Refuse a file once what is made of its arrays adds up to too many bytes."""
@@ -126,13 +130,6 @@ class Arrays:
         if stride < row or (shape[0] and start + (shape[0] - 1) * stride + row > len(view)):
             raise ValueError(f"it declares {shape[0]} rows but has no room for them")
         return np.ndarray(shape, dtype, view, start, (stride, dtype.itemsize))
-
-    def _bytes_beside(self) -> int:
-        """Count the bytes of the files that the buffers name."""
-        if len(self._buffers) > MOST_PLACES:
-            raise ValueError(f"{len(self._buffers)} buffers, more than {MOST_PLACES}")
-        uris = {buffer.get("uri", "data:") for buffer in self._buffers}
-        return sum(len(self._beside(uri)) for uri in sorted(uris) if not uri.startswith("data:"))
 
     def _buffer(self, index: int) -> bytes:
         if index not in self._content:

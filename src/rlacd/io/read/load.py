@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import Contents, one_shape, require_few, without_engine_hulls
+from rlacd.io.read.contents import Contents, damaged, one_shape, require_few, without_engine_hulls
 from rlacd.io.read.open_file import CONVERTERS, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import FloatArray, heights
@@ -27,7 +27,7 @@ from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
-_READERS = {
+READERS = {
     "obj": "read.obj:read_obj",
     "msh": "read.simple_formats:read_msh",
     "stl": "read.simple_formats:read_stl",
@@ -43,7 +43,7 @@ _READERS = {
 }
 """By extension, the function that reads it."""
 
-FORMATS = tuple(_READERS)
+FORMATS = tuple(READERS)
 """The formats that are read."""
 
 
@@ -86,27 +86,24 @@ def load_mesh(source: Source) -> InputMesh:
         return without_engine_hulls(_baked(kind, Contents(geometry_of(source, kind), asset=asset)))
     if isinstance(source, tuple) and len(source) == 2:
         return replace(_baked("arrays", Contents(one_shape("arrays", *arrays_of(*source)))), nodes=(), node_of=None)
-    raise MeshDataError(
-        f"cannot take a mesh from {type(source).__name__}: give a path, a trimesh object, or a tuple (vertices, faces)"
-    )
+    raise MeshDataError(f"cannot take a mesh from {type(source).__name__}: give a path, trimesh, or (vertices, faces)")
 
 
 def _read(path: Path) -> Contents:
     """Parse a file; raises MeshFileError with the most likely reason."""
-    content, extension = _opened(path), path.suffix.lower().lstrip(".")
-    holds = format_of(content)
+    content = read_named(path)  # here, not by name in a parser: a name like a URL must not be fetched
+    if not content.strip(b"\0 \t\r\n"):
+        raise MeshFileError(f"{path} is empty: export the mesh again")
+    holds, extension = format_of(content), path.suffix.lower().lstrip(".")
     if extension == "usdz" and holds == "3mf":  # both are archives
         holds = extension
-    renamed = (
-        f"rename it to .{holds}" if holds and holds != {"vrm": "glb", "stp": "step"}.get(extension, extension) else None
-    )
-    if extension not in _READERS:
-        hint = CONVERTERS.get(extension) or (f"{renamed}, which it seems to hold" if renamed else "")
-        raise MeshFileError(
-            f"{path} is in a format that rlacd does not read: {hint or 'convert it to glb, obj, stl or ply'}"
-        )
+    as_named = holds in (None, {"vrm": "glb", "stp": "step"}.get(extension, extension))
+    renamed = None if as_named else f"rename it to .{holds}"
+    if extension not in READERS:
+        hint = f"{renamed}, which it seems to hold" if renamed else "convert it to glb, obj, stl or ply"
+        raise MeshFileError(f"{path} is in a format that rlacd does not read: {CONVERTERS.get(extension, hint)}")
     try:
-        contents: Contents = function_of(_READERS[extension])(path, content)
+        contents: Contents = function_of(READERS[extension])(path, content)
     except Exception as error:  # parsers may raise anything on damaged files
         if renamed:
             raise MeshFileError(f"{path} is not {extension} but {holds}: {renamed}") from error
@@ -115,21 +112,10 @@ def _read(path: Path) -> Contents:
         if isinstance(error, MemoryError):
             raise MeshFileError(f"{path} takes more memory than there is: simplify the mesh first") from error
         # A missing module means that the parser tried an encoding no mesh has: that says nothing about the file.
-        said = "" if isinstance(error, ImportError) or not str(error) else f" ({str(error).splitlines()[0][:200]})"
-        raise MeshFileError(
-            f"{path} cannot be read as {extension}: it is damaged or cut off{said}; export it again"
-        ) from error
+        raise damaged(path, extension, "" if isinstance(error, ImportError) else str(error)) from error
     if renamed and not any(len(shape.vertices) for _, shape in contents.geometry):
         raise MeshFileError(f"{path} is not {extension} but {holds}: {renamed}")
     return contents
-
-
-def _opened(path: Path) -> bytes:
-    """The content of a file, which is opened here, not by name in a parser: a name like a URL must not be fetched."""
-    content = read_named(path)
-    if not content.strip(b"\0 \t\r\n"):
-        raise MeshFileError(f"{path} is empty: export the mesh again")
-    return content
 
 
 def _baked(name: str, contents: Contents) -> InputMesh:
@@ -141,9 +127,7 @@ def _baked(name: str, contents: Contents) -> InputMesh:
     for node, (v, f) in contents.geometry:
         if len(f) and (f.min() < 0 or f.max() >= len(v)):
             wrong = int(f[(f < 0) | (f >= len(v))][0])
-            raise MeshDataError(
-                f"a face uses vertex {wrong} but there are {len(v)} (counted from 0): the file is damaged"
-            )
+            raise MeshDataError(f"a face uses vertex {wrong} of {len(v)}, counted from 0: the file is damaged")
         if solid and not len(f):
             continue
         if not np.array_equal(node.transform, np.eye(4)):
@@ -169,10 +153,8 @@ def _finite(name: str, vertices: FloatArray, faces: IntArray, node_of: IntArray 
         usable = finite[faces].all(axis=1)
         if len(faces) and not usable.any():
             raise MeshDataError(f"every face of {name} uses a vertex that is NaN or infinite: export the mesh again")
-        warnings.append(
-            f"{int((~finite).sum())} vertices are NaN or infinite: they and the {int((~usable).sum())} faces that use "
-            "them were left out"
-        )
+        bad, unusable = np.count_nonzero(~finite), np.count_nonzero(~usable)
+        warnings = [f"{bad} vertices are NaN or infinite: they and the {unusable} faces that use them were left out"]
         faces = (np.cumsum(finite) - 1)[faces[usable]]
         node_of = None if node_of is None else node_of[usable]
         vertices = vertices[finite]

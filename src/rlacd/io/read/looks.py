@@ -20,7 +20,7 @@ from rlacd.io.read.beside import FolderFiles
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
-_READERS = {
+_WITH_LOOKS = {
     "obj": "read.obj:scene_of_obj",
     "ply": "read.ply:scene_of_ply",
     "dae": "read.collada:scene_of_collada",
@@ -45,7 +45,7 @@ def looks_of(path: Path, content: bytes, extension: str) -> Any:
         ``obj``, ``ply``, ``dae`` or ``3mf``.
     """
     try:
-        return function_of(_READERS[extension])(path, content)
+        return function_of(_WITH_LOOKS[extension])(path, content)
     except Exception:  # parsers may raise anything on damaged files; the triangles have been read without looks
         warnings.warn(f"the looks of {path.name} could not be read, so it is grey", UserWarning, stacklevel=3)
         return None
@@ -85,7 +85,7 @@ def opened_picture(beside: FolderFiles, name: str) -> Any:
         picture.load()  # now, when one that cannot be decoded may still be left out
         return picture
     except Exception as error:  # decoders may raise anything
-        reasons = {ImportError: "run  pip install 'rlacd[view]'", FileNotFoundError: "it is not in the folder"}
-        why = next((said for kind, said in reasons.items() if isinstance(error, kind)), "it is damaged or too large")
+        why = "it is not in the folder" if isinstance(error, FileNotFoundError) else "it is damaged or too large"
+        why = "run  pip install 'rlacd[view]'" if isinstance(error, ImportError) else why
         warnings.warn(f"the picture {name!r:.100} was left out: {why}", UserWarning, stacklevel=2)
         return None

@@ -84,7 +84,10 @@ OFF_KEYWORD = re.compile(rb"((?:ST|[CN4n])*)OFF(?![A-Za-z])|off(?![A-Za-z])")
 _OBJ_WORDS = {b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"g", b"o", b"s", b"mtllib", b"usemtl"}
 
 
-_MARKS = {b"glTF": "glb", b"Kaydara FBX Binary": "fbx", b"ISO-10303-21;": "step", b"ply\n": "ply", b"ply\r": "ply"}
+MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
+"""How a binary glTF file begins, and what its chunks are called."""
+
+_MARKS = {MAGIC: "glb", b"Kaydara FBX Binary": "fbx", b"ISO-10303-21;": "step", b"ply\n": "ply", b"ply\r": "ply"}
 
 
 def format_of(content: bytes) -> str | None:

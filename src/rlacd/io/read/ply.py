@@ -69,9 +69,8 @@ def _rows(body: bytes, at: int, element: _Element) -> tuple[IntArray, dict[str, 
     _, lists = _walked(body, at, element, min(element.count, 1))
     fields: list[Any] = []
     for name, (kind, length) in element.properties.items():
-        fields += (
-            [(name, kind)] if length is None else [(_LENGTH + name, length), (name, kind, sum(map(len, lists[name])))]
-        )
+        fields += [] if length is None else [(_LENGTH + name, length)]
+        fields += [(name, kind)] if length is None else [(name, kind, sum(map(len, lists[name])))]
     record = np.dtype(fields)
     begins = at + record.itemsize * np.arange(element.count + 1)
     if element.count and begins[-1] <= len(body):

@@ -100,16 +100,12 @@ def read_off(path: Path, content: bytes) -> Contents:
     content = plain_text(content)
     keyword = OFF_KEYWORD.match(content)
     if keyword is not None and _BINARY.match(content, keyword.end()):
-        raise MeshFileError(
-            f"{path} is a binary OFF file, which rlacd does not read: save it as text, or as ply or obj"
-        )
+        raise MeshFileError(f"{path} is a binary OFF file, which is not read: save it as text, or as ply or obj")
     check_text(path, content)
     lines = [line for line in (raw.split(b"#", 1)[0].strip() for raw in content.splitlines()) if line]
     if lines and (keyword := OFF_KEYWORD.match(lines[0])) is not None:
         if set(keyword[1] or b"") & set(b"n4"):
-            raise MeshFileError(
-                f"{path} is nOFF or 4OFF, for any number of dimensions, which is not read: save it as OFF"
-            )
+            raise MeshFileError(f"{path} is nOFF or 4OFF, for any number of dimensions: save it as OFF")
         rest = lines[0][keyword.end() :].strip()
         lines[:1] = [rest] if rest else []
     header = lines[0].split() if lines else []

@@ -14,14 +14,15 @@ import trimesh
 from lxml import etree
 
 from rlacd.errors import MeshFileError
-from rlacd.io.read.contents import DEEPEST_PART, LONGEST_NAME, MOST_PLACES, Contents, Triangles
-from rlacd.io.read.conventions import METRES
+from rlacd.io.read.contents import LONGEST_NAME, Contents, Triangles, check_places
 from rlacd.io.read.xml import PARSER, check_prologue, open_archive, parse_xml
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import Asset, SourceNode
 
 Color = tuple[float, float, float, float]
 """Red, green, blue in linear light, and opacity."""
+
+METRES = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "meter": 1.0, "inch": 0.0254, "foot": 0.3048}
 
 _HEX = re.compile(r"#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?$")
 
@@ -54,7 +55,7 @@ class _Archive:
         self.unit = ""
         self.placed: dict[str, tuple[SourceNode, _Object]] = {}
         self._objects_of(self._main())
-        self._place(self._build, np.eye(4), [])
+        self._place(self._build, np.eye(4))
 
     def _main(self) -> str:
         """The model that the relationships of the archive name, or the one of the usual name."""
@@ -88,21 +89,15 @@ class _Archive:
                         groups[element.get("id", "")] = [_color(one) for one in element.iter("{*}base", "{*}color")]
         return self._models[model]
 
-    def _place(self, items: Sequence[_Item], transform: FloatArray, around: list[tuple[str, str]]) -> None:
-        if len(around) > DEEPEST_PART:
-            raise MeshFileError(f"{self._path} places parts in parts more than {DEEPEST_PART} deep: export it again")
+    def _place(self, items: Sequence[_Item], transform: FloatArray, depth: int = 0) -> None:
         for item in items:
-            where = (item.model, item.number)
-            if where in around:
-                raise MeshFileError(f"{self._path} places the part {item.number!r:.80} inside itself: export it again")
-            if len(self.placed) > MOST_PLACES:
-                raise MeshFileError(f"{self._path} has more than {MOST_PLACES} places for its parts: simplify it first")
+            check_places(self._path, len(self.placed), depth)
             thing = self._objects_of(item.model)[item.number]
             here = transform @ item.transform
             key = trimesh.util.unique_name(thing.name, self.placed, self._keys)
             if len(thing.shape.vertices) or not thing.parts:
                 self.placed[key] = SourceNode(thing.name, key, here), thing
-            self._place(thing.parts, here, [*around, where])
+            self._place(thing.parts, here, depth + 1)
 
 
 def read_3mf(path: Path, content: bytes) -> Contents:
@@ -130,12 +125,9 @@ def scene_of_3mf(path: Path, content: bytes) -> trimesh.Scene:
         shared[id(thing)] = key
         mesh = trimesh.Trimesh(*thing.shape, process=False)
         if thing.color is not None:
-            material = trimesh.visual.material.PBRMaterial(
-                baseColorFactor=np.array(thing.color),
-                metallicFactor=0.0,
-                roughnessFactor=0.5,
-                alphaMode="OPAQUE" if thing.color[3] == 1.0 else "BLEND",
-            )
+            how: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.5}
+            how["alphaMode"] = "OPAQUE" if thing.color[3] == 1.0 else "BLEND"
+            material = trimesh.visual.material.PBRMaterial(baseColorFactor=np.array(thing.color), **how)
             mesh.visual = trimesh.visual.TextureVisuals(material=material)
         scene.add_geometry(mesh, node_name=key, geom_name=key, transform=node.transform)
     return scene
@@ -170,10 +162,6 @@ def _color(element: Any) -> Color | None:
     match = _HEX.match(element.get("displaycolor", element.get("color", "")))
     if match is None:
         return None
-    red, green, blue = (_linear(int(match[1][at : at + 2], 16) / 255) for at in (0, 2, 4))
+    srgb = [int(match[1][at : at + 2], 16) / 255 for at in (0, 2, 4)]
+    red, green, blue = (value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in srgb)
     return red, green, blue, int(match[2] or "ff", 16) / 255
-
-
-def _linear(value: float) -> float:
-    """A channel of sRGB as light."""
-    return float(value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4)

@@ -40,9 +40,7 @@ def _instances(source: Any, name: str) -> Iterator[tuple[SourceNode, Any]]:
         try:
             transform, shape = source.graph[node]
         except ValueError as error:
-            raise MeshDataError(
-                f"the node {node!r:.80} of {name} has no place in its scene: export the scene again"
-            ) from error
+            raise MeshDataError(f"the node {node!r:.80} of {name} has no place: export the scene again") from error
         yield SourceNode(str(node), node, np.asarray(transform, dtype=np.float64)), source.geometry[shape]
 
 

@@ -15,7 +15,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, ToldNodes, served
-from rlacd.io.read.contents import Triangles
+from rlacd.io.read.contents import Triangles, damaged
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Values
@@ -48,9 +48,7 @@ def read_stage(values: Values, blobs: Blobs) -> Answered:
     nodes = ToldNodes(path)
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
         if prim.IsA(UsdGeom.PointInstancer):
-            raise MeshFileError(
-                f"{path} has a point instancer, which rlacd does not read: convert its instances to meshes first"
-            )
+            raise MeshFileError(f"{path} has a point instancer, which is not read: convert its instances to meshes")
         if not _is_rendered(prim):
             continue
         if not prim.IsA(UsdGeom.Mesh) and str(prim.GetTypeName()) not in PRIMITIVES:
@@ -90,7 +88,7 @@ def check_files(path: Path) -> None:
     while waiting:
         layer = Sdf.Layer.FindOrOpen(waiting.pop())
         if layer is None:
-            raise MeshFileError(f"{path} cannot be read as USD: it is damaged or cut off; export it again")
+            raise damaged(path, "USD")
         for named in filter(None, layer.GetCompositionAssetDependencies()):  # a file may refer to its own prims
             found = layer.ComputeAbsolutePath(named)
             if found in known:
@@ -121,20 +119,15 @@ def prim_geometry(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, An
 def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
     """The points and triangles of a mesh, in its own coordinates."""
     mesh = UsdGeom.Mesh(prim)
-    points, counts, corners = (
-        np.asarray(_value(attribute) or (), dtype=kind)
-        for attribute, kind in (
-            (mesh.GetPointsAttr(), np.float64),
-            (mesh.GetFaceVertexCountsAttr(), np.int64),
-            (mesh.GetFaceVertexIndicesAttr(), np.int64),
-        )
-    )
+    points = np.asarray(_value(mesh.GetPointsAttr()) or (), dtype=np.float64)
+    counts = np.asarray(_value(mesh.GetFaceVertexCountsAttr()) or (), dtype=np.int64)
+    corners = np.asarray(_value(mesh.GetFaceVertexIndicesAttr()) or (), dtype=np.int64)
     if (counts < 0).any() or counts.sum() != len(corners):
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} that are inconsistent: export it again")
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} that refer to missing points: export it again")
-    positions = np.asarray(points.reshape(-1, 3), dtype=np.float64)
-    faces = triangles_of(positions, np.asarray(counts, dtype=np.int64), np.asarray(corners, dtype=np.int64))
+    positions = points.reshape(-1, 3)
+    faces = triangles_of(positions, counts, corners)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         faces = faces[:, ::-1]
     return positions, faces

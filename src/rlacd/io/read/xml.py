@@ -20,9 +20,6 @@ from rlacd.errors import MeshFileError
 PARSER: dict[str, Any] = {"resolve_entities": False, "no_network": True, "load_dtd": False}
 """Parser options for lxml."""
 
-PIECE = 1 << 16
-"""Bytes that are looked at at a time, up to the first element."""
-
 MOST_MEMBERS = 10_000
 """Files in an archive."""
 
@@ -46,20 +43,22 @@ def check_prologue(path: Path, data: bytes) -> None:
     """
     parser = expat.ParserCreate()
 
-    def refuse(*_: object) -> None:
-        raise MeshFileError(
-            f"{path} has a document type (<!DOCTYPE>), which is not allowed, as it can refer to anything: remove it"
-        )
-
     def reached(*_: object) -> None:
         raise _RootReached
 
-    parser.StartDoctypeDeclHandler = refuse
+    refuse_doctype(parser, path)
     parser.StartElementHandler = reached
     with contextlib.suppress(_RootReached):
-        for at in range(0, len(data), PIECE):
-            parser.Parse(data[at : at + PIECE], False)
-        parser.Parse(b"", True)
+        parser.Parse(data, True)
+
+
+def refuse_doctype(parser: expat.XMLParserType, path: Path) -> None:
+    """Let a parser raise MeshFileError at a document type."""
+
+    def refuse(*_: object) -> None:
+        raise MeshFileError(f"{path} has a document type (<!DOCTYPE>), which can refer to anything: remove it")
+
+    parser.StartDoctypeDeclHandler = refuse
 
 
 def parse_xml(path: Path, data: bytes) -> Any:
@@ -77,10 +76,7 @@ def open_archive(path: Path, content: bytes) -> zipfile.ZipFile:
     # XML of meshes compresses to a tenth, rarely to a thirtieth.
     unpacked, most = sum(member.file_size for member in members), min(2**24 + 50 * len(content), 2**30)
     if unpacked > most:
-        raise MeshFileError(
-            f"{path} unpacks to {unpacked} bytes, more than the {most} that an archive of its length may hold: "
-            "convert it to glb, obj, stl or ply"
-        )
+        raise MeshFileError(f"{path} unpacks to {unpacked} bytes, more than the {most} allowed: convert it to glb")
     if any(member.compress_type not in PLAIN for member in members):
         raise MeshFileError(f"{path} is compressed in a way that its format does not allow: export it again")
     return archive

@@ -23,10 +23,9 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.plan import HullFiles, MeshUse, Plan
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import Edit, Element, expand
-from rlacd.io.robots.urdf import read_scale
+from rlacd.io.robots.urdf import HullFiles, MeshUse, Plan, read_scale
 
 SHOWN, HIDDEN = ("0", "1", "2"), "3"
 """Groups that MuJoCo shows by default, and one that it does not."""
@@ -193,19 +192,18 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
     root = compiler.root
     defaults = Defaults.of(root)
     assets = {_mesh_name(mesh, defaults): mesh for section in root.named("asset") for mesh in section.named("mesh")}
-    warnings = [
-        f"What <{kind}> brings in is left unchanged: rewrite that file too."
-        for kind in ("model", "attach")
-        if any(element.tag == kind for element in root.walk())
-    ]
-    geoms: list[_Geom] = []
-    for body in (element for element in root.walk() if element.tag in BODIES):
-        found = _colliding(body, defaults, compiler)
-        geoms += [geom for geom in found if _is_file(assets, geom, defaults, warnings)]
-    meshes = [
-        _Mesh(name, assets[name], full := defaults.full(assets[name]), _use(assets[name], full, references, compiler))
-        for name in dict.fromkeys(geom.mesh for geom in geoms)
-    ]
+    warnings: list[str] = []
+    geoms = [geom for body in root.walk() if body.tag in BODIES for geom in _colliding(body, defaults, compiler)]
+    meshes = []
+    for name in dict.fromkeys(geom.mesh for geom in geoms):
+        full = defaults.full(assets[name]) if name in assets else {}
+        if "file" in full:
+            meshes.append(_Mesh(name, assets[name], full, _use(assets[name], full, references, compiler)))
+        else:
+            why = "has no file of its own" if name in assets else "is not in the file"
+            warnings.append(f"The mesh {name} is left unchanged: it {why}.")
+    replaced = {mesh.name for mesh in meshes}
+    geoms = [geom for geom in geoms if geom.mesh in replaced]
     warnings += _caveats(root, geoms)
     rewritten = {mesh.asset for mesh in meshes}
     files = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
@@ -218,29 +216,19 @@ def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, 
         for mesh in meshes:
             names[mesh.name] = [_unused(f"{mesh.name}_{i:03d}", own) for i in range(len(hulls[mesh.use]))]
             edits.append(_hull_assets(mesh, named, zip(names[mesh.name], hulls[mesh.use], strict=True)))
-            moved = compiler.relocated(mesh.asset)
-            values = {} if moved is None else {"file": moved}
+            values = {"file": moved} if (moved := compiler.relocated(mesh.asset)) is not None else {}
             if mesh.use in copies:
                 values["file"] = named(mesh.full["file"], copies[mesh.use])
             if _lacks_volume(sources[mesh.use], mesh.full.get("inertia", "legacy")):
                 values["inertia"] = "shell"
-                warnings.append(_as_shell(mesh, geoms))
-            edits += [_with(mesh.asset, values)] if values else []
+                weighed = any(g.mesh == mesh.name and g.is_weighed and "mass" not in g.attributes for g in geoms)
+                said = " Its mass is its area times the density." if weighed else ""
+                warnings.append(f'{mesh.use.path.name} has no volume, so its mesh got inertia="shell".{said}')
+            edits += [mesh.asset.replaced(mesh.asset.with_attributes(values))] if values else []
         edits += [_geom_edit(geom, names[geom.mesh], taken) for geom in geoms]
         return edits + _relocations(compiler, edits, rewritten)
 
     return Plan(list(dict.fromkeys(mesh.use for mesh in meshes)), edit, relative, warnings)
-
-
-def _with(element: Element, values: Mapping[str, str]) -> Edit:
-    """The edit that sets attributes of an element."""
-    return Edit(element.file, element.start, element.end, element.with_attributes(values))
-
-
-def _as_shell(mesh: _Mesh, geoms: Sequence[_Geom]) -> str:
-    weighed = any(geom.mesh == mesh.name and geom.is_weighed and "mass" not in geom.attributes for geom in geoms)
-    density = " Its mass is its area times the density." if weighed else ""
-    return f'{mesh.use.path.name} has no volume, so its mesh got inertia="shell".{density}'
 
 
 def _hull_assets(mesh: _Mesh, named: Callable[[str, str], str], hulls: Iterable[tuple[str, str]]) -> Edit:
@@ -258,18 +246,17 @@ def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) 
     for element in reversed(includes):  # what an inner file changes, the outer ones hold
         if element.included is not None and id(element.included.file) in changed:
             changed.add(id(element.file))
-    moved = []
-    for element in compiler.root.named("compiler"):
-        if compiler.strips and "strippath" in element.attributes:
-            moved.append(_with(element, {"strippath": "false"}))
+    moved = {
+        element: {"strippath": "false"}
+        for element in compiler.root.named("compiler")
+        if compiler.strips and "strippath" in element.attributes
+    }
     for element in compiler.root.walk():
         if element.tag in FILES and (compiler.strips or id(element.file) in changed) and element not in done:
-            if element.included is not None and id(element.included.file) in changed:
-                continue
-            name = compiler.relocated(element)
-            if name is not None:
-                moved.append(_with(element, {"file": name}))
-    return moved
+            written = element.included is not None and id(element.included.file) in changed
+            if not written and (name := compiler.relocated(element)) is not None:
+                moved[element] = {"file": name}
+    return [element.replaced(element.with_attributes(values)) for element, values in moved.items()]
 
 
 def _geom_edit(geom: _Geom, meshes: list[str], taken: set[str]) -> Edit:
@@ -292,7 +279,7 @@ def _geom_edit(geom: _Geom, meshes: list[str], taken: set[str]) -> Edit:
         if "fluidshape" in geom.attributes and geom.is_kept:
             values["fluidshape"] = "none"
         pieces.append(element.with_attributes(values))
-    return Edit(element.file, element.start, element.end, element.indent.join(pieces))
+    return element.replaced(element.indent.join(pieces))
 
 
 def _numbers(geom: Element, attributes: Mapping[str, str], name: str, default: str) -> list[float]:
@@ -302,9 +289,7 @@ def _numbers(geom: Element, attributes: Mapping[str, str], name: str, default: s
         return [float(word) for word in text.split()] or [float(text)]
     except ValueError as error:
         where = geom.attributes.get("name", "without a name")
-        raise MeshFileError(
-            f"the {name} of the geom {where} is {text!r}, which is not a number: correct it."
-        ) from error
+        raise MeshFileError(f"the {name} of the geom {where} is {text!r}, which is no number: correct it.") from error
 
 
 def _lacks_volume(mesh: trimesh.Trimesh, inertia: str) -> bool:
@@ -351,17 +336,6 @@ def _collides(attributes: Mapping[str, str]) -> bool:
     return any(attributes.get(name, "1").strip() != "0" for name in ("contype", "conaffinity"))
 
 
-def _is_file(assets: Mapping[str, Element], geom: _Geom, defaults: Defaults, warnings: list[str]) -> bool:
-    asset = assets.get(geom.mesh)
-    if asset is not None and "file" in defaults.full(asset):
-        return True
-    why = "is not in the file" if asset is None else "has no file of its own"
-    sentence = f"The mesh {geom.mesh} is left unchanged: it {why}."
-    if sentence not in warnings:
-        warnings.append(sentence)
-    return False
-
-
 def _use(asset: Element, full: Mapping[str, str], references: References, compiler: Compiler) -> MeshUse:
     where = f"mesh {full.get('name', full['file'])} of {asset.file.path}"
     folder = compiler.root.file.folder / compiler.mesh_folder
@@ -374,6 +348,9 @@ def _mesh_name(mesh: Element, defaults: Defaults) -> str:
 
 
 def _caveats(root: Element, geoms: list[_Geom]) -> Iterator[str]:
+    for tag in ("model", "attach"):
+        if any(element.tag == tag for element in root.walk()):
+            yield f"What <{tag}> brings in is left unchanged: rewrite that file too."
     names = {geom.element.attributes.get("name") for geom in geoms} - {None}
     for element in root.walk():
         for attribute, kind in NAMED_BY.items():

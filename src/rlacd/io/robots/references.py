@@ -62,23 +62,18 @@ class References:
             There is no such file or package, or it lies outside what the description may refer to.
         """
         package = self.package_of(reference)
-        parts = urlsplit(reference) if "://" in reference else None
-        if package is not None and parts is not None:
-            base, rest = package, unquote(parts.path).lstrip("/")
-        elif parts is not None and parts.scheme == "file":
-            base, rest = folder, unquote(parts.netloc + parts.path)
-        elif parts is not None:
-            raise MeshFileError(f"{self._robot} refers to {reference}, which is not on this disk: download it first.")
-        else:
-            base, rest = folder, reference.replace("\\", "/")
+        base, rest = package or folder, reference.replace("\\", "/")
+        if "://" in reference:
+            parts = urlsplit(reference)
+            rest = unquote(parts.path).lstrip("/") if package else unquote(parts.netloc + parts.path)
+            if package is None and parts.scheme != "file":
+                raise MeshFileError(f"{self._robot} refers to {reference}, which is not on this disk: download it.")
         if "\0" in rest:
             raise MeshFileError(f"{self._robot} refers to {reference!r}, which is not a file name.")
         place = Path(os.path.abspath(base / rest))
         if not any(place.is_relative_to(allowed) for allowed in ([package] if package else self._allowed)):
-            raise MeshFileError(
-                f"{self._robot} refers to {reference}, outside of {package or self.root}: "
-                "give --package-dir with a folder that holds it if you trust the file."
-            )
+            said = f"{self._robot} refers to {reference}, outside of {package or self.root}"
+            raise MeshFileError(f"{said}: give --package-dir with a folder that holds it if you trust the file.")
         if not place.is_file():
             raise MeshFileError(f"{self._robot} refers to {reference}, but {place} does not exist.")
         return place
@@ -95,18 +90,14 @@ class References:
             return None
         name = reference.split("://", 1)[1].split("/", 1)[0]
         if not name:
-            raise MeshFileError(
-                f"{self._robot} refers to {reference}, which names no package: package://NAME/FILE does."
-            )
+            raise MeshFileError(f"{self._robot} refers to {reference}, which names no package.")
         if name in self._named:
             return self._named[name]
         if name.strip(". ") and not set(name) & {"\\", "\0"}:
             for folder in self._candidates(name):
                 if folder.is_dir():
                     return folder
-        raise MeshFileError(
-            f"{self._robot} refers to the package {name}, which was not found: give --package-dir {name}=FOLDER."
-        )
+        raise MeshFileError(f"{self._robot} needs the package {name}, not found: give --package-dir {name}=FOLDER.")
 
     def _candidates(self, name: str) -> Iterator[Path]:
         """Candidate folders of a package, likeliest first: above the file, beside those folders, in ROS paths."""

@@ -15,19 +15,17 @@ from numpy.typing import NDArray
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MeshFileError, OptionError
-from rlacd.io.read.conventions import collada_unit
+from rlacd.io.read.contents import Triangles
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
 from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
-from rlacd.io.robots.plan import MeshUse, Plan
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
-from rlacd.io.robots.urdf import plan_urdf
+from rlacd.io.robots.urdf import MeshUse, Plan, plan_urdf
 from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
-from rlacd.io.write.single_precision import Triangles
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
 from rlacd.options import LENGTHS
 from rlacd.options.fields import checked, path_like, read, shown
@@ -126,7 +124,7 @@ def rewrite_robot(
         return rewrite_stage(usd.read_colliders(source), place, options, keep_input=keep_input)
     if keep_input:
         raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
-    packages = checked(OutputOptions, "package_dirs", package_dirs, called="package_dirs") or ()
+    packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     kind, root, folder = _opened(source, place)
     _check_options(options)
     references = References(source, packages)
@@ -139,8 +137,7 @@ def rewrite_robot(
     files: dict[str, bytes] = {}
     copies: dict[MeshUse, str] = {}
     for use, name in zip(plan.uses, _stems([use.path for use in plan.uses]), strict=True):
-        unit, said = collada_unit(use.path)
-        result = _decomposed(use, unit, options)
+        result, said = _decomposed(use, options)
         hulls = {f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)}
         if kind == "mjcf" and not mujoco_reads(use.path):
             copies[use] = f"{stem}_{name}_visual.obj"
@@ -151,7 +148,7 @@ def rewrite_robot(
         warnings += [*said, *(f"{use.path.name}: {warning}" for warning in result.report.get("warnings", []))]
     named = {use: mesh.files for use, mesh in meshes.items()}
     edits = plan.edit(named, {use: mesh.result.source for use, mesh in meshes.items()}, copies)
-    data = edited(root, edits, [element for element in root.walk() if element.included is not None])
+    data = edited(root, edits)
     warnings += [warning for warning in plan.warnings if warning not in warnings] + _fewer(meshes, options)
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
@@ -176,9 +173,7 @@ def rewrite_stage(
 def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:
     """Check, before any work, that what `source` becomes can be written to `place`; raises as `rewrite_robot`."""
     if place.suffix.lower() not in endings:
-        raise OptionError(
-            f"{source} can only be rewritten as another {' or '.join(endings)}, not as {shown(str(place))}."
-        )
+        raise OptionError(f"{source} can only become another {' or '.join(endings)}, not {shown(str(place))}.")
     if os.path.realpath(source) == os.path.realpath(place):
         raise OptionError(f"{place} would overwrite the input; choose another name.")
     check_name(place)
@@ -221,10 +216,9 @@ def _left_behind(files: Sequence[str], source: Path, place: Path) -> list[str]:
     """Warn about other files that are named relative to a folder which the result does not lie in."""
     if not files or os.path.realpath(place.absolute().parent) == os.path.realpath(source):
         return []
-    return [
-        f"{len(files)} other files, such as {files[0]}, are referred to relative to {source} and will not be found "
-        f"from {place.absolute().parent}: write the result beside the input, or copy them too."
-    ]
+    said = f"{len(files)} other files, such as {files[0]}, are referred to relative to {source}"
+    lost = f"will not be found from {place.absolute().parent}: write the result beside the input, or copy them too"
+    return [f"{said} and {lost}."]
 
 
 def _reference(old: str, hull: str, references: References, folder: Path) -> str:
@@ -246,11 +240,9 @@ def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) 
     stated |= options.get("criterion") not in (None, "concavity")
     if stated or max(scales) < 2 * min(scales) or hulls < MANY_HULLS * len(meshes):
         return []
-    length = reports[0]["options"]["threshold"] / min(scales)
-    return [
-        f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each; --threshold-abs "
-        f"{float(f'{1.05 * length:.2g}'):g}, about that of the largest, may give fewer."  # 5 %: never rounded below it
-    ]
+    length = float(f"{1.05 * reports[0]['options']['threshold'] / min(scales):.2g}")  # 5 %: never rounded below it
+    said = f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each"
+    return [f"{said}; --threshold-abs {length:g}, about that of the largest, may give fewer."]
 
 
 MANY_HULLS = 10
@@ -266,11 +258,19 @@ def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
     return decompose((mesh.vertices, mesh.faces), **given)
 
 
-def _decomposed(use: MeshUse, unit: float, options: Mapping[str, Any]) -> Decomposition:
+def _decomposed(use: MeshUse, options: Mapping[str, Any]) -> tuple[Decomposition, list[str]]:
+    """Decompose a mesh, in the unit that a COLLADA file states: ROS, Gazebo and Bullet apply it.
+
+    Whether such a file whose y axis points up is turned differs between them, so that is a warning.
+    """
     try:
-        mesh = load_mesh(use.path)
-        mesh = trimesh.Trimesh(mesh.vertices * unit * use.scale, _oriented(mesh.faces, use), process=False)
-        return _coarse(mesh, options)
+        read = load_mesh(use.path)
+        is_collada = use.path.suffix.lower() == ".dae"
+        unit = (read.metres or 1.0) if is_collada else 1.0
+        mesh = trimesh.Trimesh(read.vertices * unit * use.scale, _oriented(read.faces, use), process=False)
+        turned = f"{use.path.name} declares {read.up.upper()}_UP, and some programs rotate such a file when they read"
+        said = [f"{turned} it; its hulls keep its coordinates."] if is_collada and read.up != "z" else []
+        return _coarse(mesh, options), said
     except MeshError as error:
         if str(use.path) in str(error):
             raise

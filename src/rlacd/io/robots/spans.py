@@ -11,10 +11,12 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read.xml import refuse_doctype
 
 DEEPEST_ELEMENT = 500
 """Depth of nested elements; robots have about fifty."""
@@ -43,6 +45,15 @@ class File:
     def folder(self) -> Path:
         """The folder that holds it."""
         return self.path.absolute().parent
+
+
+class Edit(NamedTuple):
+    """New bytes for the range ``[start:end]`` of a file."""
+
+    file: File
+    start: int
+    end: int
+    new: bytes
 
 
 @dataclass(eq=False)
@@ -90,6 +101,10 @@ class Element:
         at = space.rfind(b"\n")
         return space[at - (space[at - 1 : at] == b"\r") :] if at >= 0 else b""
 
+    def replaced(self, new: bytes) -> Edit:
+        """The edit that puts other bytes in the place of the element."""
+        return Edit(self.file, self.start, self.end, new)
+
     def with_attributes(self, values: Mapping[str, str]) -> bytes:
         """Return the element's bytes with attributes set in its start tag, and the rest unchanged."""
         head, rest = self.file.data[self.start : self.head], self.file.data[self.head : self.end]
@@ -101,16 +116,6 @@ class Element:
         tail = kept[len(kept.rstrip()) :]
         added = b"".join(b" " + name + b"=" + value for name, value in left.items())
         return kept.rstrip() + added + tail + close + rest
-
-
-@dataclass(frozen=True)
-class Edit:
-    """New bytes for the range ``[start:end]`` of a file."""
-
-    file: File
-    start: int
-    end: int
-    new: bytes
 
 
 def parse(path: Path, data: bytes, depth: int = 0) -> Element:
@@ -142,16 +147,10 @@ class _Builder:
         self.top: list[Element] = []
         self._file, self._depth, self._count = file, depth, 0
         self._open: list[Element] = []
-        self.parser.StartDoctypeDeclHandler = self._refuse
+        refuse_doctype(self.parser, file.path)
         self.parser.XmlDeclHandler = self._declared
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
-
-    def _refuse(self, *_: object) -> None:
-        raise MeshFileError(
-            f"{self._file.path} has a document type (<!DOCTYPE>), which is not allowed, as it can refer to anything: "
-            "remove it."
-        )
 
     def _declared(self, version: str, encoding: str | None, standalone: int) -> None:
         self._file.encoding = encoding or "utf-8"
@@ -203,16 +202,12 @@ def expand(root: Element, find: Callable[[str, Element], Path], read: Callable[[
             waiting += [below for below in child.walk() if below.tag == "include"]
 
 
-def edited(root: Element, edits: Sequence[Edit], includes: Sequence[Element] = ()) -> bytes:
-    """Return the root's file with all edits, which do not overlap; an included file that changes is written into it.
-
-    `includes` are the ``<include>`` elements below `root`, those in other files too.
-    """
+def edited(root: Element, edits: Sequence[Edit]) -> bytes:
+    """Return the root's file with all edits, which do not overlap; an included file that changes is written into it."""
     changes = [(edit.start, edit.end, edit.new) for edit in edits if edit.file is root.file]
-    for element in includes:
-        if element.file is root.file and element.included is not None:
-            inner = element.included
-            whole = edited(inner, edits, includes)
+    for element in root.walk():
+        if element.file is root.file and (inner := element.included) is not None:
+            whole = edited(inner, edits)
             if whole != inner.file.data:
                 last = inner.end if inner.head == inner.end else inner.file.data.rindex(b"</", 0, inner.end)
                 content = whole[inner.head : len(whole) - (len(inner.file.data) - last)]

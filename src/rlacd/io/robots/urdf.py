@@ -1,13 +1,65 @@
-"""URDF: each ``<collision>`` with a mesh becomes one such element per hull, otherwise unchanged."""
+"""The plan of a rewrite: which meshes to decompose, and how the file changes once their hulls are known; that of URDF.
+
+Each ``<collision>`` with a mesh becomes one such element per hull, otherwise unchanged.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeAlias
+
+import trimesh
 
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.plan import HullFiles, MeshUse, Plan, Scale
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import Edit, Element
+
+Scale: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class MeshUse:
+    """A mesh file at a scale: decomposed once, however many times it is used.
+
+    Attributes
+    ----------
+    path
+        The file.
+    scale
+        The factors that the description applies to its coordinates; negative ones mirror.
+    """
+
+    path: Path
+    scale: Scale
+
+
+HullFiles: TypeAlias = Mapping[MeshUse, Sequence[str]]
+"""The names of the files of each mesh's hulls."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How to rewrite one description.
+
+    Attributes
+    ----------
+    uses
+        The meshes to decompose, in the order of the file, each once.
+    edit
+        Takes the hull files of each and its mesh at scale, and the copies
+        of meshes that the consumer cannot read; returns the edits of the file and of those it includes.
+    relative
+        Paths that other parts of the file name relative to its folder: they break if the result goes elsewhere.
+    warnings
+        What is left unchanged, and why.
+    """
+
+    uses: list[MeshUse]
+    edit: Callable[[HullFiles, Mapping[MeshUse, trimesh.Trimesh], Mapping[MeshUse, str]], list[Edit]]
+    relative: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
 
 def plan_urdf(root: Element, references: References, named: Callable[[str, str], str]) -> Plan:
@@ -41,22 +93,16 @@ def plan_urdf(root: Element, references: References, named: Callable[[str, str],
         scale = read_scale(mesh.attributes.get("scale"), where)
         found.append((collision, mesh, MeshUse(references.find(reference, root.file.folder), scale)))
     replaced_meshes = {mesh for _, mesh, _ in found}
-    relative = [
-        mesh.attributes["filename"]
-        for mesh in root.walk()
-        if mesh.tag in ("mesh", "texture")
-        and mesh not in replaced_meshes
-        and _is_relative(mesh.attributes.get("filename"))
-    ]
+    others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced_meshes]
+    names = [each.attributes.get("filename", "") for each in others]
+    relative = [name for name in names if name and "://" not in name and not name.startswith("/")]
 
     def edit(hulls: HullFiles, *_: object) -> list[Edit]:
         edits = []
         for collision, mesh, use in found:
-            pieces = []
-            for index, hull in enumerate(hulls[use]):
-                reference = named(mesh.attributes["filename"], hull)
-                pieces.append(_collision(collision, mesh, reference, index))
-            edits.append(Edit(root.file, collision.start, collision.end, collision.indent.join(pieces)))
+            references = [named(mesh.attributes["filename"], hull) for hull in hulls[use]]
+            pieces = [_collision(collision, mesh, name, index) for index, name in enumerate(references)]
+            edits.append(collision.replaced(collision.indent.join(pieces)))
         return edits
 
     return Plan(list(dict.fromkeys(use for _, _, use in found)), edit, relative)
@@ -86,7 +132,3 @@ def _collision(collision: Element, mesh: Element, reference: str, index: int) ->
     whole = collision.with_attributes({} if own is None else {"name": f"{own}_{index:03d}"})
     at = mesh.start - collision.end + len(whole)  # the mesh stands behind what has changed
     return whole[:at] + mesh.with_attributes({"filename": reference}) + whole[at + mesh.end - mesh.start :]
-
-
-def _is_relative(reference: str | None) -> bool:
-    return bool(reference) and "://" not in str(reference) and not str(reference).startswith("/")

@@ -103,12 +103,9 @@ def encode_layer(
             hulls[f"{index}.{number}.points"] = ((mesh.vertices + shift) / scale).astype("<f4").tobytes()
             hulls[f"{index}.{number}.faces"] = np.asarray(mesh.faces, dtype="<i4").tobytes()
         done[node["path"]] = results[key]
-    asked = {
-        "path": str(stage.source),
-        "sublayer": None if flat else Path(os.path.relpath(stage.source, place.absolute().parent)).as_posix(),
-        "ending": place.suffix.lower().lstrip("."),
-        "masses": {path: result.report.get("mass") for path, result in done.items()},
-        "counts": [*map(len, done.values())],
-    }
-    answer = answer_of(SERVER, stage.source, "USD", asked, hulls)
+    sublayer = None if flat else Path(os.path.relpath(stage.source, place.absolute().parent)).as_posix()
+    masses = {path: result.report.get("mass") for path, result in done.items()}
+    asked = {"path": str(stage.source), "sublayer": sublayer, "ending": place.suffix.lower().lstrip(".")}
+    how = {"masses": masses, "counts": [*map(len, done.values())]}
+    answer = answer_of(SERVER, stage.source, "USD", {**asked, **how}, hulls)
     return answer.blobs["layer"], done, warnings + answer.values["warnings"], answer.values["files"]

@@ -24,6 +24,11 @@ OF_THE_MESH = re.compile(
 OF_COLLISIONS = re.compile(r"(physics|physx\w*|newton|mjc):|material:binding:physics$|material:binding$")
 """Properties that go from a mesh to its hulls."""
 
+OF_BODIES = re.compile(
+    r"physics:(approximation|mass|density|rigid|velocity|angular|kinematic|start|diagonal|principal|center|simulation)"
+)
+"""Those of them that are of a rigid body, or of the mesh itself."""
+
 TO_COLLIDERS = re.compile(r"collection:.*:(in|ex)cludes$|physics:filteredPairs$|physxContactReport:reportPairs$")
 """Relationships that name colliders, any number of them: they name the hulls too."""
 
@@ -89,9 +94,7 @@ def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:
     on = [prim for prim in found if UsdPhysics.CollisionAPI(prim).GetCollisionEnabledAttr().Get() is not False]
     groups = [prim for prim in on if not prim.IsA(UsdGeom.Gprim)]
     if groups:
-        warnings.append(
-            f"{len(groups)} prims collide and are no shapes, such as {groups[0].GetPath()}: left unchanged."
-        )
+        warnings.append(f"{len(groups)} prims collide and are no shapes, as {groups[0].GetPath()}: left unchanged.")
     if any(prim.IsA(UsdGeom.PointInstancer) for prim in stage.Traverse()):
         raise MeshFileError(f"{path} has a point instancer, which is not rewritten: convert its instances first")
     return [prim for prim in on if prim.IsA(UsdGeom.Mesh)], warnings
@@ -202,7 +205,8 @@ def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[An
         group.AddTransformOp().Set(moved.GetLocalTransformation())
         group.SetResetXformStack(moved.GetResetXformStack())
     schemas = [name for name in prim.GetAppliedSchemas() if not OF_THE_MESH.search(name)]
-    settings = [each for each in prim.GetAuthoredProperties() if OF_COLLISIONS.match(each.GetName())]
+    authored = {each.GetName(): each for each in prim.GetAuthoredProperties()}
+    settings = [authored[name] for name in authored if OF_COLLISIONS.match(name) and not OF_BODIES.match(name)]
     for number, (points, faces) in enumerate(hulls):
         corners, triangles = np.frombuffer(points, "<f4").reshape(-1, 3), np.frombuffer(faces, "<i4").reshape(-1, 3)
         hull = mesh_prim(stage, group.GetPath().AppendChild(f"hull_{number:03d}"), corners, triangles).GetPrim()
@@ -211,11 +215,6 @@ def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[An
         for schema in schemas:
             hull.AddAppliedSchema(schema)
         for each in settings:
-            if not re.search(
-                r"physics:(approximation|mass|density|rigid|velocity|angular|kinematic|start|diagonal"
-                r"|principal|center|simulation)",
-                each.GetName(),
-            ):
-                each.FlattenTo(hull)
+            each.FlattenTo(hull)
     UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)
     return [hull.GetPath() for hull in group.GetPrim().GetChildren()]

@@ -19,7 +19,7 @@ from rlacd.io.write.encode import ENCODERS, ENGINE_NAMES, encode_glb, encode_obj
 from rlacd.io.write.folder import write_folder
 from rlacd.io.write.model import (
     MeshFile,
-    Model,
+    RigidBody,
     hollow,
     implausible,
     model_of,
@@ -84,22 +84,18 @@ def _with_scene(result: Result, file_format: str, ending: str, keep_input: bool)
 
     With `keep_input`, an input without a scene is the triangles in grey.
     """
-    has_scene = result.input is not None and result.input.asset is not None
+    has_scene, kept = result.input is not None and result.input.asset is not None, "write.keep:encode_kept"
     if ending == "glb" and has_scene and file_format in ENGINE_NAMES:
-        return bytes(function_of("write.keep:encode_kept")(result, ENGINE_NAMES[file_format], colored=False))
+        return bytes(function_of(kept)(result, ENGINE_NAMES[file_format], colored=False))
     if not keep_input or not result.hulls:
         return None
     if has_scene:
-        return bytes(
-            function_of("write.keep:encode_kept")(
-                result, lambda name, index, primitive: f"{name}_{hull_name(index)}", colored=True
-            )
-        )
+        return bytes(function_of(kept)(result, lambda name, index, _: f"{name}_{hull_name(index)}", colored=True))
     visual = (node_name(result.name), result.source) if len(result.source.faces) else None
     return encode_glb(result.hulls, visual=visual)
 
 
-def _for_engine(model: Model, engine: str, ending: str) -> bytes:
+def _for_engine(model: RigidBody, engine: str, ending: str) -> bytes:
     """The input as one grey node, and the hulls named for the engine."""
     name = node_name(model.name)
     names = [ENGINE_NAMES[engine](name, index, primitive) for index, primitive in enumerate(model.primitives)]
@@ -107,7 +103,7 @@ def _for_engine(model: Model, engine: str, ending: str) -> bytes:
     return encode(model.hulls, names, None if model.visual is None else (name, model.visual))
 
 
-def _save_with_meshes(result: Result, model: Model, target: Target, one_mesh: bool) -> None:
+def _save_with_meshes(result: Result, model: RigidBody, target: Target, one_mesh: bool) -> None:
     folder, stem = mesh_folder(target.path, target.file_format), file_stem(model.name)
     shapes = shapes_of(model, stem, _PRIMITIVES[target.file_format], one_mesh=one_mesh)
     mjcf = target.file_format == "mjcf"

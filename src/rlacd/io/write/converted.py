@@ -9,13 +9,13 @@ from typing import Any, TypeAlias
 import numpy as np
 import trimesh
 
+from rlacd.io.read.contents import Triangles
 from rlacd.io.read.gltf import split
 from rlacd.io.read.looks import BETWEEN, looks_of
 from rlacd.io.write.encode import VISUAL_COLOR
 from rlacd.io.write.glb import ROUGHNESS
 from rlacd.io.write.model import Look, Painted
 from rlacd.io.write.palette import linear_from_srgb
-from rlacd.io.write.single_precision import Triangles
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh, SourceNode
 from rlacd.solid.topology import IntArray

@@ -148,14 +148,12 @@ ENCODERS: dict[str, Callable[[Sequence[trimesh.Trimesh]], bytes]] = {
 }
 
 
+_PREFIXES = {"box": "UBX", "sphere": "USP", "capsule": "UCP"}
+
 ENGINE_NAMES: dict[str, Callable[[str, int, Primitive | None], str]] = {
-    "unreal": lambda name, index, primitive: f"{_prefix(primitive)}_{name}_{index:02d}",
+    "unreal": lambda name, index, shape: f"{_PREFIXES.get(shape.kind if shape else '', 'UCX')}_{name}_{index:02d}",
     "godot": lambda name, index, primitive: f"{name}_{index:03d}-convcolonly",
 }
 """Names of hulls. Unreal: ``UCX_<name>_00``, ``UCX_<name>_01``, ... are the hulls of the node or mesh ``<name>``; boxes
 begin with ``UBX``, spheres with ``USP``, capsules with ``UCP``. Godot: nodes ending in ``-convcolonly`` become convex
 shapes of a static body and are not drawn."""
-
-
-def _prefix(primitive: Primitive | None) -> str:
-    return {"box": "UBX", "sphere": "USP", "capsule": "UCP"}.get("" if primitive is None else primitive.kind, "UCX")

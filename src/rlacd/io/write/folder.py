@@ -6,8 +6,8 @@ import contextlib
 import json
 import os
 import re
+import secrets
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -36,7 +36,8 @@ def write_folder(
         # Inside an existing folder, not beside it: it may be the root of a disk, and renames cannot cross disks.
         parent = folder if folder.is_dir() else folder.resolve().parent
         parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=".rlacd-", suffix=".tmp", dir=parent))
+        staging = parent / f".rlacd-{secrets.token_hex(8)}.tmp"
+        staging.mkdir()
         try:
             for name, data in {**files, listing: _list(files)}.items():
                 write_file(staging / name, data)
@@ -52,14 +53,11 @@ def check_names(folder: Path, stem: str, names: Sequence[str]) -> None:
     with output_errors(folder):
         listing = folder / f"{stem}_hulls.json"
         ours = listed_hulls(listing, stem)
-        taken = [name for name in names if name not in ours and os.path.lexists(folder / name)]
-        if os.path.lexists(listing) and _listed(listing) is None:
-            taken.append(listing.name)
+        ours |= {listing.name} if _listed(listing) is not None else set()
+        taken = [name for name in (*names, listing.name) if name not in ours and os.path.lexists(folder / name)]
     if taken:
-        raise OutputError(
-            f"cannot write {folder / taken[0]}: a file of that name is there that rlacd did not write; "
-            "move it away or choose another name."
-        )
+        said = f"cannot write {folder / taken[0]}: a file of that name is there that rlacd did not write"
+        raise OutputError(f"{said}; move it away or choose another name.")
 
 
 def listed_hulls(listing: Path, stem: str) -> set[str]:
@@ -86,7 +84,6 @@ def _list(names: Sequence[str] | Mapping[str, bytes]) -> bytes:
 
 def _appear(staging: Path, folder: Path, then: Callable[[], None]) -> bool:
     """Give a complete folder its name; False if another run's has appeared there first."""
-    _open_to_umask(staging)
     with _locked(staging):  # the lock goes with the folder, so that nobody fills it before `then` is done
         try:
             os.rename(staging, folder)
@@ -128,10 +125,3 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _open_to_umask(folder: Path) -> None:
-    # mkdtemp makes the folder private to the user; give it the mode of any new folder of theirs.
-    umask = os.umask(0)
-    os.umask(umask)
-    folder.chmod(0o777 & ~umask)

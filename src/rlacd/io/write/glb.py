@@ -8,26 +8,15 @@ from __future__ import annotations
 import base64
 import json
 import struct
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from rlacd.io.write.single_precision import Triangles
+from rlacd.io.read.contents import Triangles
+from rlacd.io.read.open_file import BINARY_CHUNK, JSON_CHUNK, MAGIC
 
 ROUGHNESS = 0.8
-
-
-class Code(IntEnum):
-    """Numbers of the specification: kinds of chunks, types of components, targets of views."""
-
-    JSON = 0x4E4F534A
-    BINARY = 0x004E4942
-    FLOAT = 5126
-    UNSIGNED_INT = 5125
-    ATTRIBUTES = 34962
-    INDICES = 34963
 
 
 class Placed(NamedTuple):
@@ -78,8 +67,8 @@ class GltfFile:
         primitive = {"attributes": {"POSITION": len(accessors)}, "indices": len(accessors) + 1, "mode": 4}
         bounds = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
         for array, kind, component, target in (
-            (points, "VEC3", Code.FLOAT, Code.ATTRIBUTES),
-            (corners, "SCALAR", Code.UNSIGNED_INT, Code.INDICES),
+            (points, "VEC3", 5126, 34962),  # float32, attributes
+            (corners, "SCALAR", 5125, 34963),  # uint32, indices
         ):
             view = self.append(array.tobytes(), target)
             described = {"bufferView": view, "componentType": component, "count": len(array), "type": kind}
@@ -122,22 +111,18 @@ class GltfFile:
             binary = (self.binary or b"") + added
             buffers[:1] = [{**(buffers[0] if buffers else {}), "byteLength": len(binary)}]
         text = json.dumps(self.header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-        chunks = _chunk(Code.JSON, text + b" " * (-len(text) % 4))
-        chunks += (_chunk(Code.BINARY, binary) if binary else b"") + self._others
-        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-
-def _chunk(kind: int, content: bytes) -> bytes:
-    """A chunk with its header."""
-    return struct.pack("<II", len(content), kind) + content
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<I4s", len(text), JSON_CHUNK) + text
+        chunks += (struct.pack("<I4s", len(binary), BINARY_CHUNK) + binary if binary else b"") + self._others
+        return struct.pack("<4sII", MAGIC, 2, 12 + len(chunks)) + chunks
 
 
 def _chunks(rest: bytes | None) -> tuple[bytes | None, bytes]:
     """The binary chunk, if there is one, and all others as they are."""
     if not rest:
         return None, b""
-    length, kind = struct.unpack_from("<II", rest, 0)
-    if kind != Code.BINARY:
+    length, kind = struct.unpack_from("<I4s", rest, 0)
+    if kind != BINARY_CHUNK:
         return None, rest
     binary = rest[8 : 8 + length]
     return binary + bytes(-len(binary) % 4), rest[8 + length :]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import base64
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,12 @@ import numpy as np
 import trimesh
 
 from rlacd.io.read.beside import DATA, IMAGES, FolderFiles
+from rlacd.io.read.contents import Triangles
 from rlacd.io.read.gltf import split
 from rlacd.io.write.converted import converted, nodes_of
 from rlacd.io.write.glb import GltfFile, Placed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
-from rlacd.io.write.single_precision import Triangles, required_hull
+from rlacd.io.write.single_precision import required_hull
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh
@@ -69,7 +70,9 @@ def encode_kept(result: Result, named: Named, *, colored: bool) -> bytes:
         node = nodes[int(hull.metadata.get("node_index", 0))]
         at = scene.index_of(node.key)
         mesh_name = scene.mesh_name(at) or node.name
-        inverse = None if scene.is_skinned(at) else _inverse(node.transform)
+        # Engines move a node whose mesh follows a skeleton away from below its hulls.
+        is_skinned = at is not None and "skin" in scene.header["nodes"][at]
+        inverse = None if is_skinned else _inverse(node.transform)
         primitive = primitives[index] if inverse is None or _keeps_shape(inverse) else None
         placed = _local(hull, factor, inverse, named(node.name, of_nodes[node.name], primitive))
         called = named(mesh_name, of_meshes[mesh_name], primitive)
@@ -118,23 +121,18 @@ class _Scene(GltfFile):
         """The index of a source node."""
         return self._nodes.get(key) if self._by_name else int(key)
 
-    def is_skinned(self, index: int | None) -> bool:
-        """Whether a node's mesh follows a skeleton: engines move such a node away from below its hulls."""
-        return index is not None and "skin" in self.header["nodes"][index]
-
     def mesh_name(self, index: int | None) -> str:
         """The name of the mesh that a node places; empty if it has none."""
         mesh = None if index is None else self.header["nodes"][index].get("mesh")
         name = "" if mesh is None else self.header["meshes"][mesh].get("name", "")
         return name if isinstance(name, str) else ""
 
-    def _take_off(self, hulls: Iterable[int | None]) -> None:
+    def _take_off(self, off: Sequence[int]) -> None:
         """Take the meshes off nodes, and the nodes off the scene unless there is something below them.
 
         They stay in their lists, nameless, so that all other indices stay too.
         """
         nodes, meshes = self.header.get("nodes", []), self.header.get("meshes", [])
-        off = [index for index in hulls if index is not None]
         unplaced = {nodes[index].get("mesh") for index in off}
         for index in off:
             for of_mesh in ("mesh", "skin", "weights", "name"):

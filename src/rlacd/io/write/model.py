@@ -12,14 +12,14 @@ import numpy as np
 import trimesh
 
 from rlacd.errors import OutputError
-from rlacd.io.read.conventions import UNITS
+from rlacd.io.read.contents import Triangles
 from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
-from rlacd.io.write.single_precision import Triangles, placed_mesh, required_hull
-from rlacd.options.names import PrimitiveKind
+from rlacd.io.write.single_precision import placed_mesh, required_hull
+from rlacd.options.names import UNITS, PrimitiveKind
 from rlacd.options.output import DENSITY, OutputOptions
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.frame import Frame
+from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.mass import Mass, mass_of
 from rlacd.solid.primitive import Primitive
 
@@ -32,7 +32,7 @@ TO_Z_UP = {
 
 
 @dataclass(frozen=True)
-class Model:
+class RigidBody:
     """A body to write; all lengths in the input's own unit and frame.
 
     Attributes
@@ -109,7 +109,7 @@ Shape: TypeAlias = "MeshFile | Primitive"
 """What collides: a mesh file, or a primitive that needs none."""
 
 
-def model_of(result: Result, asked: OutputOptions) -> Model:
+def model_of(result: Result, asked: OutputOptions) -> RigidBody:
     """Collect everything to be written of a decomposition.
 
     Raises
@@ -125,34 +125,28 @@ def model_of(result: Result, asked: OutputOptions) -> Model:
         density = asked.mass / of_volume.volume_abs
     weighed = of_volume.scaled(density)
     if not (0 < weighed.volume_abs < math.inf and np.isfinite(weighed.inertia_abs).all()):
-        raise OutputError(
-            f"the mass of {result.name} at density {density:g} is {weighed.volume_abs:g}; scale the mesh."
-        )
+        raise OutputError(f"the mass of {result.name} at density {density:g} is {weighed.volume_abs:g}; scale it.")
     visual = result.source if len(result.source.faces) else None
     name = printable_name(result.name).replace("::", "_")  # a separator between names in SDF
     if name == "world" or re.fullmatch("__.*__", name):
         name = f"body_{name.strip('_')}"  # simulators reserve those names
-    return Model(name, result.hulls, result.primitives, visual, weighed, result.up_axis(asked.up))
+    return RigidBody(name, result.hulls, result.primitives, visual, weighed, result.up_axis(asked.up))
 
 
-def implausible(model: Model) -> str | None:
+def implausible(model: RigidBody) -> str | None:
     """Say in a sentence what suggests that the input's unit is not the metre, as simulators take it to be."""
     bounds = np.array([hull.bounds for hull in model.hulls])
     size = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
     mass = model.mass.volume_abs
     if LENGTHS[0] <= size <= LENGTHS[1] and MASSES[0] <= mass <= MASSES[1]:
         return None
+    said = f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg"
     if PREFERRED[0] <= size <= PREFERRED[1]:
-        return (
-            f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg: --density or --mass sets its "
-            "mass (density=, mass= in Python)."
-        )
+        return f"{said}: --density or --mass sets its mass (density=, mass= in Python)."
     units = [f"--unit {unit}" for unit in ("mm", "cm") if PREFERRED[0] <= size * UNITS[unit] <= PREFERRED[1]]
     way = f"{' or '.join(units)} converts" if units and size > LENGTHS[0] else "--scale multiplies"
-    return (
-        f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg, since simulators take lengths to be "
-        f"in metres: {way} them, --mass sets its mass (unit=, scale=, mass= in Python)."
-    )
+    how = f"{way} them, --mass sets its mass (unit=, scale=, mass= in Python)"
+    return f"{said}, since simulators take lengths to be in metres: {how}."
 
 
 def hollow(result: Result) -> str | None:
@@ -161,14 +155,12 @@ def hollow(result: Result) -> str | None:
     sheets = sum(body["faces_in"] for body in bodies if body["step"] == SHEET)
     if 2 * sheets <= sum(body["faces_in"] for body in bodies):
         return None
-    return (
-        f"{result.name} is a hollow shell of open sheets, so its mass and inertia are those of walls "
-        f"{SHEET_THICKNESS / result.report['scale']:.3g} thick: mass= (--mass) sets its mass."
-    )
+    walls = f"walls {2 * HALF_THICKNESS / result.report['scale']:.3g} thick"
+    return f"{result.name} is a hollow shell of open sheets, weighed as {walls}: mass= (--mass) sets its mass."
 
 
-SHEET, SHEET_THICKNESS = "slab", 2e-3
-"""The step of repair that gives sheets a thickness, and that thickness, where the longest side is 2."""
+SHEET = "slab"
+"""The step of repair that gives sheets a thickness."""
 
 PREFERRED = (5e-3, 5.0)
 """Metres: a unit is suggested if the body is as long in it."""
@@ -188,7 +180,7 @@ def node_name(name: str) -> str:
     return re.sub(r"\s+", "_", printable_name(name))
 
 
-def shapes_of(model: Model, stem: str, kinds: Collection[PrimitiveKind], *, one_mesh: bool = False) -> list[Shape]:
+def shapes_of(model: RigidBody, stem: str, kinds: Collection[PrimitiveKind], *, one_mesh: bool = False) -> list[Shape]:
     """The shapes that collide: OBJ files ``<stem>_000.obj``, ...
 
     A hull that stands for a primitive of one of the `kinds` is that primitive. With `one_mesh`, the hulls are objects
@@ -216,7 +208,7 @@ def shapes_of(model: Model, stem: str, kinds: Collection[PrimitiveKind], *, one_
     return [MeshFile(f"{stem}_collision.obj", encode_obj(moved), shift)]
 
 
-def visuals_of(model: Model, stem: str, painted: Sequence[Painted] = ()) -> list[MeshFile]:
+def visuals_of(model: RigidBody, stem: str, painted: Sequence[Painted] = ()) -> list[MeshFile]:
     """The visible meshes, as OBJ files: one, or one for each material where the looks are known."""
     if model.visual is None:
         return []

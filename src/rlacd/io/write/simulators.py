@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from rlacd.io.write.model import TO_Z_UP, MeshFile, Model, Shape, numbers
+from rlacd.io.write.model import TO_Z_UP, MeshFile, RigidBody, Shape, numbers
 from rlacd.io.write.palette import hull_colors
 from rlacd.solid.primitive import Primitive
 
@@ -19,7 +19,7 @@ DRAKE = "http://drake.mit.edu"
 _MOMENTS = {f"i{a}{b}": ("xyz".index(a), "xyz".index(b)) for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")}
 
 
-def encode_mjcf(model: Model, shapes: list[Shape], visuals: list[MeshFile], folder: str) -> bytes:
+def encode_mjcf(model: RigidBody, shapes: list[Shape], visuals: list[MeshFile], folder: str) -> bytes:
     """A free body, with its hulls in class ``collision`` and the visible meshes in class ``visual``.
 
     Groups follow the convention of the MuJoCo Menagerie: 2 is visible, 3 collides and is hidden by default. Mesh files
@@ -57,7 +57,7 @@ def encode_mjcf(model: Model, shapes: list[Shape], visuals: list[MeshFile], fold
     return _written(root)
 
 
-def _body(model: Model, asset: Any, world: Any) -> Any:
+def _body(model: RigidBody, asset: Any, world: Any) -> Any:
     """The free body, with its mass; in a scene, it stands over a floor."""
     if model.is_scene:
         _add_stage(asset, world)
@@ -95,7 +95,7 @@ def _add_stage(asset: Any, world: Any) -> None:
     etree.SubElement(world, "geom", name="floor", type="plane", size="0 0 0.05", material="floor")
 
 
-def _lift(model: Model) -> float:
+def _lift(model: RigidBody) -> float:
     """How high the body has to stand for its lowest point to be a twentieth of its height above the floor."""
     axis = "xyz".index(model.up)
     bounds = np.array([hull.bounds[:, axis] for hull in model.hulls])
@@ -111,7 +111,7 @@ def _geom(shape: Primitive) -> dict[str, str]:
     return {"type": shape.kind, "size": numbers(size), **placed}
 
 
-def encode_urdf(model: Model, shapes: list[Shape], visuals: list[MeshFile], folder: str) -> bytes:
+def encode_urdf(model: RigidBody, shapes: list[Shape], visuals: list[MeshFile], folder: str) -> bytes:
     """A link with its mass, the visible mesh, and a ``<collision>`` per hull."""
     robot = etree.Element("robot", name=model.name)
     # MuJoCo reads URDF too, but by default looks for every mesh beside it and drops visual-only geometry.
@@ -134,7 +134,7 @@ def encode_urdf(model: Model, shapes: list[Shape], visuals: list[MeshFile], fold
     return _written(robot)
 
 
-def encode_sdf(model: Model, shapes: list[Shape], visuals: list[MeshFile], folder: str) -> bytes:
+def encode_sdf(model: RigidBody, shapes: list[Shape], visuals: list[MeshFile], folder: str) -> bytes:
     """A model for Gazebo and Drake, with a ``<collision>`` per hull."""
     root = etree.Element("sdf", version="1.11", nsmap={"drake": DRAKE})
     described = etree.SubElement(root, "model", name=model.name)
@@ -165,12 +165,12 @@ def encode_sdf(model: Model, shapes: list[Shape], visuals: list[MeshFile], folde
     return _written(root)
 
 
-def _named(model: Model, shapes: list[Shape], visuals: list[MeshFile] = []) -> list[tuple[str, Shape]]:  # noqa: B006
+def _named(model: RigidBody, shapes: list[Shape], visuals: list[MeshFile] = []) -> list[tuple[str, Shape]]:  # noqa: B006
     seen: list[tuple[str, Shape]] = [(f"{model.name}_visual", visual) for visual in visuals]
     return seen + [(f"{model.name}_{index:03d}", shape) for index, shape in enumerate(shapes)]
 
 
-def _moments(model: Model) -> dict[str, str]:
+def _moments(model: RigidBody) -> dict[str, str]:
     return {name: numbers([model.mass.inertia_abs[at]]) for name, at in _MOMENTS.items()}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,7 @@ import trimesh
 
 from rlacd._native import convex_hull, mesh_volume
 from rlacd.errors import OutputError
+from rlacd.io.read.contents import Triangles as Triangles
 
 # A hull keeps its shape if its volume changes by less than this share: a flat or tiny hull far from the origin loses
 # much more, or all of it, when float32 has no digits left for its thickness.
@@ -17,13 +18,6 @@ VOLUME_TOLERANCE = 1e-3
 
 VISIBLE_STEP = 1e-4
 """Of a visible mesh's size."""
-
-
-class Triangles(NamedTuple):
-    """A mesh without looks. Making a `trimesh.Trimesh` takes longer than rounding a hull."""
-
-    vertices: npt.NDArray[np.float64]
-    faces: npt.NDArray[np.integer]
 
 
 Triangulated: TypeAlias = "trimesh.Trimesh | Triangles"
@@ -80,10 +74,8 @@ def required_hull(hull: Triangulated, name: str, where: str) -> tuple[Triangles,
         shift = (hull.vertices.min(axis=0) + hull.vertices.max(axis=0)) / 2
         rounded = rounded_hull(hull, shift)
     if rounded is None:
-        raise OutputError(
-            f"cannot write {name} {where}: it is too thin for single precision; scale the mesh, or write .obj, .ply "
-            "or .stl, which keep double precision."
-        )
+        said = f"cannot write {name} {where}: it is too thin for single precision"
+        raise OutputError(f"{said}; scale the mesh, or write .obj, .ply or .stl, which are in double.")
     return rounded, shift
 
 

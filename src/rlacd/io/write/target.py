@@ -117,13 +117,9 @@ def _target(text: str, wanted: str | None) -> Target:
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in (*FORMATS, *MODEL_OF))
         said = f"whose ending is .{ending}" if ending else "which has no ending"
-        raise OptionError(
-            f"cannot write {shown(str(place))}, {said}; use one of {known}, or end the name with / for a folder."
-        )
+        raise OptionError(f"cannot write {shown(str(place))}, {said}; use one of {known}, or a name ending in /.")
     if wanted not in (None, ending):
-        raise OptionError(
-            f"the format {wanted} contradicts the name {shown(str(place))}; give one of the two, or a folder."
-        )
+        raise OptionError(f"the format {wanted} contradicts the name {shown(str(place))}; give one of the two.")
     check_file(place)
     return Target(place, ending, is_folder=False)
 
@@ -139,18 +135,14 @@ def mesh_folder(path: Path, file_format: str) -> Path:
 def check_name(path: Path) -> None:
     """Raise OptionError if a file's name cannot be written in XML, since its mesh folder is named after it."""
     if _UNWRITABLE.search(path.name):
-        raise OptionError(
-            f"cannot write {str(path)!r}: XML cannot hold some characters of its name; choose another name."
-        )
+        raise OptionError(f"cannot write {str(path)!r}: XML cannot hold its name; choose another name.")
 
 
 def _model_target(text: str, file_format: str) -> Target:
     place = Path(text)
     endings = [f".{ending}" for ending in MODELS[file_format]]
     if text.endswith(SEPARATORS) or place.suffix.lower() not in endings:
-        raise OptionError(
-            f"the format {file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}."
-        )
+        raise OptionError(f"{file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}.")
     check_file(place)
     if file_format == "usd":
         function_of("write.usd:require_usd")()
@@ -191,9 +183,7 @@ def check_folder(folder: Path) -> None:
     """Raise `OutputError` if `folder` cannot be filled, without touching the disk."""
     if folder.is_dir():
         if not os.access(folder, os.W_OK | os.X_OK):
-            raise OutputError(
-                f"cannot write into {folder}: you may not; choose another place or change its permissions."
-            )
+            raise OutputError(f"cannot write into {folder}: you may not; choose another place.")
     elif folder.exists() and not folder.is_dir():  # another run's may have appeared between the two questions
         raise OutputError(f"cannot write into {folder}: it is a file, not a folder; choose another name.")
     else:

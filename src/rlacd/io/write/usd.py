@@ -2,38 +2,32 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import unicodedata
 from typing import Any
 
 import numpy as np
 
-from rlacd.errors import MissingExtraError
+from rlacd.errors import import_extra
 from rlacd.io.write.encode import hull_name
-from rlacd.io.write.model import Model
+from rlacd.io.write.model import RigidBody
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull
 from rlacd.solid.primitive import Primitive
 
-NEEDS_EXTRA = "USD needs an extra: run  pip install 'rlacd[usd]'  and try again."
-
 
 def require_usd() -> None:
     """Raise MissingExtraError, with installation advice, unless USD can be imported."""
-    try:
-        for module in ("pxr", "pxr.UsdPhysics"):
-            importlib.import_module(module)
-    except ImportError as error:
-        raise MissingExtraError(NEEDS_EXTRA) from error
+    for module in ("pxr", "pxr.UsdPhysics"):
+        import_extra(module, "USD", "usd")
 
 
-def encode_usd(model: Model, ending: str) -> bytes:
+def encode_usd(model: RigidBody, ending: str) -> bytes:
     """Write a stage: the rigid body ``/<name>``, with ``visual`` (visible) and ``collision/hull_000``, ... (colliding).
 
     Parameters
     ----------
-    model : Model
+    model : RigidBody
         USD supports y or z as the up axis; a body whose x axis points up is rotated.
     ending : {"usda", "usd", "usdc"}
         Text for ``usda``, else binary.
@@ -136,7 +130,7 @@ def _collider(prim: Any, color: Any) -> None:
     UsdPhysics.CollisionAPI.Apply(prim.GetPrim())
 
 
-def _set_mass(api: Any, model: Model) -> None:
+def _set_mass(api: Any, model: RigidBody) -> None:
     from pxr import Gf
 
     moments, axes = np.linalg.eigh(model.mass.inertia_abs)

@@ -79,10 +79,8 @@ def make_encoder(options: TrainOptions) -> Encoder:
     weights = options.encoder_weights
     if options.encoder == "i2p-mae":
         if not weights:
-            raise OptionError(
-                "encoder i2p-mae needs weights: give --encoder-weights FILE, the pre-trained checkpoint that "
-                f"{PUBLISHED} links to, or use --encoder sweep, which needs none."
-            )
+            how = f"give --encoder-weights FILE, the pre-trained checkpoint that {PUBLISHED} links to"
+            raise OptionError(f"encoder i2p-mae needs weights: {how}, or use --encoder sweep, which needs none.")
         network = I2PMAEEncoder.from_checkpoint(Path(weights)).to(pick_device(options.device))
         return PublishedEncoder(network, options.points)
     if weights:

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import pickle
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from rlacd.errors import OptionError
+from rlacd.errors import OptionError, WeightsError
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
-from rlacd.learn.encoders.transformer import Blocks, position_embedding
-from rlacd.learn.encoders.weights_file import load_weights
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,72 @@ class Sizes:
     depth: int = 5
     heads: int = 6
     embedding: int = 256
+
+
+class Attention(nn.Module):
+    """Multi-head self-attention without bias in the query, key and value projection."""
+
+    def __init__(self, width: int, heads: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.qkv = nn.Linear(width, 3 * width, bias=False)
+        self.proj = nn.Linear(width, width)
+
+    def forward(self, x: Tensor, mask: Tensor | None = None) -> Tensor:
+        """Attend among tokens x [B, T, C]; `mask`, bool [B, 1, 1, T], is True where a token may be attended to."""
+        q, k, v = self.qkv(x).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4).unbind(0)
+        seen = F.scaled_dot_product_attention(q, k, v, attn_mask=mask)
+        out: Tensor = self.proj(seen.transpose(1, 2).flatten(2))
+        return out
+
+
+class Mlp(nn.Module):
+    """Two linear layers, four times as wide between them, with GELU."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.fc1, self.fc2 = nn.Linear(width, 4 * width), nn.Linear(4 * width, width)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """[..., C] to [..., C]."""
+        out: Tensor = self.fc2(F.gelu(self.fc1(x)))
+        return out
+
+
+class Block(nn.Module):
+    """Attention and MLP, each after a layer norm and added to its input."""
+
+    def __init__(self, width: int, heads: int) -> None:
+        super().__init__()
+        self.norm1 = nn.LayerNorm(width)
+        self.attn = Attention(width, heads)
+        self.norm2 = nn.LayerNorm(width)
+        self.mlp = Mlp(width)
+
+    def forward(self, x: Tensor, mask: Tensor | None = None) -> Tensor:
+        """Tokens [B, T, C] to tokens; see `Attention` for the mask."""
+        x = x + self.attn(self.norm1(x), mask)
+        out: Tensor = x + self.mlp(self.norm2(x))
+        return out
+
+
+class Blocks(nn.Module):
+    """A stack of blocks; positions are added before each."""
+
+    def __init__(self, width: int, heads: int, depth: int) -> None:
+        super().__init__()
+        self.blocks = nn.ModuleList(Block(width, heads) for _ in range(depth))
+
+    def forward(self, x: Tensor, positions: Tensor, mask: Tensor | None = None) -> Tensor:
+        """Tokens x and their positions, both [B, T, C], to tokens."""
+        for block in self.blocks:
+            x = block(x + positions, mask)
+        return x
+
+
+def position_embedding(width: int) -> nn.Sequential:
+    """Build the map from a position in space to the embedding added to the token there."""
+    return nn.Sequential(nn.Linear(3, width), nn.GELU(), nn.Linear(width, width))
 
 
 class GroupEmbedding(nn.Module):
@@ -183,9 +251,7 @@ class I2PMAEEncoder(nn.Module):
             `count` is too small.
         """
         if count < self.sizes.groups[0]:
-            raise OptionError(
-                f"there are {count} points; this encoder needs at least {self.sizes.groups[0]} (--points)."
-            )
+            raise OptionError(f"{count} points; this encoder needs at least {self.sizes.groups[0]} (--points).")
 
     def encode(self, points: Tensor) -> Tensor:
         """Features [B, 768] of components by points [B, 2, N, 3] of their surface and their hull's, on the CPU.
@@ -221,3 +287,55 @@ def _matrix(layer: nn.Module) -> tuple[Tensor, Tensor | None]:
 def _rest(mlp: nn.Sequential, hidden: Tensor) -> Tensor:
     """Apply the layers of a shared MLP after the first."""
     return F.linear(F.relu(mlp[1](hidden), inplace=True), *_matrix(mlp[3]))
+
+
+WRAPPERS = ("base_model", "model", "state_dict")
+"""Keys under which checkpoints keep the state; the published one uses the first."""
+
+FIRST = "h_encoder.token_embed.0.first_conv.0.weight"
+"""The first parameter of the encoder."""
+
+HARMLESS = [np.dtype, np.dtypes.Float64DType, np.dtypes.Float32DType, np.dtypes.Int64DType]
+"""Kinds of numpy numbers, used by checkpoints for their score; nothing else is allowed beyond torch's own list."""
+
+
+def load_weights(path: Path, expected: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Read the tensors that an encoder expects; keys may be nested under ``base_model`` and begin with ``module.``.
+
+    Raises
+    ------
+    WeightsError
+        The file is missing, damaged, or holds anything but named tensors; or the first tensor that is missing, has
+        another shape, or is not finite.
+    """
+    if not path.is_file():
+        raise WeightsError(f"there is no file {path}; give the file of weights as --encoder-weights.")
+    try:
+        state = {name.removeprefix("module."): value for name, value in _read(path).items()}
+    except (pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:160].rstrip(".")
+        said = f"{path} is damaged, cut off or not a file of weights ({reason}): {FIRST} and all after it are missing"
+        raise WeightsError(f"{said}; fetch or make it again.") from error
+    for name, wanted in expected.items():
+        found = state.get(name)
+        if found is None:
+            raise WeightsError(f"{path} is not an I2P-MAE checkpoint: {name} is missing; give the published file.")
+        if found.shape != wanted.shape:
+            shapes = f"{list(found.shape)}, not {list(wanted.shape)}"
+            raise WeightsError(f"{path} is not an I2P-MAE checkpoint of this size: {name} has shape {shapes}.")
+        if not torch.isfinite(found).all():
+            raise WeightsError(f"{path} is damaged: {name} holds values that are not finite.")
+    return {name: state[name].to(wanted.dtype) for name, wanted in expected.items()}
+
+
+def _read(path: Path) -> dict[str, Tensor]:
+    scalar = np.float64(0).__reduce__()[0]
+    harmless: list[Any] = [*HARMLESS, *((scalar, f"numpy.{core}.multiarray.scalar") for core in ("core", "_core"))]
+    with torch.serialization.safe_globals(harmless):
+        held = torch.load(path, map_location="cpu", weights_only=True)
+    for wrapper in WRAPPERS:
+        if isinstance(held, dict) and isinstance(held.get(wrapper), dict):
+            held = held[wrapper]
+    if not isinstance(held, dict):
+        raise ValueError(f"it holds a {type(held).__name__}")
+    return {str(name): value for name, value in held.items() if isinstance(value, Tensor)}
