@@ -100,8 +100,8 @@ def _enclosed(free: BoolArray) -> list[int]:
     inner = regions[1:-1, 1:-1]
     blocked = np.argwhere(~free)
     middles = []
-    for region in range(1, int(regions.max()) + 1):
-        if region != regions[0, 0]:
+    for region in np.unique(regions):
+        if region not in (0, regions[0, 0]):
             cells = np.argwhere(inner == region)
             away = np.linalg.norm(cells[:, None] - blocked[None], axis=2).min(axis=1)
             middles.append(int(np.ravel_multi_index(tuple(cells[away.argmax()]), free.shape)))

@@ -104,7 +104,9 @@ def test_pairs_of_nearby_boxes(across: bool) -> None:
             for j in parts
             if i != j and (near(i, j) or (across and any(near(i, k) and near(k, j) for k in parts)))
         }
-        boxes = _native.Boxes([part.hull.corners for part in parts.values()], list(parts))
+        boxes = _native.Boxes([])
+        for number, part in parts.items():
+            boxes.add(number, part.hull.corners)
         assert boxes.pairs(new, 0.2, across).tolist() == [list(pair) for pair in sorted(expected)]
 
 

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <iterator>
 
-#include "hull/wide.hpp"
-
 namespace rlacd {
 
 void Clipper::subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex) {

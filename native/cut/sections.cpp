@@ -76,12 +76,10 @@ void reduce_to_planar_hull(std::vector<Vec3>& points) {
 
 // The same, dropping the coordinate that the plane's normal determines best.
 void reduce_to_planar_hull(std::vector<Vec3>& points, Vec3 n) {
-  if (std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z))
-    reduce_to_planar_hull<0>(points);
-  else if (std::fabs(n.y) >= std::fabs(n.z))
-    reduce_to_planar_hull<1>(points);
-  else
-    reduce_to_planar_hull<2>(points);
+  const int axis = longest_axis(n);
+  axis == 0   ? reduce_to_planar_hull<0>(points)
+  : axis == 1 ? reduce_to_planar_hull<1>(points)
+              : reduce_to_planar_hull<2>(points);
 }
 
 // Integral of min(s - d, 0) over a triangle with corner values s0 <= s1 <= s2, divided by its area.
@@ -171,7 +169,7 @@ SolidMesh::SolidMesh(const Mesh& solid)
     area.push_back(0.5 * cross(b - a, c - a));
     for (const std::int32_t corner : f) is_corner[corner] = 1;
   }
-  volume = mesh_volume(mesh.vertices, mesh.faces);
+  volume = mesh_volume(mesh);
 }
 
 Sections::Sections(const SolidMesh& solid, Vec3 normal, std::vector<double> offsets)

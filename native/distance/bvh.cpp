@@ -1,7 +1,5 @@
 #include "distance/bvh.hpp"
 
-#include <utility>
-
 #include "base/parallel.hpp"
 #include "base/stop.hpp"
 
@@ -16,13 +14,6 @@ constexpr int kDeepestHeuristicSplit = 48;
 constexpr int kStack = 96;
 constexpr std::size_t kBetweenPolls = 1024;
 constexpr std::ptrdiff_t kAlone = 20'000;  // trees over no more triangles are made in one thread
-
-double distance2_to_box(const Box& box, Vec3 p) {
-  const double x = std::max(std::max(box.lower.x - p.x, p.x - box.upper.x), 0.0);
-  const double y = std::max(std::max(box.lower.y - p.y, p.y - box.upper.y), 0.0);
-  const double z = std::max(std::max(box.lower.z - p.z, p.z - box.upper.z), 0.0);
-  return x * x + y * y + z * z;
-}
 
 // Lower and negated upper ends along the three axes: all are minima, so that they are extended at once.
 struct Ends {
@@ -89,7 +80,7 @@ Halves halve(Items first, Items last, int axis) {
 // One pass sorts the items into bins; the bounds of both halves are those of their bins.
 Halves split(Items first, Items last, const Ends& centres, int depth) {
   const Vec3 extent = centres.extent();
-  const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+  const int axis = longest_axis(extent);
   // Below or above these numbers, the scale would vanish or overflow.
   const bool is_told_apart = extent[axis] > 0x1p-1000 && extent[axis] <= std::numeric_limits<double>::max();
   if (depth >= kDeepestHeuristicSplit || !is_told_apart) return halve(first, last, axis);
@@ -316,12 +307,48 @@ Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) c
     const Node& node = nodes_[visit.child];
     Visit next[2];
     for (int side = 0; side < 2; ++side)
-      next[side] = {node.child[side], node.leaf_size[side], distance2_to_box(node.box[side], p)};
+      next[side] = {node.child[side], node.leaf_size[side], node.box[side].distance2(p)};
     const int nearer = next[1].distance2 < next[0].distance2 ? 1 : 0;
     if (next[1 - nearer].distance2 < best.distance2) stack[top++] = next[1 - nearer];
     if (next[nearer].distance2 < best.distance2) stack[top++] = next[nearer];
   }
   return best;
+}
+
+void Bvh::within(Vec3 x, double radius, std::vector<std::int32_t>& found) const {
+  const std::size_t before = found.size();
+  const double most = radius * radius;
+  std::vector<std::int32_t> open = {0};
+  while (!open.empty()) {
+    const Node& node = nodes_[open.back()];
+    open.pop_back();
+    for (int side = 0; side < 2; ++side) {
+      const std::int32_t child = node.child[side];
+      if (node.box[side].distance2(x) > most) continue;
+      if (child >= 0) open.push_back(child);
+      for (std::int32_t slot = ~child; child < 0 && slot < ~child + node.leaf_size[side]; ++slot)
+        if (norm2(triangles_[slot].a - x) <= most) found.push_back(faces_[slot]);
+    }
+  }
+  std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
+}
+
+std::pair<std::vector<std::int64_t>, std::vector<std::int32_t>> points_within(const std::vector<Vec3>& points,
+                                                                              const std::vector<Vec3>& centres,
+                                                                              const std::vector<double>& radii,
+                                                                              std::size_t most) {
+  Mesh mesh{points, {}};
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(points.size()); ++i) mesh.faces.push_back({i, i, i});
+  const Bvh tree(mesh);
+  std::vector<std::int64_t> counts(centres.size());
+  std::vector<std::int32_t> found;
+  for (std::size_t i = 0; i < centres.size() && found.size() <= most; ++i) {
+    if (i % kBetweenPolls == 0) poll_stop();
+    const std::size_t before = found.size();
+    tree.within(centres[i], radii[i], found);
+    counts[i] = static_cast<std::int64_t>(found.size() - before);
+  }
+  return {std::move(counts), std::move(found)};
 }
 
 }  // namespace rlacd

@@ -45,8 +45,7 @@ class DepthField {
   std::size_t direction_of(const Corners& corner) const {
     Vec3 d = (1.0 / 3.0) * (corner[0] + corner[1] + corner[2]) - centre_;
     for (int axis = 0; axis < 3; ++axis) d[axis] *= shrink_[axis];
-    const int axis = std::fabs(d.x) >= std::fabs(d.y) ? (std::fabs(d.x) >= std::fabs(d.z) ? 0 : 2)
-                                                      : (std::fabs(d.y) >= std::fabs(d.z) ? 1 : 2);
+    const int axis = longest_axis(d);
     const double longest = std::fabs(d[axis]);
     if (!(longest > 0)) return 0;
     const auto grid = [&](double t) {

@@ -3,7 +3,6 @@
 #include <stdexcept>
 
 #include "base/stop.hpp"
-#include "hull/wide.hpp"
 
 namespace rlacd {
 namespace {

@@ -50,12 +50,14 @@ Edges edges_of(const std::vector<Triangle>& faces, std::size_t vertices);
 class Groups {
  public:
   explicit Groups(std::size_t nodes);
+  void add() { parent_.push_back(static_cast<std::int64_t>(parent_.size())); }
   void join(std::int64_t a, std::int64_t b);
+  // A node that all of its group share.
+  std::int64_t root(std::int64_t node);
   // The number of groups, and the group of each node.
   std::pair<std::int64_t, std::vector<std::int64_t>> labels();
 
  private:
-  std::int64_t root(std::int64_t node);
   std::vector<std::int64_t> parent_;  // never larger than the node
 };
 

@@ -58,7 +58,7 @@ def test_points_in_a_ball(seed: int, count: int, radius: float) -> None:
     points = random.uniform(size=(count, 3)).round(random.integers(1, 4))  # some in one place
     centres = random.uniform(-0.2, 1.2, (20, 3))
     radii = np.full(20, radius) * random.uniform(size=20)
-    counts, found = _native.PointTree(points).within(centres, radii)
+    counts, found = _native.points_within(points, centres, radii)
     expected = cKDTree(points).query_ball_point(centres, radii, return_sorted=True)
     assert counts.tolist() == [len(own) for own in expected]
     assert found.tolist() == [int(i) for own in expected for i in own]
@@ -66,12 +66,12 @@ def test_points_in_a_ball(seed: int, count: int, radius: float) -> None:
 
 def test_a_search_for_points_ends_at_its_limit() -> None:
     points = np.zeros((100, 3))
-    _, found = _native.PointTree(points).within(points, np.ones(100), 250)
+    _, found = _native.points_within(points, points, np.ones(100), 250)
     assert len(found) == 300
     with pytest.raises(ValueError, match="not finite"):
-        _native.PointTree(np.full((1, 3), np.inf))
+        _native.points_within(np.full((1, 3), np.inf), points, np.ones(100))
     with pytest.raises(ValueError, match="one radius"):
-        _native.PointTree(points).within(points, np.ones(3))
+        _native.points_within(points, points, np.ones(3))
 
 
 @given(st.integers(0, 10**6))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import label_cells, nearest_labels, poll_stop
+from rlacd._native import label_cells, poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import ROUNDING
@@ -88,13 +88,22 @@ class Reach:
     def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
         """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
-        reached = self.reached.astype(self.room.dtype)
-        return np.asarray(nearest_labels(reached, cell, depth / self.pitch + ROUNDING) == 0)
+        return ~_grown(self.reached, depth / self.pitch)[tuple(cell.T)]
 
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
-        return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + ROUNDING)
+        reach = self.radius / self.pitch + 2 + ROUNDING
+        steps = np.stack(np.meshgrid(*3 * [np.arange(-int(reach), int(reach) + 1)], indexing="ij"), axis=-1).reshape(
+            -1, 3
+        )
+        away = (steps**2).sum(axis=1)
+        steps = steps[np.argsort(away, kind="stable")[: np.count_nonzero(away <= reach**2)]]
+        room, found, left = np.pad(self.room, int(reach)), np.zeros(len(cell), dtype=np.int64), np.arange(len(cell))
+        for step in steps + int(reach):  # the nearest first
+            found[left] = room[tuple((cell[left] + step).T)]
+            left = left[found[left] == 0]
+        return found
 
     def around_cells(self, cells: IntArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
