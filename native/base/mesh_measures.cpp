@@ -1,4 +1,3 @@
-// Volume, area, axes and mass of triangle meshes: see mesh_measures.hpp for input and output.
 #include "base/mesh_measures.hpp"
 
 #include <algorithm>

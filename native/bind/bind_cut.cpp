@@ -9,8 +9,7 @@
 
 namespace rlacd {
 
-template <>
-struct ScalarOf<PlaneScore> : ScalarOf<double> {};
+double scalar(Tag<PlaneScore>);
 
 namespace {
 

@@ -11,8 +11,7 @@
 
 namespace rlacd {
 
-template <>
-constexpr int kFields<Interval> = 2;
+constexpr int fields(Tag<Interval>) { return 2; }
 
 namespace {
 
@@ -189,12 +188,11 @@ void bind_filling(nb::module_& m) {
            "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
       .def("clipped", released([](const Filling& self, const Mesh& hull) {
              ClippedSolid clip = self.clipped(hull);
-             return std::tuple(std::move(clip.mesh.vertices), std::move(clip.mesh.faces), clip.volume,
-                               new TreeCache(std::move(clip.shape)));
+             return std::tuple(std::move(clip.mesh.vertices), std::move(clip.mesh.faces), clip.volume);
            }),
            "hull_vertices"_a, "hull_faces"_a,
            "The solid clipped to a convex hull and closed by caps on the hull's facets: vertices [V, 3], faces [F, 3], "
-           "volume, and what makes the tree of that surface.")
+           "volume.")
       .def("grown", released(&Filling::grown), "hull_vertices"_a, "hull_faces"_a, "depth"_a,
            "Half-spaces n.x <= d that hold a hull, rows of n and d [P, 4]: their intersection has grown until the "
            "solid's surface stops it, which may come as deep as `depth` into it.")

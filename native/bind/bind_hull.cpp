@@ -12,10 +12,8 @@
 
 namespace rlacd {
 
-template <>
-constexpr int kFields<Hull> = 3;
-template <>
-constexpr int kFields<FlushBody::Contact> = 2;
+constexpr int fields(Tag<Hull>) { return 3; }
+constexpr int fields(Tag<FlushBody::Contact>) { return 2; }
 
 namespace {
 

@@ -12,22 +12,16 @@
 #include "mesh/least_bent.hpp"
 #include "mesh/near_boxes.hpp"
 #include "mesh/spread_points.hpp"
-#include "mesh/wedges.hpp"
 #include "mesh/weld.hpp"
 #include "proxy/simplifier.hpp"
 
 namespace rlacd {
 
-template <>
-constexpr int kFields<Edges> = 3;
-template <>
-constexpr int kFields<Wedges> = 2;
-template <>
-constexpr int kFields<SpreadPoints> = 2;
-template <>
-constexpr int kFields<SurfaceSamples> = 2;
-template <>
-constexpr int kFields<Crossings> = 2;
+constexpr int fields(Tag<Edges>) { return 3; }
+constexpr int fields(Tag<Wedges>) { return 2; }
+constexpr int fields(Tag<SpreadPoints>) { return 2; }
+constexpr int fields(Tag<SurfaceSamples>) { return 2; }
+constexpr int fields(Tag<Crossings>) { return 2; }
 
 namespace {
 
@@ -40,6 +34,12 @@ std::vector<bool> to_marks(const std::optional<MarksIn>& array, std::size_t coun
   if (!array) return {};
   require(array->size() == count, "not as many marks as items");
   return std::vector<bool>(array->data(), array->data() + count);
+}
+
+template <class Grid>
+Cell shape_of(const Grid& grid) {
+  return {static_cast<std::int64_t>(grid.shape(0)), static_cast<std::int64_t>(grid.shape(1)),
+          static_cast<std::int64_t>(grid.shape(2))};
 }
 
 // Binds what is measured on every face of a mesh, given its corners.
@@ -137,24 +137,25 @@ void bind_mesh(nb::module_& m) {
         "vertices"_a, "faces"_a, "spacing"_a,
         "Points [N, 3], corners included, such that no point of a face is farther than `spacing` from one of them, and "
         "the face [N] each lies on, ascending.");
-  m.def("mark_cells", released([](const WideMesh& mesh, double spacing, double pitch, std::int64_t margin) {
-          require(!mesh.faces.empty(), "no faces, no cells");
-          require(spacing > 0 && pitch > 0 && margin >= 0, "sizes must be positive");
-          MarkedCells cells = mark_cells(mesh, spacing, pitch, margin);
-          const Vec3 origin = cells.origin;
-          return std::tuple(std::vector{origin.x, origin.y, origin.z}, std::move(cells.marks),
-                            std::tuple(cells.shape[0], cells.shape[1], cells.shape[2]));
-        }),
-        "vertices"_a, "faces"_a, "spacing"_a, "pitch"_a, "margin"_a,
-        "A grid of cells around a mesh: the middle of the first, which of them hold points of faces spread at this "
-        "spacing, and how many there are along each axis. So many at each end are free.");
-  m.def("label_cells", released([](const ArrayIn<bool, nb::ndim<3>>& marks) {
-          const auto size = [&](std::size_t axis) { return static_cast<std::int64_t>(marks.shape(axis)); };
-          return label_cells(marks.data(), {size(0), size(1), size(2)});
-        }),
+  m.def("label_cells",
+        released([](const ArrayIn<bool, nb::ndim<3>>& marks) { return label_cells(marks.data(), shape_of(marks)); }),
         "marks"_a,
         "Labels [X * Y * Z] of the connected sets of marked cells [X, Y, Z], which share sides, ascending by their "
         "first cells; 0 for all other cells.");
+  m.def("nearest_labels",
+        released([](const ArrayIn<std::int64_t, nb::ndim<3>>& labels,
+                    const ArrayIn<std::int64_t, nb::shape<-1, 3>>& cells, double reach) {
+          const Cell shape = shape_of(labels);
+          const std::vector<Cell> places = copied<Cell>(cells);
+          for (const Cell& cell : places)
+            for (std::size_t axis = 0; axis < 3; ++axis)
+              require(cell[axis] >= 0 && cell[axis] < shape[axis], "a cell off the grid");
+          require(reach >= 0 && reach < 1000, "the reach has to be from 0 to 1000 cells");
+          return nearest_labels(labels.data(), shape, places, reach);
+        }),
+        "labels"_a, "cells"_a, "reach"_a,
+        "The label [N] of the nearest labelled cell of a grid [X, Y, Z] at most `reach` cells away from each cell [N, "
+        "3]; 0 where there is none.");
   m.def("closed_bodies", released([](const Mesh& mesh) {
           ClosedBodies found = closed_bodies(mesh);
           auto bodies = std::tuple(std::move(found.body), std::move(found.volume), std::move(found.area),
@@ -166,9 +167,6 @@ void bind_mesh(nb::module_& m) {
         "the body [F] of each face; signed volume [B], area [B] and box [B, 6] of each body; whether the faces around "
         "each vertex are all neighbours; the least height of a face, and the least length of the sum of the unit "
         "normals of neighbours.");
-  m.def(
-      "separate_fans", released(separate_fans), "vertices"_a, "faces"_a,
-      "A closed mesh in which faces that meet at a vertex only have a vertex each: copies [V', 3] follow the others.");
   m.def("along_a_curve", released(along_a_curve), "vertices"_a, "faces"_a,
         "The same mesh with vertices [V, 3] and faces [F, 3] along a space-filling curve: neighbours in space are near "
         "in memory.");

@@ -4,8 +4,7 @@
 
 namespace rlacd {
 
-template <>
-constexpr int kFields<Balls> = 2;
+constexpr int fields(Tag<Balls>) { return 2; }
 
 void bind_navigable(nb::module_& m) {
   m.def(

@@ -43,11 +43,14 @@ constexpr double kFarthest = 1e150;
 
 // Kernels compare distances: every comparison with a NaN is false, so it would go unnoticed.
 inline void require_finite(const std::vector<Vec3>& points) {
+  bool finite = true, near = true;
   for (const Vec3 p : points)
     for (const double x : {p.x, p.y, p.z}) {
-      require(std::isfinite(x), "a point is not finite");
-      require(std::fabs(x) <= kFarthest, "a point lies beyond 1e150, where distances have no value");
+      finite &= std::isfinite(x);
+      near &= std::fabs(x) <= kFarthest;
     }
+  require(finite, "a point is not finite");
+  require(near, "a point lies beyond 1e150, where distances have no value");
 }
 
 template <class Row, class Array>
@@ -72,10 +75,13 @@ std::vector<Row> to_indices(const Array& array, std::int64_t count, const char* 
           "too many vertices or faces");
   std::vector<Row> rows(array.size() * sizeof(std::int32_t) / sizeof(Row));
   auto* own = reinterpret_cast<std::int32_t*>(rows.data());
-  for (std::size_t i = 0; i < array.size(); ++i) {
-    require(array.data()[i] >= 0 && array.data()[i] < count, otherwise);
-    own[i] = static_cast<std::int32_t>(array.data()[i]);
+  const auto* index = array.data();
+  bool holds = true;
+  for (std::size_t i = 0, size = array.size(); i < size; ++i) {
+    holds &= index[i] >= 0 && index[i] < count;
+    own[i] = static_cast<std::int32_t>(index[i]);
   }
+  require(holds, otherwise);
   return rows;
 }
 
@@ -149,33 +155,19 @@ struct Rows {
 };
 
 template <class T>
-struct ScalarOf {
-  using Type = void;  // no row of an array
-};
-template <>
-struct ScalarOf<char> {
-  using Type = bool;
-};
-template <>
-struct ScalarOf<double> {
-  using Type = double;
-};
-template <>
-struct ScalarOf<std::int32_t> {
-  using Type = std::int32_t;
-};
-template <>
-struct ScalarOf<std::int64_t> {
-  using Type = std::int64_t;
-};
-template <>
-struct ScalarOf<Vec3> : ScalarOf<double> {};
-template <>
-struct ScalarOf<Box> : ScalarOf<double> {};
-template <>
-struct ScalarOf<HalfSpace> : ScalarOf<double> {};
+struct Tag {};
+
+// The scalars of a row that becomes a row of an array; of other types nothing.
+bool scalar(Tag<char>);
+double scalar(Tag<double>);
+std::int32_t scalar(Tag<std::int32_t>);
+std::int64_t scalar(Tag<std::int64_t>);
+double scalar(Tag<Vec3>);
+double scalar(Tag<Box>);
+double scalar(Tag<HalfSpace>);
 template <class Scalar, std::size_t columns>
-struct ScalarOf<std::array<Scalar, columns>> : ScalarOf<Scalar> {};
+Scalar scalar(Tag<std::array<Scalar, columns>>);
+void scalar(...);
 
 template <template <class...> class Of, class T>
 constexpr bool is_a = false;
@@ -183,10 +175,8 @@ template <template <class...> class Of, class... T>
 constexpr bool is_a<Of, Of<T...>> = true;
 
 // How many fields a struct has that becomes a tuple of them.
-template <class T>
-constexpr int kFields = 0;
-template <>
-constexpr int kFields<Mesh> = 2;
+constexpr int fields(Tag<Mesh>) { return 2; }
+constexpr int fields(...) { return 0; }
 
 // A kernel's result as what nanobind turns into Python's: vectors of rows become arrays, structs tuples.
 template <class T>
@@ -194,8 +184,9 @@ auto out(T own) {
   const auto each = [](auto&... part) { return std::tuple(out(std::move(part))...); };
   if constexpr (is_a<std::vector, T>) {
     using Row = typename T::value_type;
-    if constexpr (!std::is_void_v<typename ScalarOf<Row>::Type>) {
-      return Rows<typename ScalarOf<Row>::Type, Row>{std::move(own)};
+    using Scalar = decltype(scalar(Tag<Row>()));
+    if constexpr (!std::is_void_v<Scalar>) {
+      return Rows<Scalar, Row>{std::move(own)};
     } else {
       std::vector<decltype(out(std::declval<Row>()))> all;
       for (Row& row : own) all.push_back(out(std::move(row)));
@@ -205,10 +196,10 @@ auto out(T own) {
     return own ? std::optional(out(std::move(*own))) : std::nullopt;
   } else if constexpr (is_a<std::tuple, T> || is_a<std::pair, T>) {
     return std::apply(each, own);
-  } else if constexpr (kFields<T> == 2) {
+  } else if constexpr (fields(Tag<T>()) == 2) {
     auto& [a, b] = own;
     return each(a, b);
-  } else if constexpr (kFields<T> == 3) {
+  } else if constexpr (fields(Tag<T>()) == 3) {
     auto& [a, b, c] = own;
     return each(a, b, c);
   } else {

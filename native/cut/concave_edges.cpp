@@ -1,4 +1,3 @@
-// Concave edges: see concave_edges.hpp for input, output and algorithm.
 #include "cut/concave_edges.hpp"
 
 #include <algorithm>

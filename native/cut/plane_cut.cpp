@@ -1,4 +1,3 @@
-// Cutting by a plane: see plane_cut.hpp for input, output and algorithm.
 #include "cut/plane_cut.hpp"
 
 #include <algorithm>

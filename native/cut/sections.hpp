@@ -63,15 +63,8 @@ class Sections {
   };
   std::vector<Measures> measure_sections() const;
 
-  // Frees the memory that only `measure_sections` needs.
-  void drop_heights() {
-    heights_ = {};
-    above_ = {};
-  }
-
  private:
   void project();
-  std::int32_t first_above(double height) const;
   void fill_slabs();
   void cut_edges();
   void measure_solid();

@@ -1,4 +1,3 @@
-// Triangulation of loops: see triangulate.hpp for input, output and algorithm.
 #include "cut/triangulate.hpp"
 
 #include <algorithm>

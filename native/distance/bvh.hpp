@@ -77,23 +77,9 @@ inline Vec3 closest_on_triangle(const TriangleFrame& t, Vec3 p) {
 
 inline double distance_to_triangle(const TriangleFrame& t, Vec3 p) { return norm(closest_on_triangle(t, p) - p); }
 
-// A tree over the first faces of a mesh, without boxes: its leaves hold them in their order. It is what clipping leaves
-// of the tree over a solid, and saves sorting the faces again.
-struct TreeShape {
-  // A child is a node (child >= 0) or a leaf that holds the faces [~child, ~child + leaf_size).
-  struct Node {
-    std::int32_t child[2] = {-1, -1};
-    std::int32_t leaf_size[2] = {0, 0};
-  };
-  std::vector<Node> nodes;  // before their children
-  std::size_t faces = 0;
-};
-
 class Bvh {
  public:
   explicit Bvh(const Mesh& mesh, int threads = 1);  // which do not change the tree
-  // The faces beyond those of the shape get a tree of their own beside it.
-  Bvh(const Mesh& mesh, const TreeShape& shape);
 
   // Triangles are stored in the order of the leaves; a *slot* is a position in that order.
   struct Hit {
@@ -126,8 +112,6 @@ class Bvh {
   const TriangleFrame& triangle(std::int32_t slot) const { return triangles_[slot]; }
 
  private:
-  void hold(const Mesh& mesh, std::int32_t face);
-
   std::vector<Node> nodes_;
   std::vector<TriangleFrame> triangles_;
   std::vector<std::int32_t> faces_;

@@ -227,14 +227,9 @@ ClippedSolid Filling::clipped(const Mesh& hull) const {
     CapArea area;
     for (const ConvexClip::Section& section : clip->sections)
       add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal, area);
-    if (area.folded <= kFolded * area.all) {
-      out.mesh = std::move(clip->mesh);
-      out.shape = std::move(clip->shape);
-    } else {
-      clip.reset();
-    }
+    if (area.folded > kFolded * area.all) clip.reset();
   }
-  if (!clip) out.mesh = inside_all(solid_, hull);
+  out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull);
   out.volume = std::fmax(0, mesh_volume(out.mesh));
   return out;
 }

@@ -39,7 +39,6 @@ struct HullCorners {
 
 struct ClippedSolid {
   Mesh mesh;
-  TreeShape shape;  // of a tree over its first faces
   double volume = 0;
 };
 

@@ -1,4 +1,3 @@
-// Gluing two solids that touch: see glue.hpp for input, output and algorithm.
 #include "distance/glue.hpp"
 
 #include <algorithm>

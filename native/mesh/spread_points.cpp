@@ -1,5 +1,7 @@
 #include "mesh/spread_points.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "base/stop.hpp"
@@ -21,7 +23,7 @@ int steps(double length, double spacing) {
 
 // Calls take(point) for all points of one face.
 template <class Take>
-void spread_over(const Mesh& mesh, const Triangle& face, double spacing, bool corners_suffice, const Take& take) {
+void spread_over(const Mesh& mesh, const Triangle& face, double spacing, const Take& take) {
   // From a to b along the longest edge; rows are parallel to it.
   Vec3 a, b, c;
   double longest2 = -1;
@@ -32,10 +34,6 @@ void spread_over(const Mesh& mesh, const Triangle& face, double spacing, bool co
     a = p, b = q, c = mesh.vertices[face[(corner + 2) % 3]];
   }
   const double base = std::sqrt(longest2);
-  if (corners_suffice && base <= spacing) {
-    for (const std::int32_t corner : face) take(mesh.vertices[corner]);
-    return;
-  }
   const double height = norm(cross(b - a, c - a)) / std::max(base, std::numeric_limits<double>::min());
   const int columns = steps(base, spacing), rows = steps(height, spacing);
   for (int row = 0; row < rows; ++row) {
@@ -69,38 +67,10 @@ SpreadPoints spread_points(const Mesh& mesh, double spacing) {
   SpreadPoints spread;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     if (f % kBetweenPolls == 0) poll_stop();
-    spread_over(mesh, mesh.faces[f], spacing, false, [&](Vec3 point) { spread.points.push_back(point); });
+    spread_over(mesh, mesh.faces[f], spacing, [&](Vec3 point) { spread.points.push_back(point); });
     spread.faces.resize(spread.points.size(), static_cast<std::int32_t>(f));
   }
   return spread;
-}
-
-MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int64_t margin) {
-  MarkedCells cells;
-  const auto for_each = [&](const auto& take) {
-    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-      if (f % kBetweenPolls == 0) poll_stop();
-      spread_over(mesh, mesh.faces[f], spacing, true, take);
-    }
-  };
-  Box box;
-  for_each([&](Vec3 point) { box.extend(point); });
-  const double room = static_cast<double>(margin) * pitch;
-  cells.origin = box.lower - Vec3{room, room, room};
-  const auto cell_of = [&](Vec3 point) {
-    Cell cell;
-    for (int axis = 0; axis < 3; ++axis)
-      cell[axis] = static_cast<std::int64_t>(std::nearbyint((point[axis] - cells.origin[axis]) / pitch));
-    return cell;
-  };
-  const Cell last = cell_of(box.upper);
-  for (int axis = 0; axis < 3; ++axis) cells.shape[axis] = last[axis] + 1 + margin;
-  cells.marks.resize(cells.shape[0] * cells.shape[1] * cells.shape[2]);
-  for_each([&](Vec3 point) {
-    const Cell cell = cell_of(point);
-    cells.marks[(cell[0] * cells.shape[1] + cell[1]) * cells.shape[2] + cell[2]] = 1;
-  });
-  return cells;
 }
 
 std::vector<std::int64_t> label_cells(const bool* marks, Cell shape) {
@@ -115,6 +85,32 @@ std::vector<std::int64_t> label_cells(const bool* marks, Cell shape) {
   std::vector<std::int64_t> labels = groups.labels().second;
   for (std::int64_t cell = 0; cell < count; ++cell) labels[cell] = marks[cell] ? labels[cell] + 1 : 0;
   return labels;
+}
+
+std::vector<std::int64_t> nearest_labels(const std::int64_t* labels, Cell shape, const std::vector<Cell>& cells,
+                                         double reach) {
+  std::vector<Cell> offsets;
+  const auto norm2 = [](const Cell& c) { return c[0] * c[0] + c[1] * c[1] + c[2] * c[2]; };
+  const auto most = static_cast<std::int64_t>(std::floor(reach));
+  for (std::int64_t i = -most; i <= most; ++i)
+    for (std::int64_t j = -most; j <= most; ++j)
+      for (std::int64_t k = -most; k <= most; ++k)
+        if (static_cast<double>(norm2({i, j, k})) <= reach * reach) offsets.push_back({i, j, k});
+  std::stable_sort(offsets.begin(), offsets.end(), [&](const Cell& a, const Cell& b) { return norm2(a) < norm2(b); });
+  std::vector<std::int64_t> nearest;
+  nearest.reserve(cells.size());
+  for (std::size_t n = 0; n < cells.size(); ++n) {
+    if (n % 1024 == 0) poll_stop();
+    std::int64_t found = 0;
+    for (std::size_t o = 0; o < offsets.size() && found == 0; ++o) {
+      const std::int64_t i = cells[n][0] + offsets[o][0], j = cells[n][1] + offsets[o][1],
+                         k = cells[n][2] + offsets[o][2];
+      if (i >= 0 && j >= 0 && k >= 0 && i < shape[0] && j < shape[1] && k < shape[2])
+        found = labels[(i * shape[1] + j) * shape[2] + k];
+    }
+    nearest.push_back(found);
+  }
+  return nearest;
 }
 
 SurfaceSamples sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed) {

@@ -19,18 +19,14 @@ SpreadPoints spread_points(const Mesh& mesh, double spacing);
 
 using Cell = std::array<std::int64_t, 3>;
 
-// A grid [X, Y, Z] of cells, the last axis fastest, of size `pitch`, the first of them around `origin`, with those
-// marked that hold any of these points: of faces no larger than the spacing, the corners are enough. `margin` cells
-// around them are free.
-struct MarkedCells {
-  Vec3 origin;
-  Cell shape = {0, 0, 0};
-  std::vector<char> marks;
-};
-MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int64_t margin);
-
-// Labels of the connected sets of marked cells, which share sides, ascending by their first cells; 0 for the others.
+// Labels of the connected sets of marked cells of a grid [X, Y, Z], the last axis fastest, which share sides, ascending
+// by their first cells; 0 for the others.
 std::vector<std::int64_t> label_cells(const bool* marks, Cell shape);
+
+// The label of the nearest labelled cell at most `reach` cells away from each cell, which must lie in the grid; else 0.
+// Of several that are equally near, the one with the first offset counts.
+std::vector<std::int64_t> nearest_labels(const std::int64_t* labels, Cell shape, const std::vector<Cell>& cells,
+                                         double reach);
 
 // Seeded points on a surface, spread evenly by area: each is uniform over the surface, together they are more even than
 // independent draws: a region with a share s of the area gets s * count points, give or take about one. Point i lies at

@@ -357,7 +357,6 @@ std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
   std::vector<Intrusion> found;
   const Box& box = hull.box();
   const std::size_t count = candidates != nullptr ? candidates->size() : balls.centres.size();
-  std::int32_t separating = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (i % kChunk == 0) poll_stop();
     const std::int32_t ball = candidates != nullptr ? (*candidates)[i] : static_cast<std::int32_t>(i);
@@ -365,12 +364,6 @@ std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
     const double radius = balls.radii[ball], enough = radius - least;
     if (!(enough > 0)) continue;
     if (!box.meets({c, c}, enough)) continue;
-    if (-hull.planes().depth(separating, c) >= enough) continue;
-    const ConvexPlanes::Nearest nearest = hull.planes().nearest(c);
-    if (-nearest.depth >= enough) {
-      separating = nearest.plane;
-      continue;
-    }
     const double distance = hull.distance(c, enough);
     if (!(distance < enough)) continue;
     found.push_back({ball, radius - distance});

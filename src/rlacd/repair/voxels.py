@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rlacd import _native
-from rlacd._native import label_cells, poll_stop
-from rlacd.repair.distance import SurfaceQuery
+from rlacd._native import label_cells, nearest_labels, poll_stop
+from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.topology import BoolArray, IntArray
@@ -56,8 +55,11 @@ class Reach:
         """Roll a ball around a surface; the longest side of the frame has `resolution` cells."""
         pitch = 2.0 / resolution
         margin = int(np.ceil(radius / pitch)) + 3
-        origin, marks, shape = _native.mark_cells(vertices, faces.astype(np.int64), pitch / 2, pitch, margin)
-        occupied = np.frombuffer(marks, dtype=bool).reshape(shape)
+        points, _ = points_covering(vertices, faces.astype(np.int64), pitch / 2)
+        origin = points.min(axis=0) - margin * pitch
+        cells = np.rint((points - origin) / pitch).astype(np.int64)
+        occupied = np.zeros(cells.max(axis=0) + 1 + margin, dtype=bool)
+        occupied[tuple(cells.T)] = True
         poll_stop()
         label = label_cells(~_grown(occupied, radius / pitch)).reshape(occupied.shape)
         outside = label == label[0, 0, 0]
@@ -88,22 +90,13 @@ class Reach:
     def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
         """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
-        return ~_grown(self.reached, depth / self.pitch)[tuple(cell.T)]
+        reached = self.reached.astype(self.room.dtype)
+        return np.asarray(nearest_labels(reached, cell, depth / self.pitch + ROUNDING) == 0)
 
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
-        reach = self.radius / self.pitch + 2 + ROUNDING
-        steps = np.stack(np.meshgrid(*3 * [np.arange(-int(reach), int(reach) + 1)], indexing="ij"), axis=-1).reshape(
-            -1, 3
-        )
-        away = (steps**2).sum(axis=1)
-        steps = steps[np.argsort(away, kind="stable")[: np.count_nonzero(away <= reach**2)]]
-        room, found, left = np.pad(self.room, int(reach)), np.zeros(len(cell), dtype=np.int64), np.arange(len(cell))
-        for step in steps + int(reach):  # the nearest first
-            found[left] = room[tuple((cell[left] + step).T)]
-            left = left[found[left] == 0]
-        return found
+        return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + ROUNDING)
 
     def around_cells(self, cells: IntArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
