@@ -20,7 +20,6 @@ namespace rlacd {
 constexpr int fields(Tag<Edges>) { return 3; }
 constexpr int fields(Tag<Wedges>) { return 2; }
 constexpr int fields(Tag<SpreadPoints>) { return 2; }
-constexpr int fields(Tag<SurfaceSamples>) { return 2; }
 constexpr int fields(Tag<Crossings>) { return 2; }
 
 namespace {
@@ -137,6 +136,17 @@ void bind_mesh(nb::module_& m) {
         "vertices"_a, "faces"_a, "spacing"_a,
         "Points [N, 3], corners included, such that no point of a face is farther than `spacing` from one of them, and "
         "the face [N] each lies on, ascending.");
+  m.def("mark_cells", released([](const WideMesh& mesh, double spacing, double pitch, std::int64_t margin) {
+          require(!mesh.faces.empty(), "no faces, no cells");
+          require(spacing > 0 && pitch > 0 && margin >= 0, "sizes must be positive");
+          MarkedCells cells = mark_cells(mesh, spacing, pitch, margin);
+          const Vec3 origin = cells.origin;
+          return std::tuple(std::vector{origin.x, origin.y, origin.z}, std::move(cells.marks),
+                            std::tuple(cells.shape[0], cells.shape[1], cells.shape[2]));
+        }),
+        "vertices"_a, "faces"_a, "spacing"_a, "pitch"_a, "margin"_a,
+        "A grid of cells around a mesh: the middle of the first, which of them hold points of faces spread at this "
+        "spacing, and how many there are along each axis. So many at each end are free.");
   m.def("label_cells",
         released([](const ArrayIn<bool, nb::ndim<3>>& marks) { return label_cells(marks.data(), shape_of(marks)); }),
         "marks"_a,

@@ -4,6 +4,8 @@
 //      set of convex objects (triangles, hulls) is such a function; so is depth under a set of planes.
 //        Sample at(Vec3 p, int32 hint, double enough)  a witness with f_w(p) = f(p), or any with f_w(p) <= enough
 //        double from(int32 witness, Vec3 p)            f_w(p)
+//        double quick_upper(corners)                   a cheap upper bound over a triangle, or infinity
+//        void settled(corners, witness)                is called with the single witness that closed a triangle
 // Out: an interval that holds the maximum, narrow enough for the goal; in waves, also where it is reached.
 // How: branch and bound over the triangles, halved at their longest edge.
 //      Lower bound: f at the corners.
@@ -111,7 +113,7 @@ std::array<Cell, 2> bisect(const Field& field, const Cell& cell, double enough) 
 
 // One thread, the cell with the greatest upper bound first.
 template <class Field>
-Interval maximize(const Field& field, const Mesh& mesh, const Goal& goal) {
+Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
   Interval found;
   double dropped = 0;  // greatest upper bound among the cells not examined further
   const auto needed = [&] { return std::max(goal.pass, found.lower + goal.tolerance); };
@@ -127,12 +129,19 @@ Interval maximize(const Field& field, const Mesh& mesh, const Goal& goal) {
     poll_stop();
     Cell cell;
     cell.corner = corners_of(mesh, face);
+    cell.upper = field.quick_upper(cell.corner);
+    if (cell.upper <= needed()) {
+      dropped = std::max(dropped, cell.upper);
+      continue;
+    }
     const double exact_above = enough();
     const Vec3 centre = (1.0 / 3.0) * (cell.corner[0] + cell.corner[1] + cell.corner[2]);
     const Sample centred = field.at(centre, -1, exact_above);
     learn(centred, exact_above);
-    cell.upper = upper_bound(field, cell.corner, &centred.witness, 1);
-    if (cell.upper > needed()) {
+    cell.upper = std::min(cell.upper, upper_bound(field, cell.corner, &centred.witness, 1));
+    if (cell.upper <= needed()) {
+      field.settled(cell.corner, centred.witness);
+    } else {
       std::int32_t witnesses[4] = {centred.witness};
       for (int i = 0; i < 3; ++i) {
         Sample& sample = at_vertex[face[i]];

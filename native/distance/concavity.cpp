@@ -14,7 +14,15 @@ constexpr std::size_t kProbes = 64;
 // Distance from points inside a hull to its surface; the witnesses are its planes.
 class DepthField {
  public:
-  explicit DepthField(const ConvexPlanes& planes) : planes_(planes) {}
+  DepthField(const ConvexPlanes& planes, const Mesh& hull) : planes_(planes) {
+    settled_.fill(-1);
+    Box box;
+    for (const Triangle& face : hull.faces)
+      for (const std::int32_t corner : face) box.extend(hull.vertices[corner]);
+    centre_ = 0.5 * (box.lower + box.upper);
+    const Vec3 half = 0.5 * (box.upper - box.lower);
+    for (int axis = 0; axis < 3; ++axis) shrink_[axis] = half[axis] > 0 ? 1 / half[axis] : 0;
+  }
 
   Sample at(Vec3 p, std::int32_t, double) const {
     const ConvexPlanes::Nearest nearest = planes_.nearest(p);
@@ -22,8 +30,34 @@ class DepthField {
   }
   double from(std::int32_t plane, Vec3 p) const { return std::max(planes_.depth(plane, p), 0.0); }
 
+  // Triangles in the same direction from the hull's centre mostly lie below the same facet: the plane that settled the
+  // last one is tried first, and all planes only if it fails.
+  double quick_upper(const Corners& corner) const {
+    const std::int32_t plane = settled_[direction_of(corner)];
+    if (plane < 0) return std::numeric_limits<double>::infinity();
+    return std::max({from(plane, corner[0]), from(plane, corner[1]), from(plane, corner[2])});
+  }
+  void settled(const Corners& corner, std::int32_t plane) { settled_[direction_of(corner)] = plane; }
+
  private:
+  // Directions are binned by the face of a cube they leave through and an 8 x 8 grid on it.
+  static constexpr int kGrid = 8;
+  std::size_t direction_of(const Corners& corner) const {
+    Vec3 d = (1.0 / 3.0) * (corner[0] + corner[1] + corner[2]) - centre_;
+    for (int axis = 0; axis < 3; ++axis) d[axis] *= shrink_[axis];
+    const int axis = longest_axis(d);
+    const double longest = std::fabs(d[axis]);
+    if (!(longest > 0)) return 0;
+    const auto grid = [&](double t) {
+      return std::clamp(static_cast<int>((t / longest + 1) * (kGrid / 2)), 0, kGrid - 1);
+    };
+    const int side = 2 * axis + (d[axis] > 0 ? 1 : 0);
+    return static_cast<std::size_t>((side * kGrid + grid(d[(axis + 1) % 3])) * kGrid + grid(d[(axis + 2) % 3]));
+  }
+
   const ConvexPlanes& planes_;
+  Vec3 centre_, shrink_;
+  std::array<std::int32_t, 6 * kGrid * kGrid> settled_;
 };
 
 void check(const Mesh& part, const Mesh& hull) {
@@ -55,8 +89,8 @@ Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, doub
                     double floor, const TreeCache& tree) {
   check(part, hull);
   const ConvexPlanes planes(hull);
-  const DepthField depth(planes);
-  const SurfaceField distance(tree.of(part));
+  DepthField depth(planes, hull);
+  SurfaceField distance(tree.of(part));
   Concavity result;
   result.volume_radius = volume_radius(part_volume, hull_volume);
   Goal goal;
@@ -83,9 +117,9 @@ bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, dou
   goal.tolerance = kUndecided * threshold;
   goal.pass = threshold;
   goal.fail = threshold;
-  const DepthField depth(planes);
+  DepthField depth(planes, hull);
   if (!(maximize(depth, part, goal).upper <= threshold)) return false;
-  const SurfaceField distance(tree.of(part));
+  SurfaceField distance(tree.of(part));
   return maximize(distance, hull, goal).upper <= threshold;
 }
 

@@ -7,6 +7,7 @@
 //      choose, or nearly so.
 
 #include <algorithm>
+#include <array>
 
 #include "base/parallel.hpp"
 #include "base/stop.hpp"
@@ -17,90 +18,168 @@ namespace rlacd {
 namespace {
 
 constexpr double kRounding = 1e-12;  // points this far outside a plane count as on it
-constexpr std::size_t kChunk = 256;  // leaves
+
+std::array<Corners, 2> halves(const Corners& corner) {
+  const int k = longest_side(corner);
+  const Vec3 p = corner[k], q = corner[(k + 1) % 3], tip = corner[(k + 2) % 3], middle = 0.5 * (p + q);
+  return {{{p, middle, tip}, {middle, q, tip}}};
+}
 
 struct Body {
   explicit Body(const Mesh& hull) : planes(hull), box(Box::of(hull.vertices)) {}
-
-  // How far the planes would have to move out to take in a point; 0 inside.
-  double beyond(Vec3 p) const { return std::max(-planes.nearest(p).depth, 0.0); }
-  bool holds(const Box& own) const {
-    const Vec3 middle = 0.5 * (own.lower + own.upper), half = 0.5 * (own.upper - own.lower);
-    for (std::int32_t k = 0; k < static_cast<std::int32_t>(planes.size()); ++k)
-      if (planes.depth(k, middle) < reach_along(planes.normal(k), half)) return false;
-    return true;
-  }
 
   ConvexPlanes planes;
   Box box;
 };
 
-// Some points that a body has to take in.
-struct Taken {
-  std::size_t body;
-  Vec3 point;
+constexpr int kLevels = 5;
+
+// One child of a node of the tree.
+struct Branch {
+  std::int32_t node;
+  int side;
 };
 
-void take(const Corners& corner, const std::vector<Body>& bodies, const std::vector<std::size_t>& near, double grain,
-          std::vector<Taken>& taken) {
-  std::size_t best = 0;
-  double least = std::numeric_limits<double>::infinity();  // growth of the hull that takes the whole triangle
-  Vec3 needed = {least, least, least};                     // growth for each corner, by whichever hull
-  for (const std::size_t body : near) {
-    double most = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double growth = bodies[body].beyond(corner[k]);
-      needed[k] = std::min(needed[k], growth);
-      most = std::max(most, growth);
+class Cover {
+ public:
+  Cover(const Mesh& solid, const Bvh& bvh, const std::vector<Body>& bodies, double reach, double grain)
+      : solid_(solid), bvh_(bvh), bodies_(bodies), reach_(reach), grain_(grain), taken_(bodies.size()) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const std::size_t first = planes_.size();
+      for (std::size_t k = 0; k < bodies[i].planes.size(); ++k) planes_.push_back(static_cast<std::int32_t>(k));
+      near_.push_back({static_cast<std::int32_t>(i), first, planes_.size()});
     }
-    if (most < least) least = most, best = body;
-    if (least <= kRounding) return;
   }
-  if (least <= std::max({needed.x, needed.y, needed.z}) + grain) {
-    for (const Vec3 p : corner)
-      if (bodies[best].beyond(p) > 0) taken.push_back({best, p});
-    return;
+
+  // Goes through one child of a node and everything below it.
+  void visit(const Branch& branch) { visit(branch, {0, near_.size()}); }
+
+  const std::vector<std::vector<Vec3>>& taken() const { return taken_; }
+
+ private:
+  // A body, and those of its planes that what is looked at may reach beyond: planes_[first, last).
+  struct Near {
+    std::int32_t body;
+    std::size_t first, last;
+  };
+  struct Range {
+    std::size_t first, last;  // of near_
+  };
+
+  void visit(const Branch& branch, Range above) {
+    poll_stop();
+    const Bvh::Node& node = bvh_.nodes()[branch.node];
+    const Box& box = node.box[branch.side];
+    if (box.is_empty()) return;
+    const std::size_t planes_before = planes_.size(), first = near_.size();
+    if (!is_held(box, above)) {
+      // Where none is near, all are looked at.
+      const Range near = near_.size() > first ? Range{first, near_.size()} : Range{0, bodies_.size()};
+      const std::int32_t child = node.child[branch.side];
+      if (child >= 0) {
+        for (int side = 0; side < 2; ++side) visit({child, side}, near);
+      } else {
+        for (std::int32_t k = 0; k < node.leaf_size[branch.side]; ++k)
+          take(corners_of(solid_, solid_.faces[bvh_.face(~child + k)]), near);
+      }
+    }
+    near_.resize(first);
+    planes_.resize(planes_before);
   }
-  poll_stop();
-  const int k = longest_side(corner);
-  const Vec3 p = corner[k], q = corner[(k + 1) % 3], tip = corner[(k + 2) % 3], middle = 0.5 * (p + q);
-  take({p, middle, tip}, bodies, near, grain, taken);
-  take({middle, q, tip}, bodies, near, grain, taken);
+
+  // Appends the bodies near a box, each with the planes that the box reaches beyond; true if a body holds it.
+  bool is_held(const Box& box, Range above) {
+    const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
+    for (std::size_t i = above.first; i < above.last; ++i) {
+      const Near candidate = near_[i];
+      const Body& body = bodies_[candidate.body];
+      if (!body.box.meets(box, reach_)) continue;
+      const std::size_t first = planes_.size();
+      for (std::size_t k = candidate.first; k < candidate.last; ++k) {
+        const std::int32_t plane = planes_[k];
+        if (body.planes.depth(plane, middle) < reach_along(body.planes.normal(plane), half)) planes_.push_back(plane);
+      }
+      if (planes_.size() == first) return true;
+      near_.push_back({candidate.body, first, planes_.size()});
+    }
+    return false;
+  }
+
+  // How far a body's planes would have to move out to take in a point; 0 inside.
+  double beyond(const Near& near, Vec3 p) const {
+    const ConvexPlanes& planes = bodies_[near.body].planes;
+    double most = 0;
+    for (std::size_t k = near.first; k < near.last; ++k) most = std::max(most, -planes.depth(planes_[k], p));
+    return most;
+  }
+
+  void take(const Corners& corner, Range candidates) {
+    const Near* best = nullptr;
+    double least = std::numeric_limits<double>::infinity();  // growth of the hull that takes the whole triangle
+    Vec3 needed = {least, least, least};                     // growth for each corner, by whichever hull
+    for (std::size_t i = candidates.first; i < candidates.last; ++i) {
+      double most = 0;
+      for (int k = 0; k < 3; ++k) {
+        const double growth = beyond(near_[i], corner[k]);
+        needed[k] = std::min(needed[k], growth);
+        most = std::max(most, growth);
+      }
+      if (most < least) least = most, best = &near_[i];
+      if (least <= kRounding) return;
+    }
+    if (least <= std::max({needed.x, needed.y, needed.z}) + grain_) {
+      for (const Vec3 p : corner)
+        if (beyond(*best, p) > 0) taken_[best->body].push_back(p);
+      return;
+    }
+    poll_stop();
+    for (const Corners& half : halves(corner)) take(half, candidates);
+  }
+
+  const Mesh& solid_;
+  const Bvh& bvh_;
+  const std::vector<Body>& bodies_;
+  const double reach_, grain_;
+  // First all bodies with all their planes, then those near each node on the way to the one that is looked at.
+  std::vector<Near> near_;
+  std::vector<std::int32_t> planes_;
+  std::vector<std::vector<Vec3>> taken_;
+};
+
+// The branches of the tree at a fixed depth: the same work for any number of threads.
+std::vector<Branch> branches(const Bvh& bvh) {
+  std::vector<Branch> found = {{0, 0}, {0, 1}};
+  for (int level = 0; level < kLevels; ++level) {
+    std::vector<Branch> below;
+    for (const Branch& branch : found) {
+      const std::int32_t child = bvh.nodes()[branch.node].child[branch.side];
+      if (child < 0) {
+        below.push_back(branch);
+        continue;
+      }
+      for (int side = 0; side < 2; ++side) below.push_back({child, side});
+    }
+    found = std::move(below);
+  }
+  return found;
 }
 
 }  // namespace
 
 std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
                                          double grain, int threads) {
-  struct Leaf {
-    Box box;
-    std::int32_t slot, size;
-  };
-  std::vector<Leaf> leaves;
-  for (const Bvh::Node& node : bvh.nodes())
-    for (int side = 0; side < 2; ++side)
-      if (node.leaf_size[side] > 0) leaves.push_back({node.box[side], ~node.child[side], node.leaf_size[side]});
-  std::sort(leaves.begin(), leaves.end(), [](const Leaf& a, const Leaf& b) { return a.slot < b.slot; });
   std::vector<Body> bodies;
-  std::vector<std::size_t> all;
-  for (const Mesh& hull : hulls) all.push_back(bodies.size()), bodies.emplace_back(hull);
-  std::vector<std::vector<Taken>> taken((leaves.size() + kChunk - 1) / kChunk);
-  parallel_for(taken.size(), threads, [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kChunk; i < std::min(leaves.size(), (chunk + 1) * kChunk); ++i) {
-      const Leaf& leaf = leaves[i];
-      std::vector<std::size_t> near;
-      for (const std::size_t body : all)
-        if (bodies[body].box.meets(leaf.box, reach)) near.push_back(body);
-      if (std::any_of(near.begin(), near.end(), [&](std::size_t body) { return bodies[body].holds(leaf.box); }))
-        continue;
-      for (std::int32_t slot = leaf.slot; slot < leaf.slot + leaf.size;
-           ++slot)  // where none is near, all are looked at
-        take(corners_of(mesh, mesh.faces[bvh.face(slot)]), bodies, near.empty() ? all : near, grain, taken[chunk]);
-    }
+  for (const Mesh& hull : hulls) bodies.emplace_back(hull);
+  const std::vector<Branch> work = branches(bvh);
+  std::vector<std::vector<std::vector<Vec3>>> taken(work.size());
+  parallel_for(work.size(), threads, [&](std::size_t i) {
+    Cover cover(mesh, bvh, bodies, reach, grain);
+    cover.visit(work[i]);
+    taken[i] = cover.taken();
   });
   std::vector<std::vector<Vec3>> result(hulls.size());
-  for (const std::vector<Taken>& some : taken)
-    for (const auto& [body, point] : some) result[body].push_back(point);
+  for (const auto& own : taken)
+    for (std::size_t i = 0; i < own.size(); ++i) result[i].insert(result[i].end(), own[i].begin(), own[i].end());
   return result;
 }
 

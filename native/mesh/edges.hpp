@@ -25,6 +25,11 @@ class Buckets {
   std::pair<Item*, Item*> range(std::size_t key) {
     return {items_.data() + begin_[key], items_.data() + begin_[key + 1]};
   }
+  // Calls task(item) for those with keys in [from, to).
+  template <class Task>
+  void for_each(std::size_t from, std::size_t to, const Task& task) const {
+    for (std::size_t i = begin_[from]; i < begin_[to]; ++i) task(items_[i]);
+  }
 
  private:
   std::vector<std::size_t> begin_, next_;

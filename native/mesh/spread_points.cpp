@@ -23,7 +23,7 @@ int steps(double length, double spacing) {
 
 // Calls take(point) for all points of one face.
 template <class Take>
-void spread_over(const Mesh& mesh, const Triangle& face, double spacing, const Take& take) {
+void spread_over(const Mesh& mesh, const Triangle& face, double spacing, bool corners_suffice, const Take& take) {
   // From a to b along the longest edge; rows are parallel to it.
   Vec3 a, b, c;
   double longest2 = -1;
@@ -34,6 +34,10 @@ void spread_over(const Mesh& mesh, const Triangle& face, double spacing, const T
     a = p, b = q, c = mesh.vertices[face[(corner + 2) % 3]];
   }
   const double base = std::sqrt(longest2);
+  if (corners_suffice && base <= spacing) {
+    for (const std::int32_t corner : face) take(mesh.vertices[corner]);
+    return;
+  }
   const double height = norm(cross(b - a, c - a)) / std::max(base, std::numeric_limits<double>::min());
   const int columns = steps(base, spacing), rows = steps(height, spacing);
   for (int row = 0; row < rows; ++row) {
@@ -67,10 +71,38 @@ SpreadPoints spread_points(const Mesh& mesh, double spacing) {
   SpreadPoints spread;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     if (f % kBetweenPolls == 0) poll_stop();
-    spread_over(mesh, mesh.faces[f], spacing, [&](Vec3 point) { spread.points.push_back(point); });
+    spread_over(mesh, mesh.faces[f], spacing, false, [&](Vec3 point) { spread.points.push_back(point); });
     spread.faces.resize(spread.points.size(), static_cast<std::int32_t>(f));
   }
   return spread;
+}
+
+MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int64_t margin) {
+  MarkedCells cells;
+  const auto for_each = [&](const auto& take) {
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+      if (f % kBetweenPolls == 0) poll_stop();
+      spread_over(mesh, mesh.faces[f], spacing, true, take);
+    }
+  };
+  Box box;
+  for_each([&](Vec3 point) { box.extend(point); });
+  const double room = static_cast<double>(margin) * pitch;
+  cells.origin = box.lower - Vec3{room, room, room};
+  const auto cell_of = [&](Vec3 point) {
+    Cell cell;
+    for (int axis = 0; axis < 3; ++axis)
+      cell[axis] = static_cast<std::int64_t>(std::nearbyint((point[axis] - cells.origin[axis]) / pitch));
+    return cell;
+  };
+  const Cell last = cell_of(box.upper);
+  for (int axis = 0; axis < 3; ++axis) cells.shape[axis] = last[axis] + 1 + margin;
+  cells.marks.resize(cells.shape[0] * cells.shape[1] * cells.shape[2]);
+  for_each([&](Vec3 point) {
+    const Cell cell = cell_of(point);
+    cells.marks[(cell[0] * cells.shape[1] + cell[1]) * cells.shape[2] + cell[2]] = 1;
+  });
+  return cells;
 }
 
 std::vector<std::int64_t> label_cells(const bool* marks, Cell shape) {
@@ -113,14 +145,14 @@ std::vector<std::int64_t> nearest_labels(const std::int64_t* labels, Cell shape,
   return nearest;
 }
 
-SurfaceSamples sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed) {
+SpreadPoints sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed) {
   std::vector<double> area_up_to(mesh.faces.size());
   double area = 0;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     area += norm(long_normal(mesh, mesh.faces[f]));
     area_up_to[f] = area;
   }
-  SurfaceSamples samples;
+  SpreadPoints samples;
   if (count == 0) return samples;
   if (!(area > 0)) throw std::invalid_argument("the surface has no area to sample");
 

@@ -9,15 +9,26 @@
 
 namespace rlacd {
 
-// A grid over every face such that no point of it is farther than `spacing` from a grid point.
 struct SpreadPoints {
-  std::vector<Vec3> points;         // corners included
+  std::vector<Vec3> points;
   std::vector<std::int32_t> faces;  // [N], the face each lies on, ascending
 };
-// The spacing is positive. Grids have at most 768 rows and columns.
+
+// A grid over every face, corners included, such that no point of it is farther than `spacing`, which is positive, from
+// a grid point. Grids have at most 768 rows and columns.
 SpreadPoints spread_points(const Mesh& mesh, double spacing);
 
 using Cell = std::array<std::int64_t, 3>;
+
+// A grid [X, Y, Z] of cells, the last axis fastest, of size `pitch`, the first of them around `origin`, with those
+// marked that hold any of these points: of faces no larger than the spacing, the corners are enough. `margin` cells
+// around them are free.
+struct MarkedCells {
+  Vec3 origin;
+  Cell shape = {0, 0, 0};
+  std::vector<char> marks;
+};
+MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int64_t margin);
 
 // Labels of the connected sets of marked cells of a grid [X, Y, Z], the last axis fastest, which share sides, ascending
 // by their first cells; 0 for the others.
@@ -34,11 +45,6 @@ std::vector<std::int64_t> nearest_labels(const std::int64_t* labels, Cell shape,
 // triangle taken from the two-dimensional additive recurrence of the plastic number, randomly shifted, so that
 // neighbours in one triangle keep apart. The only generator is a counter put through SplitMix64, and the only
 // operations are IEEE-exact: the same bits everywhere.
-struct SurfaceSamples {
-  std::vector<Vec3> points;
-  std::vector<std::int32_t> faces;
-};
-
-SurfaceSamples sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed);
+SpreadPoints sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed);
 
 }  // namespace rlacd

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rlacd import _native
 from rlacd._native import label_cells, nearest_labels, poll_stop
-from rlacd.repair.distance import SurfaceQuery, points_covering
+from rlacd.repair.distance import SurfaceQuery
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.topology import BoolArray, IntArray
@@ -55,11 +56,8 @@ class Reach:
         """Roll a ball around a surface; the longest side of the frame has `resolution` cells."""
         pitch = 2.0 / resolution
         margin = int(np.ceil(radius / pitch)) + 3
-        points, _ = points_covering(vertices, faces.astype(np.int64), pitch / 2)
-        origin = points.min(axis=0) - margin * pitch
-        cells = np.rint((points - origin) / pitch).astype(np.int64)
-        occupied = np.zeros(cells.max(axis=0) + 1 + margin, dtype=bool)
-        occupied[tuple(cells.T)] = True
+        origin, marks, shape = _native.mark_cells(vertices, faces.astype(np.int64), pitch / 2, pitch, margin)
+        occupied = np.frombuffer(marks, dtype=bool).reshape(shape)
         poll_stop()
         label = label_cells(~_grown(occupied, radius / pitch)).reshape(occupied.shape)
         outside = label == label[0, 0, 0]
