@@ -127,6 +127,14 @@ struct Box {
   }
 };
 
+// The box of the corners of a mesh's faces.
+inline Box box_of_faces(const Mesh& mesh) {
+  Box box;
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face) box.extend(mesh.vertices[corner]);
+  return box;
+}
+
 struct HalfSpace {  // normal . x <= offset
   Vec3 normal;
   double offset;

@@ -16,9 +16,7 @@ class DepthField {
  public:
   DepthField(const ConvexPlanes& planes, const Mesh& hull) : planes_(planes) {
     settled_.fill(-1);
-    Box box;
-    for (const Triangle& face : hull.faces)
-      for (const std::int32_t corner : face) box.extend(hull.vertices[corner]);
+    const Box box = box_of_faces(hull);
     centre_ = 0.5 * (box.lower + box.upper);
     const Vec3 half = 0.5 * (box.upper - box.lower);
     for (int axis = 0; axis < 3; ++axis) shrink_[axis] = half[axis] > 0 ? 1 / half[axis] : 0;

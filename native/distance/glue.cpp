@@ -128,13 +128,6 @@ std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
   return result;
 }
 
-Box box_of(const Mesh& mesh) {
-  Box box;
-  for (const Triangle& face : mesh.faces)
-    for (const std::int32_t corner : face) box.extend(mesh.vertices[corner]);
-  return box;
-}
-
 // Appends to `out` the part of mesh `a` that does not touch `b`.
 void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common) {
   const std::vector<Facet> others = facets_within(b, common);
@@ -197,7 +190,7 @@ bool share_area(const Facet& facet, const Facet& other) {
 }  // namespace
 
 Mesh glue(const Mesh& a, const Mesh& b) {
-  const Box box_a = box_of(a), box_b = box_of(b);
+  const Box box_a = box_of_faces(a), box_b = box_of_faces(b);
   Box common;
   for (int axis = 0; axis < 3; ++axis) {
     common.lower[axis] = std::max(box_a.lower[axis], box_b.lower[axis]);
@@ -214,8 +207,8 @@ Mesh glue(const Mesh& a, const Mesh& b) {
 }
 
 bool do_touch(const Mesh& a, const Mesh& b) {
-  const std::vector<Facet> others = facets_within(b, box_of(a));
-  for (const Facet& facet : facets_within(a, box_of(b))) {
+  const std::vector<Facet> others = facets_within(b, box_of_faces(a));
+  for (const Facet& facet : facets_within(a, box_of_faces(b))) {
     poll_stop();
     if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
       return true;
@@ -224,8 +217,8 @@ bool do_touch(const Mesh& a, const Mesh& b) {
 }
 
 void add_touching_planes(std::vector<TouchingPlane>& planes, const Mesh& a, const Mesh& b) {
-  const std::vector<Facet> others = facets_within(b, box_of(a));
-  std::vector<Facet> own = facets_within(a, box_of(b));
+  const std::vector<Facet> others = facets_within(b, box_of_faces(a));
+  std::vector<Facet> own = facets_within(a, box_of_faces(b));
   // Large faces first: their planes are the most exact.
   std::stable_sort(own.begin(), own.end(), [](const Facet& f, const Facet& g) { return f.height > g.height; });
   for (const Facet& facet : own) {
