@@ -166,7 +166,7 @@ void bind_mesh(nb::module_& m) {
         "labels"_a, "cells"_a, "reach"_a,
         "The label [N] of the nearest labelled cell of a grid [X, Y, Z] at most `reach` cells away from each cell [N, "
         "3]; 0 where there is none.");
-  m.def("closed_bodies", released([](const Mesh& mesh) {
+  m.def("closed_bodies", released([](const AnyMesh& mesh) {
           ClosedBodies found = closed_bodies(mesh);
           auto bodies = std::tuple(std::move(found.body), std::move(found.volume), std::move(found.area),
                                    std::move(found.box), found.has_no_pinch, found.least_height, found.least_fold);
@@ -177,18 +177,20 @@ void bind_mesh(nb::module_& m) {
         "the body [F] of each face; signed volume [B], area [B] and box [B, 6] of each body; whether the faces around "
         "each vertex are all neighbours; the least height of a face, and the least length of the sum of the unit "
         "normals of neighbours.");
-  m.def("along_a_curve", released(along_a_curve), "vertices"_a, "faces"_a,
+  m.def("along_a_curve", released([](const AnyMesh& mesh) { return along_a_curve(mesh); }), "vertices"_a, "faces"_a,
         "The same mesh with vertices [V, 3] and faces [F, 3] along a space-filling curve: neighbours in space are near "
         "in memory.");
-  m.def("mesh_volume", released(mesh_volume), "vertices"_a, "faces"_a, "Signed volume of a closed triangle mesh.");
-  m.def("mesh_area", released(mesh_area), "vertices"_a, "faces"_a, "Area of a triangle mesh.");
-  m.def("principal_axes", released([](const Mesh& mesh) {
+  m.def("mesh_volume", released([](const AnyMesh& mesh) { return mesh_volume(mesh); }), "vertices"_a, "faces"_a,
+        "Signed volume of a closed triangle mesh.");
+  m.def("mesh_area", released([](const AnyMesh& mesh) { return mesh_area(mesh); }), "vertices"_a, "faces"_a,
+        "Area of a triangle mesh.");
+  m.def("principal_axes", released([](const AnyMesh& mesh) {
           const std::array<Vec3, 3> axes = principal_axes(mesh);
           return std::vector<Vec3>(axes.begin(), axes.end());
         }),
         "vertices"_a, "faces"_a,
         "Principal axes [3, 3] of a surface, one per row, longest first, the largest entry of each positive.");
-  m.def("mesh_mass", released([](const Mesh& mesh) {
+  m.def("mesh_mass", released([](const AnyMesh& mesh) {
           const Mass mass = mesh_mass(mesh);
           return std::tuple(mass.volume, std::vector{mass.centre.x, mass.centre.y, mass.centre.z},
                             std::vector<Vec3>(mass.inertia.begin(), mass.inertia.end()));

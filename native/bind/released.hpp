@@ -95,7 +95,8 @@ std::vector<std::int32_t> to_numbers(const Array& array, std::size_t count) {
   return to_indices<std::int32_t>(array, static_cast<std::int64_t>(count), "a number is out of range");
 }
 
-// A mesh of the width that Python's own topology has, whose vertices may be anything.
+// Meshes whose vertices may be anything; the faces of a wide one have the width of Python's own topology.
+struct AnyMesh : Mesh {};
 struct WideMesh : Mesh {};
 
 // From which arguments a kernel's parameter is made, and how.
@@ -111,6 +112,13 @@ struct FromArrays<Mesh> {
   using Arguments = std::tuple<PointsIn, FacesIn>;
   static Mesh make(const PointsIn& vertices, const FacesIn& faces) {
     return {to_points(vertices), to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)))};
+  }
+};
+template <>
+struct FromArrays<AnyMesh> {
+  using Arguments = std::tuple<PointsIn, FacesIn>;
+  static AnyMesh make(const PointsIn& vertices, const FacesIn& faces) {
+    return {{copied<Vec3>(vertices), to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)))}};
   }
 };
 template <>
