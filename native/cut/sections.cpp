@@ -13,6 +13,8 @@ namespace {
 constexpr double kFilm = 1e-13;         // relative to the mesh
 constexpr std::size_t kManyEdges = 24;  // at one vertex; testing all pairs of more would take too long
 constexpr double kFlat = 1e-12;         // sine of an angle that counts as zero
+constexpr std::size_t kFew = 20;        // sorting this few points is fast
+constexpr double kWellInside = 1e-12;   // share of the area of the points' box: far above rounding
 
 int axis_of(Vec3 n) {
   for (int axis = 0; axis < 3; ++axis)
@@ -20,11 +22,36 @@ int axis_of(Vec3 n) {
   return -1;
 }
 
+// Drops most points well inside the octagon of the extreme points in eight directions, so that less is left to sort
+// (Akl and Toussaint, "A Fast Convex Hull Algorithm", 1978).
+template <int drop>
+void drop_inner(std::vector<Vec3>& points) {
+  constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
+  constexpr double direction[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+  double most[8];
+  Vec3 outermost[8];
+  std::fill(std::begin(most), std::end(most), -std::numeric_limits<double>::infinity());
+  for (const Vec3 p : points)
+    for (int k = 0; k < 8; ++k)
+      if (const double s = direction[k][0] * p[u] + direction[k][1] * p[v]; s > most[k]) most[k] = s, outermost[k] = p;
+  const double well = kWellInside * (most[0] + most[4]) * (most[2] + most[6]);
+  if (!(well > 0)) return;  // the points are collinear or equal: the octagon has no interior
+  const auto is_inside = [&](Vec3 p) {
+    for (int k = 0; k < 8; ++k) {
+      const Vec3 a = outermost[k], b = outermost[(k + 1) % 8];
+      if ((b[u] - a[u]) * (p[v] - a[v]) - (b[v] - a[v]) * (p[u] - a[u]) <= well && !(a == b)) return false;
+    }
+    return true;
+  };
+  points.erase(std::remove_if(points.begin(), points.end(), is_inside), points.end());
+}
+
 // Corners of the convex hull of points on a plane, by Andrew's monotone chain in the coordinates other than `drop`.
 // Rounding may drop a corner that protrudes by about 1e-16, which no volume depends on.
 template <int drop>
 void reduce_to_planar_hull(std::vector<Vec3>& points) {
   if (points.size() < 4) return;
+  if (points.size() > kFew) drop_inner<drop>(points);
   constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
   std::sort(points.begin(), points.end(), [](Vec3 a, Vec3 b) {
     return a[u] != b[u] ? a[u] < b[u] : a[v] != b[v] ? a[v] < b[v] : a[drop] < b[drop];
@@ -151,13 +178,26 @@ void Sections::project() {
   for (std::size_t i = 0; i < count; ++i) {
     const double s = dot(normal_, mesh_.vertices[i]);
     heights_[i] = s;
-    above_[i] = static_cast<std::int32_t>(std::upper_bound(offsets_.begin(), offsets_.end(), s) - offsets_.begin());
+    above_[i] = first_above(s);
     if (!solid_.is_corner[i]) continue;
     is_on_plane_ = is_on_plane_ || (above_[i] > 0 && offsets_[above_[i] - 1] == s);
     lowest_ = std::min(lowest_, s);
     highest_ = std::max(highest_, s);
   }
   film_ = kFilm * (highest_ - lowest_);
+}
+
+// Planes are usually equidistant: then the first guess is right.
+std::int32_t Sections::first_above(double height) const {
+  if (offsets_.empty()) return 0;
+  const auto planes = static_cast<std::int32_t>(offsets_.size());
+  const double width = offsets_.back() - offsets_.front();
+  const double share = width > 0 ? (height - offsets_.front()) / width : 0;
+  auto j = share > 0 ? share < 1 ? static_cast<std::int32_t>(share * (planes - 1)) + 1 : planes : 0;
+  while (j < planes && offsets_[j] <= height) ++j;
+  while (j > 0 && offsets_[j - 1] > height) --j;
+  RLACD_ASSERT(j == planes || offsets_[j] > height);
+  return j;
 }
 
 std::size_t Sections::first_from(std::int32_t vertex) const {

@@ -66,6 +66,7 @@ class Sections {
 
  private:
   void project();
+  std::int32_t first_above(double height) const;
   void fill_slabs();
   void cut_edges();
   void measure_solid();
