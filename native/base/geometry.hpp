@@ -30,6 +30,11 @@ inline Vec3 normalized(Vec3 a) {
   const double n = norm(a);
   return n > 0 ? (1 / n) * a : a;
 }
+// The axis along which a vector is longest, the first of several.
+inline int longest_axis(Vec3 v) {
+  const Vec3 a = {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)};
+  return a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
+}
 inline double max_abs(Vec3 a) { return std::max(std::max(std::fabs(a.x), std::fabs(a.y)), std::fabs(a.z)); }
 
 using Triangle = std::array<std::int32_t, 3>;  // indices of the corners, counter-clockwise seen from outside
@@ -74,6 +79,11 @@ inline int longest_side(const Corners& t) {
   return longest;
 }
 
+inline std::vector<Vec3> joined(std::vector<Vec3> points, const std::vector<Vec3>& others) {
+  points.insert(points.end(), others.begin(), others.end());
+  return points;
+}
+
 inline void append(Mesh& out, const Mesh& other) {
   const auto first = static_cast<std::int32_t>(out.vertices.size());
   out.vertices.insert(out.vertices.end(), other.vertices.begin(), other.vertices.end());
@@ -110,13 +120,24 @@ struct Box {
     return true;
   }
   double distance2(Vec3 p) const {
-    double sum = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double d = std::max({lower[axis] - p[axis], p[axis] - upper[axis], 0.0});
-      sum += d * d;
-    }
-    return sum;
+    const double x = std::max(std::max(lower.x - p.x, p.x - upper.x), 0.0);
+    const double y = std::max(std::max(lower.y - p.y, p.y - upper.y), 0.0);
+    const double z = std::max(std::max(lower.z - p.z, p.z - upper.z), 0.0);
+    return x * x + y * y + z * z;
   }
+};
+
+// The box of the corners of a mesh's faces.
+inline Box box_of_faces(const Mesh& mesh) {
+  Box box;
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face) box.extend(mesh.vertices[corner]);
+  return box;
+}
+
+struct HalfSpace {  // normal . x <= offset
+  Vec3 normal;
+  double offset;
 };
 
 // How far a box reaches from its middle along a direction, given half its extents.

@@ -1,10 +1,9 @@
 #include "base/interrupts.hpp"
 
+#include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <csignal>
 #include <cstdlib>
-#include <mutex>
 #include <thread>
 
 namespace rlacd {
@@ -24,53 +23,29 @@ void count(int number) {
   if (others != SIG_DFL && others != SIG_IGN) others(number);
 }
 
-class Watcher {
- public:
-  ~Watcher() { end(); }
+std::atomic<int> latest{0};  // of the watchers, which end once there is another number
 
-  void begin(int code, double grace) {
-    end();
-    is_over_ = false;
-    watcher_ = std::thread([this, code, grace] { watch(code, grace); });
+void watch(int own, int code, double grace) {
+  for (double left = grace; left > 0 && latest == own;) {
+    std::this_thread::sleep_for(kBetweenLooks);
+    if (interrupts >= kQuit) left -= std::chrono::duration<double>(kBetweenLooks).count();
   }
-
-  void end() {
-    {
-      const std::lock_guard<std::mutex> lock(guard_);
-      is_over_ = true;
-    }
-    changed_.notify_all();
-    if (watcher_.joinable()) watcher_.join();
-  }
-
- private:
-  void watch(int code, double grace) {
-    std::unique_lock<std::mutex> lock(guard_);
-    const auto has_ended = [this] { return is_over_; };
-    while (interrupts < kQuit)
-      if (changed_.wait_for(lock, kBetweenLooks, has_ended)) return;
-    if (!changed_.wait_for(lock, std::chrono::duration<double>(grace), has_ended)) std::_Exit(code);
-  }
-
-  std::mutex guard_;
-  std::condition_variable changed_;
-  std::thread watcher_;
-  bool is_over_ = true;
-} watcher;
+  if (latest == own) std::_Exit(code);
+}
 
 }  // namespace
 
 void count_interrupts(int code, double grace) {
   forget_interrupts();
   interrupts = 0;
-  watcher.begin(code, grace);
+  std::thread(watch, ++latest, code, grace).detach();
   others = std::signal(SIGINT, count);
 }
 
 void forget_interrupts() {
   if (others != SIG_DFL) std::signal(SIGINT, others);
   others = SIG_DFL;
-  watcher.end();
+  ++latest;
 }
 
 }  // namespace rlacd

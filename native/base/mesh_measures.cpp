@@ -1,4 +1,3 @@
-// Volume, area, axes and mass of triangle meshes: see mesh_measures.hpp for input and output.
 #include "base/mesh_measures.hpp"
 
 #include <algorithm>
@@ -13,14 +12,14 @@ constexpr double kRounding = 1e-15;  // entries this small beside the trace are 
 constexpr int kSweeps = 30;          // five are enough
 
 // Second moments of the surface about its centroid, row-major, up to a positive factor; exact over each triangle.
-std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+std::array<Vec3, 3> mesh_moments(const Mesh& mesh) {
   std::vector<double> areas;
-  areas.reserve(faces.size());
+  areas.reserve(mesh.faces.size());
   double total = 0;
   Vec3 centroid;
-  for (const Triangle& f : faces) {
-    const Vec3 a = vertices[f[0]], b = vertices[f[1]], c = vertices[f[2]];
-    areas.push_back(norm(cross(b - a, c - a)));
+  for (const Triangle& f : mesh.faces) {
+    const auto [a, b, c] = corners_of(mesh, f);
+    areas.push_back(norm(long_normal(mesh, f)));
     total += areas.back();
     centroid = centroid + areas.back() / 3 * (a + b + c);
   }
@@ -30,9 +29,9 @@ std::array<Vec3, 3> mesh_moments(const std::vector<Vec3>& vertices, const std::v
   const auto add = [&moments](double weight, Vec3 p) {
     for (int i = 0; i < 3; ++i) moments[i] = moments[i] + weight * p[i] * p;
   };
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    const Vec3 a = vertices[faces[i][0]] - centroid, b = vertices[faces[i][1]] - centroid,
-               c = vertices[faces[i][2]] - centroid;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const Corners t = corners_of(mesh, mesh.faces[i]);
+    const Vec3 a = t[0] - centroid, b = t[1] - centroid, c = t[2] - centroid;
     const double weight = areas[i] / total;
     for (const Vec3 p : {a, b, c, a + b + c}) add(weight, p);
   }
@@ -56,24 +55,26 @@ void rotate(std::array<Vec3, 3>& moments, std::array<Vec3, 3>& axes, int p, int 
 
 }  // namespace
 
-double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
-  if (faces.empty()) return 0;
-  const Vec3 apex = vertices[faces[0][0]];
+double mesh_volume(const Mesh& mesh) {
+  if (mesh.faces.empty()) return 0;
+  const Vec3 apex = mesh.vertices[mesh.faces[0][0]];
   double sum = 0;
-  for (const Triangle& f : faces)
-    sum += dot(vertices[f[0]] - apex, cross(vertices[f[1]] - apex, vertices[f[2]] - apex));
+  for (const Triangle& f : mesh.faces) {
+    const auto [a, b, c] = corners_of(mesh, f);
+    sum += dot(a - apex, cross(b - apex, c - apex));
+  }
   return sum / 6;
 }
 
-double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+double mesh_area(const Mesh& mesh) {
   double sum = 0;
-  for (const Triangle& f : faces) sum += norm(cross(vertices[f[1]] - vertices[f[0]], vertices[f[2]] - vertices[f[0]]));
+  for (const Triangle& f : mesh.faces) sum += norm(long_normal(mesh, f));
   return sum / 2;
 }
 
 // Jacobi's method takes sums, products, quotients and square roots alone, which IEEE 754 rounds the same everywhere.
-std::array<Vec3, 3> principal_axes(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
-  std::array<Vec3, 3> moments = mesh_moments(vertices, faces);
+std::array<Vec3, 3> principal_axes(const Mesh& mesh) {
+  std::array<Vec3, 3> moments = mesh_moments(mesh);
   std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   const double negligible = kRounding * (moments[0].x + moments[1].y + moments[2].z);
   bool turned = true;
@@ -100,15 +101,16 @@ std::array<Vec3, 3> principal_axes(const std::vector<Vec3>& vertices, const std:
 
 // Sums over the tetrahedra between the faces and an apex, all relative to the apex: with corners 0, a, b, c, s = a + b
 // + c and volume v, the integral of x is v s / 4, and that of x x^T is v (a a^T + b b^T + c c^T + s s^T) / 20.
-Mass mesh_mass(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
+Mass mesh_mass(const Mesh& mesh) {
   Mass mass;
-  if (faces.empty()) return mass;
-  const Vec3 apex = vertices[faces[0][0]];
+  if (mesh.faces.empty()) return mass;
+  const Vec3 apex = mesh.vertices[mesh.faces[0][0]];
   double sixfold = 0;
   Vec3 first;
   std::array<Vec3, 3> second{};
-  for (const Triangle& f : faces) {
-    const Vec3 a = vertices[f[0]] - apex, b = vertices[f[1]] - apex, c = vertices[f[2]] - apex, s = a + b + c;
+  for (const Triangle& f : mesh.faces) {
+    const Corners t = corners_of(mesh, f);
+    const Vec3 a = t[0] - apex, b = t[1] - apex, c = t[2] - apex, s = a + b + c;
     const double v = dot(a, cross(b, c));
     sixfold += v;
     first = first + v * s;

@@ -1,21 +1,20 @@
 // Volume, area, axes and mass of triangle meshes, summed face by face: the same bits on every machine.
 //
-// Input:  vertices and faces; for the volume, of a closed oriented mesh.
+// Input:  a mesh; for the volume, a closed oriented one.
 // Output: the enclosed volume, the surface area, the principal axes of the surface, and the mass of the solid.
 #pragma once
 
 #include <array>
-#include <vector>
 
 #include "base/geometry.hpp"
 
 namespace rlacd {
 
-double mesh_volume(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
-double mesh_area(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
+double mesh_volume(const Mesh& mesh);
+double mesh_area(const Mesh& mesh);
 
 // Unit vectors along the principal axes of the surface, longest first, the largest entry of each positive.
-std::array<Vec3, 3> principal_axes(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
+std::array<Vec3, 3> principal_axes(const Mesh& mesh);
 
 // Volume, centre of mass, and inertia about it, row-major, of the solid of density one in a closed mesh.
 struct Mass {
@@ -23,6 +22,6 @@ struct Mass {
   Vec3 centre;
   std::array<Vec3, 3> inertia{};
 };
-Mass mesh_mass(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces);
+Mass mesh_mass(const Mesh& mesh);
 
 }  // namespace rlacd

@@ -1,160 +1,259 @@
-// Python bindings of the surface queries: closest points, winding numbers, samples, one-sided Hausdorff distance.
-
-#include "base/arrays.hpp"
+// Python bindings of distances: of points, of a part from its hull, of hulls from a solid and of their union.
 #include "base/parallel.hpp"
+#include "bind/released.hpp"
 #include "distance/apart.hpp"
-#include "distance/crossings.hpp"
-#include "distance/hausdorff.hpp"
-#include "distance/sample.hpp"
+#include "distance/concavity.hpp"
+#include "distance/filling.hpp"
+#include "distance/glue.hpp"
 #include "distance/surface.hpp"
+#include "distance/surface_field.hpp"
+#include "distance/union_distance.hpp"
 
 namespace rlacd {
+
+constexpr int fields(Tag<Interval>) { return 2; }
+
 namespace {
 
-using LabelsIn = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+constexpr std::size_t kChunk = 256;  // points, enough to justify a thread
 
-constexpr std::size_t kChunk = 256;
+// Runs task(begin, end) for the chunks of a number of points.
+template <class Task>
+void for_each_chunk(std::size_t count, int threads, const Task& task) {
+  parallel_for((count + kChunk - 1) / kChunk, threads,
+               [&](std::size_t chunk) { task(chunk * kChunk, std::min(count, (chunk + 1) * kChunk)); });
+}
 
 // The closest points of a surface: neighbours in the list are often near each other, so the triangle found for one
-// point bounds the distance of the next. The bound allows for rounding, so
-// that the triangle found is the same without it.
-template <class Take>
-void for_each_closest(const Bvh& bvh, const std::vector<Vec3>& points, int threads, const Take& take) {
-  const std::size_t chunks = (points.size() + kChunk - 1) / kChunk;
-  parallel_for(chunks, threads, [&](std::size_t chunk) {
+// point bounds the distance of the next. The bound allows for rounding, so that the triangle found is the same without
+// it.
+std::vector<Bvh::Hit> closest(const Bvh& bvh, const std::vector<Vec3>& points, int threads) {
+  std::vector<Bvh::Hit> hits(points.size());
+  for_each_chunk(points.size(), threads, [&](std::size_t begin, std::size_t end) {
     std::int32_t near = -1;
-    for (std::size_t i = chunk * kChunk; i < std::min(points.size(), (chunk + 1) * kChunk); ++i) {
-      Bvh::Hit hit;
+    for (std::size_t i = begin; i < end; ++i) {
       if (near >= 0) {
         const double known = bvh.distance(near, points[i]), slack = 1e-7 * std::sqrt(bvh.triangle(near).longest2);
-        hit = bvh.closest(points[i], -1, 0, known + slack);
+        hits[i] = bvh.closest(points[i], -1, 0, known + slack);
       }
-      if (hit.slot < 0) hit = bvh.closest(points[i]);
-      near = hit.slot;
-      take(i, hit);
+      if (hits[i].slot < 0) hits[i] = bvh.closest(points[i]);
+      near = hits[i].slot;
     }
   });
+  return hits;
 }
 
-// Runs task(i) for every point without the GIL, in chunks large enough to justify a thread.
-template <class Task>
-void for_each_point(std::size_t count, int threads, const Task& task) {
-  const std::size_t chunks = (count + kChunk - 1) / kChunk;
-  parallel_for(chunks, threads, [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i);
-  });
+void require_positive(double tolerance, double gap = 1) {
+  require(tolerance > 0, "the tolerance must be positive");
+  require(gap > 0, "the gap must be positive");
 }
 
-void require_positive_tolerance(double tolerance) {
-  if (!(tolerance > 0)) throw std::invalid_argument("the tolerance must be positive");
+auto as_tuple(const Greatest& found) {
+  return std::tuple(found.lower, found.upper, std::tuple(found.at.x, found.at.y, found.at.z));
+}
+
+void bind_surface(nb::module_& m) {
+  nb::class_<Surface>(m, "Surface",
+                      "A triangle surface and a tree of boxes over it. Any quality: open, self-intersecting, slivers.")
+      .def("__init__", released([](Surface* self, const Mesh& mesh, int threads) {
+             require(!mesh.faces.empty(), "the surface has no faces");
+             new (self) Surface(mesh, threads);
+           }),
+           "vertices"_a, "faces"_a, "threads"_a = 1)
+      .def("distance", released([](const Surface& self, const std::vector<Vec3>& points, int threads) {
+             std::vector<double> distances;
+             for (const Bvh::Hit& hit : closest(self.bvh(), points, threads))
+               distances.push_back(std::sqrt(hit.distance2));
+             return distances;
+           }),
+           "points"_a, "threads"_a = 0, "Unsigned distances [N] of points [N, 3] to the surface.")
+      .def("closest", released([](const Surface& self, const std::vector<Vec3>& points, int threads) {
+             std::vector<Vec3> at;
+             std::vector<std::int32_t> faces;
+             for (const Bvh::Hit& hit : closest(self.bvh(), points, threads))
+               at.push_back(hit.point), faces.push_back(self.bvh().face(hit.slot));
+             return std::pair(std::move(at), std::move(faces));
+           }),
+           "points"_a, "threads"_a = 0,
+           "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
+      .def("winding",
+           released(
+               [](const Surface& self, const std::vector<Vec3>& points, double accuracy, int threads, bool is_closed) {
+                 require(accuracy >= 1, "the accuracy must be at least 1");
+                 std::vector<double> windings(points.size());
+                 const Winding& winding = self.winding();
+                 for_each_chunk(points.size(), threads, [&](std::size_t begin, std::size_t end) {
+                   for (std::size_t i = begin; i < end; ++i)
+                     windings[i] = is_closed ? winding.of_closed(points[i]) : winding.at(points[i], accuracy);
+                 });
+                 return windings;
+               }),
+           "points"_a, "accuracy"_a = 2.0, "threads"_a = 0, "is_closed"_a = false,
+           "Generalised winding numbers [N] of points [N, 3].\n\n"
+           "Groups of triangles farther than `accuracy` times their radius are expanded to second order: with the "
+           "default 2 errors up to 0.03 were seen close to real surfaces, with 4 up to 0.01; infinity is exact. Around "
+           "a closed surface they are whole numbers, and quicker to find.");
+  m.def("directed_hausdorff",
+        released([](const Mesh& mesh, const Surface& surface, double tolerance, int threads) -> Interval {
+          require_positive(tolerance);
+          return maximize_in_waves(SurfaceField(surface.bvh()), mesh, tolerance, threads);
+        }),
+        "vertices"_a, "faces"_a, "surface"_a, "tolerance"_a, "threads"_a = 0,
+        "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface; upper - lower <= "
+        "tolerance.");
+  m.def("apart_points",
+        released([](const Surface& surface, const std::vector<Vec3>& points, double reach, std::size_t enough) {
+          require(reach > 0, "the reach must be positive");
+          return apart_points(surface, points, reach, enough);
+        }),
+        "surface"_a, "points"_a, "reach"_a, "enough"_a,
+        "Indices [K] of points [N, 3] of a closed solid of which no two can lie in one convex set whose surface stays "
+        "within `reach` of the solid; the search ends when `enough` are found.");
+}
+
+void bind_concavity(nb::module_& m) {
+  nb::class_<TreeCache>(m, "TreeCache", "The tree of one part's surface, made by the first test that needs it.")
+      .def(nb::init<>());
+  m.def("meets_concavity",
+        released([](const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold,
+                    const TreeCache* tree) {
+          const TreeCache own;
+          return meets_concavity(part, hull, part_volume, hull_volume, threshold, tree ? *tree : own);
+        }),
+        "part_vertices"_a, "part_faces"_a, "hull_vertices"_a, "hull_faces"_a, "part_volume"_a, "hull_volume"_a,
+        "threshold"_a, "tree"_a = nb::none(),
+        "Whether the concavity of a closed part with this hull is certainly <= threshold.\n\n"
+        "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part. "
+        "`tree` is that of the part's surface; without it, one is made and forgotten.");
+  m.def("concavity",
+        released([](const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
+                    double floor, const TreeCache* tree) {
+          require_positive(tolerance);
+          const TreeCache own;
+          const Concavity c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
+          return std::tuple(c.value(), c.part_to_hull, c.hull_to_part, c.volume_radius);
+        }),
+        "part_vertices"_a, "part_faces"_a, "hull_vertices"_a, "hull_faces"_a, "part_volume"_a, "hull_volume"_a,
+        "tolerance"_a, "floor"_a = 0.0, "tree"_a = nb::none(),
+        "Concavity of a closed part with this hull: (value, part_to_hull, hull_to_part, volume_radius).\n\n"
+        "The first three are certified intervals (lower, upper). The value's is at most `tolerance` wide; that of a "
+        "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
+        "told apart: the interval may then be as wide as (0, floor), which is much faster for nearly convex parts.");
+  m.def("glue", released(glue), "vertices_a"_a, "faces_a"_a, "vertices_b"_a, "faces_b"_a,
+        "Surface (vertices [V, 3], faces [F, 3]) of the union of two closed solids with disjoint interiors: both "
+        "surfaces without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring "
+        "only.");
+  m.def("do_touch", released([](const std::vector<Mesh>& first, const std::vector<Mesh>& second) {
+          return std::any_of(first.begin(), first.end(), [&](const Mesh& a) {
+            return std::any_of(second.begin(), second.end(), [&](const Mesh& b) { return do_touch(a, b); });
+          });
+        }),
+        "vertices_a"_a, "faces_a"_a, "vertices_b"_a, "faces_b"_a,
+        "Whether some solid of a list touches one of another face to face, not just in an edge or a point.");
+}
+
+void bind_filling(nb::module_& m) {
+  nb::class_<Filling>(m, "Filling", "A closed solid that hulls of its parts are held against.")
+      .def("__init__", released([](Filling* self, const Mesh& solid, int threads) {
+             require(!solid.faces.empty(), "the solid has no faces");
+             new (self) Filling(solid, threads);
+           }),
+           "vertices"_a, "faces"_a, "threads"_a = 1)
+      .def_prop_ro("surface", &Filling::surface, nb::rv_policy::reference_internal, "The solid's surface.")
+      .def("feasibility", released([](const Filling& self, const Mesh& hull, double threshold) {
+             return static_cast<int>(self.feasibility(hull, threshold));
+           }),
+           "hull_vertices"_a, "hull_faces"_a, "threshold"_a,
+           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
+           "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
+      .def("joint_feasibilities",
+           released([](const Filling& self, const std::vector<const HullCorners*>& hulls, const PairsIn& pairs,
+                       double threshold, int threads) {
+             const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
+             std::vector<double> volumes(pairs.shape(0));
+             std::vector<std::int32_t> verdicts(pairs.shape(0));
+             parallel_for(volumes.size(), threads, [&](std::size_t i) {
+               const Filling::Joint joint =
+                   self.joint_feasibility(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
+               volumes[i] = joint.volume;
+               verdicts[i] = static_cast<std::int32_t>(joint.feasibility);
+             });
+             return std::pair(std::move(volumes), std::move(verdicts));
+           }),
+           "hulls"_a, "pairs"_a, "threshold"_a, "threads"_a = 0,
+           "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, and the `feasibility` [P] of each, decided less "
+           "thoroughly than for a single hull, where the hulls themselves are close enough to their shares of the "
+           "solid. There is no volume (0) where it is 2.")
+      .def("comes_deeper", released(&Filling::comes_deeper), "hull_vertices"_a, "hull_faces"_a, "threshold"_a,
+           "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
+      .def("clipped", released([](const Filling& self, const Mesh& hull) {
+             ClippedSolid clip = self.clipped(hull);
+             return std::tuple(std::move(clip.mesh.vertices), std::move(clip.mesh.faces), clip.volume);
+           }),
+           "hull_vertices"_a, "hull_faces"_a,
+           "The solid clipped to a convex hull and closed by caps on the hull's facets: vertices [V, 3], faces [F, 3], "
+           "volume.")
+      .def("grown", released(&Filling::grown), "hull_vertices"_a, "hull_faces"_a, "depth"_a,
+           "Half-spaces n.x <= d that hold a hull, rows of n and d [P, 4]: their intersection has grown until the "
+           "solid's surface stops it, which may come as deep as `depth` into it.")
+      .def("uncovered",
+           released([](const Filling& self, const std::vector<Mesh>& hulls, double reach, double grain, int threads) {
+             require(!hulls.empty(), "there are no hulls");
+             require(grain > 0, "the grain must be positive");
+             return self.uncovered(hulls, reach, grain, threads);
+           }),
+           "vertices"_a, "faces"_a, "reach"_a, "grain"_a, "threads"_a = 0,
+           "Points [N, 3] that each convex hull has to take in, so that together they cover the solid's surface.\n\n"
+           "Hulls grow by at most `grain` more than they must. Hulls farther than `reach` from a face are only looked "
+           "at if all are.");
+}
+
+void bind_union(nb::module_& m) {
+  nb::class_<HullUnion>(m, "HullUnion", "The union of convex hulls, each closed, convex and outward oriented.")
+      .def("__init__", released([](HullUnion* self, const std::vector<Mesh>& hulls, int threads) {
+             new (self) HullUnion(hulls, threads);
+           }),
+           "vertices"_a, "faces"_a, "threads"_a = 0)
+      .def("only", &HullUnion::only, "some"_a,
+           "The union of the hulls with these numbers, which are not prepared again.")
+      .def("exposed", released([](const HullUnion& self, double gap, int threads) {
+             require_positive(1, gap);
+             HullUnion::Exposed found = self.exposed(gap, threads);
+             append(found.exposed, found.unresolved);
+             return std::move(found.exposed);
+           }),
+           "gap"_a = 1e-6, "threads"_a = 0,
+           "Surface of the union as triangles (vertices [V, 3], faces [F, 3]); touching facets are no part of it.")
+      .def("over",
+           released([](const HullUnion& self, const Surface& surface, double tolerance, double gap, int threads) {
+             require_positive(tolerance, gap);
+             return as_tuple(self.over(surface.bvh(), tolerance, gap, threads));
+           }),
+           "surface"_a, "tolerance"_a, "gap"_a = 1e-6, "threads"_a = 0,
+           "(lower, upper, place) of the greatest distance from the union's surface to the given surface.")
+      .def("under", released([](const HullUnion& self, const Mesh& mesh, double tolerance, int threads) {
+             require_positive(tolerance);
+             return as_tuple(self.under(mesh, tolerance, threads));
+           }),
+           "vertices"_a, "faces"_a, "tolerance"_a, "threads"_a = 0,
+           "(lower, upper, place) of the greatest distance from the mesh's faces to the union as a solid, 0 inside.")
+      .def("distance", released([](const HullUnion& self, const std::vector<Vec3>& points, int threads) {
+             std::vector<double> distances(points.size());
+             for_each_chunk(points.size(), threads, [&](std::size_t begin, std::size_t end) {
+               for (std::size_t i = begin; i < end; ++i) distances[i] = self.distance(points[i]);
+             });
+             return distances;
+           }),
+           "points"_a, "threads"_a = 0, "Distances [N] of points [N, 3] to the solid, 0 inside a hull.");
 }
 
 }  // namespace
 
 void bind_distance(nb::module_& m) {
-  nb::class_<Surface>(m, "Surface",
-                      "A triangle surface and a tree of boxes over it. Any quality: open, self-intersecting, slivers.")
-      .def(
-          "__init__",
-          [](Surface* self, const PointsIn& vertices, const FacesIn& faces, int threads) {
-            const Mesh mesh = to_finite_mesh(vertices, faces);
-            if (mesh.faces.empty()) throw std::invalid_argument("the surface has no faces");
-            new (self) Surface(mesh, threads);
-          },
-          Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("threads") = 1)
-      .def(
-          "distance",
-          [](const Surface& self, const PointsIn& array, int threads) {
-            const std::vector<Vec3> points = to_points(array);
-            require_finite(points);
-            std::vector<double> distances(points.size());
-            for_each_closest(self.bvh(), points, threads,
-                             [&](std::size_t i, const Bvh::Hit& hit) { distances[i] = std::sqrt(hit.distance2); });
-            return rows<double>(std::move(distances));
-          },
-          Released(), nb::arg("points"), nb::arg("threads") = 0,
-          "Unsigned distances [N] of points [N, 3] to the surface.")
-      .def(
-          "closest",
-          [](const Surface& self, const PointsIn& array, int threads) {
-            const std::vector<Vec3> points = to_points(array);
-            require_finite(points);
-            std::vector<Vec3> closest(points.size());
-            std::vector<std::int32_t> faces(points.size());
-            for_each_closest(self.bvh(), points, threads, [&](std::size_t i, const Bvh::Hit& hit) {
-              closest[i] = hit.point;
-              faces[i] = self.bvh().face(hit.slot);
-            });
-            return std::tuple(rows<double>(std::move(closest)), rows<std::int32_t>(std::move(faces)));
-          },
-          Released(), nb::arg("points"), nb::arg("threads") = 0,
-          "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
-      .def(
-          "winding",
-          [](const Surface& self, const PointsIn& array, double accuracy, int threads, bool is_closed) {
-            const std::vector<Vec3> points = to_points(array);
-            require_finite(points);
-            if (!(accuracy >= 1)) throw std::invalid_argument("the accuracy must be at least 1");
-            std::vector<double> windings(points.size());
-            const Winding& winding = self.winding();
-            for_each_point(points.size(), threads, [&](std::size_t i) {
-              windings[i] = is_closed ? winding.of_closed(points[i]) : winding.at(points[i], accuracy);
-            });
-            return rows<double>(std::move(windings));
-          },
-          Released(), nb::arg("points"), nb::arg("accuracy") = 2.0, nb::arg("threads") = 0,
-          nb::arg("is_closed") = false,
-          "Generalised winding numbers [N] of points [N, 3].\n\n"
-          "Groups of triangles farther than `accuracy` times their radius are expanded to second order: with the\n"
-          "default 2 errors up to 0.03 were seen close to real surfaces, with 4 up to 0.01; infinity is exact.\n"
-          "Around a closed surface they are whole numbers, and quicker to find.");
-
-  m.def(
-      "sample_surface",
-      [](const PointsIn& vertices, const FacesIn& faces, std::size_t count, std::uint64_t seed) {
-        SurfaceSamples samples = sample_surface(to_finite_mesh(vertices, faces), count, seed);
-        return std::tuple(rows<double>(std::move(samples.points)), rows<std::int32_t>(std::move(samples.faces)));
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("count"), nb::arg("seed"),
-      "Points [count, 3] spread evenly by area over a surface, and their faces [count]; the same bits for a seed.");
-
-  m.def(
-      "directed_hausdorff",
-      [](const PointsIn& vertices, const FacesIn& faces, const Surface& surface, double tolerance, int threads) {
-        const Mesh mesh = to_finite_mesh(vertices, faces);
-        require_positive_tolerance(tolerance);
-        Interval found = directed_hausdorff(mesh, surface.bvh(), tolerance, threads);
-        return std::tuple(found.lower, found.upper);
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("surface"), nb::arg("tolerance"),
-      nb::arg("threads") = 0,
-      "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface;\n"
-      "upper - lower <= tolerance.");
-
-  m.def(
-      "crossings",
-      [](const PointsIn& vertices, const FacesIn& faces, const LabelsIn& array, std::int64_t most) {
-        const Mesh mesh = to_finite_mesh(vertices, faces);
-        if (array.shape(0) != mesh.faces.size()) throw std::invalid_argument("one body for every face");
-        const std::vector<std::int64_t> body(array.data(), array.data() + array.shape(0));
-        const Crossings found = mesh.faces.empty() ? Crossings() : crossings(mesh, body, most);
-        return std::tuple(found.pairs, found.corners);
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("body"), nb::arg("most"),
-      "How many pairs of faces of different bodies [F] touch, and a bound on the corners of their arrangement.\n"
-      "Stops to count once there are more than `most` pairs.");
-
-  m.def(
-      "apart_points",
-      [](const Surface& surface, const PointsIn& array, double reach, std::size_t enough) {
-        const std::vector<Vec3> points = to_points(array);
-        require_finite(points);
-        if (!(reach > 0)) throw std::invalid_argument("the reach must be positive");
-        return rows<std::int32_t>(apart_points(surface, points, reach, enough));
-      },
-      Released(), nb::arg("surface"), nb::arg("points"), nb::arg("reach"), nb::arg("enough"),
-      "Indices [K] of points [N, 3] of a closed solid of which no two can lie in one convex set whose surface stays\n"
-      "within `reach` of the solid; the search ends when `enough` are found.");
+  bind_surface(m);
+  bind_concavity(m);
+  bind_filling(m);
+  bind_union(m);
 }
 
 }  // namespace rlacd

@@ -1,125 +1,123 @@
-// Python bindings of the convex hull and of mesh volume and area.
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/vector.h>
-
+// Python bindings of convex hulls: built, joined, simplified, and in contact.
 #include <cmath>
-#include <stdexcept>
 
-#include "base/arrays.hpp"
 #include "base/mesh_measures.hpp"
 #include "base/parallel.hpp"
+#include "bind/released.hpp"
 #include "distance/filling.hpp"
+#include "hull/convex_body.hpp"
+#include "hull/flush.hpp"
 #include "hull/hull.hpp"
-#include "hull/inscribed_ball.hpp"
+#include "hull/simplify_hull.hpp"
 
 namespace rlacd {
+
+constexpr int fields(Tag<Hull>) { return 3; }
+constexpr int fields(Tag<FlushBody::Contact>) { return 2; }
 
 namespace {
 
 constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as a few joint hulls of small parts
 
 // The predicates are undefined for infinity and NaN.
-void require_numbers(const std::vector<Vec3>& points) {
-  for (const Vec3& p : points)
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-      throw std::invalid_argument("points must be finite");
+std::vector<Vec3> to_numbers_only(const std::vector<PointsIn>& groups) {
+  std::vector<Vec3> points;
+  for (const PointsIn& group : groups)
+    for (const Vec3 p : copied<Vec3>(group)) {
+      require(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z), "points must be finite");
+      points.push_back(p);
+    }
+  return points;
+}
+
+std::vector<double> joint_hull_volumes(const std::vector<const HullCorners*>& hulls, const PairsIn& pairs,
+                                       int threads) {
+  const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
+  std::vector<double> volumes(pairs.shape(0));
+  const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
+  parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
+    HullBuilder hull;
+    hull.add(joined(hulls[pair[2 * i]]->all, hulls[pair[2 * i + 1]]->all));
+    volumes[i] = hull.volume();
+  });
+  return volumes;
+}
+
+void require_depth(double depth, double touch) {
+  require(depth > 0 && std::isfinite(depth), "the depth must be positive");
+  require(touch >= 0, "the gap of a touch must not be negative");
 }
 
 }  // namespace
 
 void bind_hull(nb::module_& m) {
+  m.def("convex_hull", released([](const PointsIn& points) { return convex_hull(to_numbers_only({points})); }),
+        "points"_a,
+        "Convex hull of points [N, 3]: (indices [H] into points, faces [F, 3] into those H points, rank).\n\n"
+        "Every index is an extreme point, the facets are exactly convex (no rounding in the decisions) and outward "
+        "oriented. rank < 3 (all points coplanar): no indices, no faces.");
   m.def(
-      "convex_hull",
-      [](const PointsIn& array) {
-        const std::vector<Vec3> points = to_points(array);
-        require_numbers(points);
-        Hull hull = convex_hull(points);
-        return std::tuple(rows<std::int32_t>(std::move(hull.indices)), rows<std::int32_t>(std::move(hull.faces)),
-                          hull.rank);
-      },
-      Released(), nb::arg("points"),
-      "Convex hull of points [N, 3]: (indices [H] into points, faces [F, 3] into those H points, rank).\n\n"
-      "Every index is an extreme point, the facets are exactly convex (no rounding in the decisions) and outward\n"
-      "oriented. rank < 3 (all points coplanar): no indices, no faces.");
-  m.def(
-      "joint_hull",
-      [](const std::vector<PointsIn>& groups) {
-        std::vector<Vec3> points;
-        for (const PointsIn& group : groups) {
-          const std::vector<Vec3> own = to_points(group);
-          points.insert(points.end(), own.begin(), own.end());
-        }
-        require_numbers(points);
-        Mesh hull = hull_mesh(points);
-        using Out = std::tuple<Rows<double, Vec3>, Rows<std::int32_t, Triangle>, double>;
-        if (hull.faces.empty()) return std::optional<Out>();
-        const double volume = mesh_volume(hull.vertices, hull.faces);
-        return std::optional<Out>(
-            {rows<double>(std::move(hull.vertices)), rows<std::int32_t>(std::move(hull.faces)), volume});
-      },
-      Released(), nb::arg("groups"),
-      "Corners [H, 3], faces [F, 3] and volume of the convex hull of several arrays of points [N, 3]; None if all lie\n"
+      "joint_hull", released([](const std::vector<PointsIn>& groups) {
+        Mesh hull = hull_mesh(to_numbers_only(groups));
+        const double volume = mesh_volume(hull);
+        auto found = std::tuple(std::move(hull.vertices), std::move(hull.faces), volume);
+        return std::get<1>(found).empty() ? std::nullopt : std::optional(std::move(found));
+      }),
+      "groups"_a,
+      "Corners [H, 3], faces [F, 3] and volume of the convex hull of several arrays of points [N, 3]; None if all lie "
       "in a plane.");
-  m.def(
-      "holds_ball",
-      [](const PointsIn& vertices, const FacesIn& faces, double radius) {
-        const Mesh hull = to_finite_mesh(vertices, faces);
-        return holds_ball(hull, radius);
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"), nb::arg("radius"),
-      "Whether a ball of this radius fits into a convex hull.");
-  m.def(
-      "joint_hull_volumes",
-      [](const std::vector<const HullCorners*>& groups, const PairsIn& pairs, int threads) {
-        const std::vector<std::int32_t> pair = to_numbers(pairs, groups.size());
-        std::vector<double> volumes(pairs.shape(0));
-        const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
-        parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
-          HullBuilder hull;
-          std::vector<Vec3> both = groups[pair[2 * i]]->all;
-          const std::vector<Vec3>& other = groups[pair[2 * i + 1]]->all;
-          both.insert(both.end(), other.begin(), other.end());
-          hull.add(both);
-          volumes[i] = hull.volume();
-        });
-        return rows<double>(std::move(volumes));
-      },
-      Released(), nb::arg("hulls"), nb::arg("pairs"), nb::arg("threads") = 0,
-      "Volumes [P] of the joint hulls of pairs [P, 2] of hulls.");
-  m.def(
-      "mesh_volume",
-      [](const PointsIn& v, const FacesIn& f) {
-        const Mesh mesh = to_mesh(v, f);
-        return mesh_volume(mesh.vertices, mesh.faces);
-      },
-      nb::arg("vertices"), nb::arg("faces"), "Signed volume of a closed triangle mesh.");
-  m.def(
-      "principal_axes",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        const Mesh mesh = to_mesh(vertices, faces);
-        const std::array<Vec3, 3> axes = principal_axes(mesh.vertices, mesh.faces);
-        return rows<double>(std::vector<Vec3>(axes.begin(), axes.end()));
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"),
-      "Principal axes [3, 3] of a surface, one per row, longest first, the largest entry of each positive.");
-  m.def(
-      "mesh_mass",
-      [](const PointsIn& vertices, const FacesIn& faces) {
-        const Mesh mesh = to_mesh(vertices, faces);
-        const Mass mass = mesh_mass(mesh.vertices, mesh.faces);
-        const auto& inertia = mass.inertia;
-        return std::tuple(mass.volume, rows<double>(std::vector<double>{mass.centre.x, mass.centre.y, mass.centre.z}),
-                          rows<double>(std::vector<Vec3>(inertia.begin(), inertia.end())));
-      },
-      Released(), nb::arg("vertices"), nb::arg("faces"),
-      "Volume, centre of mass [3], and inertia about it [3, 3] of the solid of density one in a closed mesh.");
-  m.def(
-      "mesh_area",
-      [](const PointsIn& v, const FacesIn& f) {
-        const Mesh mesh = to_mesh(v, f);
-        return mesh_area(mesh.vertices, mesh.faces);
-      },
-      nb::arg("vertices"), nb::arg("faces"), "Area of a triangle mesh.");
+  m.def("holds_ball", released(holds_ball), "vertices"_a, "faces"_a, "radius"_a,
+        "Whether a ball of this radius fits into a convex hull.");
+  m.def("joint_hull_volumes", released(joint_hull_volumes), "hulls"_a, "pairs"_a, "threads"_a = 0,
+        "Volumes [P] of the joint hulls of pairs [P, 2] of hulls.");
+  m.def("simplify_hull",
+        released([](const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
+                    const std::vector<HalfSpace>& bounds) {
+          require(tolerance >= 0, "the tolerance must not be negative");
+          require(!hull.vertices.empty(), "the hull has no vertices");
+          std::vector<Above> above;
+          for (const HalfSpace& space : bounds) above.push_back({-space.normal, -space.offset});
+          return simplify_hull(hull, max_vertices, max_faces, tolerance, above);
+        }),
+        "vertices"_a, "faces"_a, "max_vertices"_a, "max_faces"_a, "tolerance"_a, "bounds"_a,
+        "A convex hull (vertices [V, 3], faces [F, 3]) around a convex hull with at most max_vertices corners and "
+        "max_faces triangles and little added volume; corners that cost no more than `tolerance` of distance go "
+        "anyway. It stays in the half-spaces n.x <= d of bounds [P, 4] (unit n, d), unless the limits leave no such "
+        "hull.");
+
+  nb::class_<FlushBody>(m, "FlushBody", "A closed convex triangle mesh by its flat sides, for finding contacts.")
+      .def("__init__", released([](FlushBody* self, const Mesh& hull) { new (self) FlushBody(hull); }), "vertices"_a,
+           "faces"_a)
+      .def("depths", released([](const FlushBody& self, const PointsIn& points) {
+             std::vector<double> depths;
+             for (const Vec3 point : copied<Vec3>(points)) depths.push_back(self.depth(point));
+             return depths;
+           }),
+           "points"_a, "How deep points [N, 3] lie inside [N]; negative outside.")
+      .def("contact", released([](const FlushBody& self, const FlushBody& other, double depth, double touch) {
+             require_depth(depth, touch);
+             return self.contact(other, depth, touch);
+           }),
+           "other"_a, "depth"_a, "touch"_a,
+           "Where a side of another body, turned the other way, lies less deep than `depth` under a side of this one: "
+           "(sides [S] of this body, places [N, 3] on the other). Sides touch that are no farther apart than `touch`.")
+      .def("layer",
+           released([](const FlushBody& self, const FlushBody& other, const VectorIn<std::int32_t>& sides, double depth,
+                       double touch) {
+             require_depth(depth, touch);
+             return self.layer(other, to_numbers(sides, self.size()), depth, touch);
+           }),
+           "other"_a, "sides"_a, "depth"_a, "touch"_a,
+           "What another body fills of this one with some of its sides, and those within 60 degrees of them, moved "
+           "outwards: points [N, 3] whose hull it is. Planes that it crosses by at most `touch` are left out.");
+  nb::class_<HullCorners>(m, "HullCorners", "The corners of a convex hull, prepared for tests of joint hulls.")
+      .def("__init__",
+           released([](HullCorners* self, const std::vector<Vec3>& corners) { new (self) HullCorners(corners); }),
+           "corners"_a)
+      .def("__len__", [](const HullCorners& self) { return self.all.size(); })
+      .def_prop_ro("box",
+                   released([](const HullCorners& self) { return std::vector<Vec3>{self.box.lower, self.box.upper}; }),
+                   "Lower and upper corner of the bounding box [2, 3].");
 }
 
 }  // namespace rlacd

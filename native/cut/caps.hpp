@@ -3,7 +3,7 @@
 // Input:  one side of a cut with the rims of its cap (see plane_cut.hpp).
 // Output: the closed side, and how much of the cap is upside down.
 // Algorithm: rims are triangulated. They cross where a solid overlaps itself; triangles between them may lead out of
-// the solid. If more than `kFolded` of the cap does, rims are taken apart into loops that do not cross (uncross.hpp),
+// the solid. If more than `kFolded` of the cap does, rims are taken apart into loops that do not cross,
 // which close the solid exactly as often as it overlaps itself, unless there are too many crossings.
 #pragma once
 

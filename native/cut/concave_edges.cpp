@@ -1,4 +1,3 @@
-// Concave edges: see concave_edges.hpp for input, output and algorithm.
 #include "cut/concave_edges.hpp"
 
 #include <algorithm>
@@ -14,6 +13,10 @@ namespace rlacd {
 
 namespace {
 
+constexpr double kReflex = 10 * kPi / 180;  // flatter edges tessellate curves
+constexpr double kFold =
+    0.1 * kPi / 180;  // two faces this close in angle enclose a slit or a film: rounding decides which
+constexpr double kThinnestFace = 1e-6;  // the normals of faces thinner than this are meaningless in single precision
 constexpr double kStraightOn = 0.8660254037844387;  // cosine of 30 degrees: edges that turn by less continue each other
 constexpr std::size_t kMostAtVertex = 4;            // more reflex edges at a vertex mean a rough surface, not a crease
 constexpr std::size_t kContenders = 256;            // number of edges weighed exactly; scans have thousands
@@ -23,6 +26,58 @@ constexpr double kHair = 1e-9;           // above rounding (1e-15), below the cl
 constexpr double kSameDirection = 3e-7;  // a normal this close to a coordinate axis is replaced by it
 constexpr double kSamePlane = 1e-4;      // between coordinates of planes
 constexpr double kTie = 1e-9;            // of scores this close the first is taken, so that rounding does not decide
+
+struct ReflexEdge {
+  std::int32_t end[2];   // vertices, ascending
+  std::int32_t face[2];  // the first one runs from the first end to the second
+  Vec3 normal[2];        // outward unit normals of the faces
+  double angle;          // dihedral angle minus pi, in (0, pi)
+};
+
+// Edges whose dihedral angle inside the solid exceeds pi, by ascending vertices, which exactly two faces use, in
+// opposite directions. Folds, which rounding may turn inside out, and needle-thin faces are left out.
+std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
+  std::vector<Vec3> normals;
+  std::vector<double> doubled_area;
+  normals.reserve(mesh.faces.size());
+  doubled_area.reserve(mesh.faces.size());
+  for (const Triangle& f : mesh.faces) {
+    const Vec3 scaled = long_normal(mesh, f);
+    doubled_area.push_back(norm(scaled));
+    const double length = std::max(doubled_area.back(), std::numeric_limits<double>::min());
+    normals.push_back({scaled.x / length, scaled.y / length, scaled.z / length});
+  }
+
+  std::vector<ReflexEdge> found;
+  const auto add_if_reflex = [&](std::int32_t low, std::int32_t high, std::int32_t f, std::int32_t g) {
+    // Seen along the edge, outward normals turn to the left over a ridge and to the right in a valley.
+    const Vec3 along = mesh.vertices[high] - mesh.vertices[low];
+    const double turn = dot(cross(normals[g], normals[f]), along);
+    if (!(turn > 0)) return;
+    const double length = norm(along);
+    const double angle = std::atan2(turn, length * dot(normals[f], normals[g]));
+    if (angle > kReflex && angle < kPi - kFold && std::min(doubled_area[f], doubled_area[g]) > kThinnestFace * length)
+      found.push_back({{low, high}, {f, g}, {normals[f], normals[g]}, angle});
+  };
+
+  Buckets<Run> runs = sorted_halfedges(mesh.faces, mesh.vertices.size());
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    poll_stop();
+    const auto [begin, end] = runs.range(v);
+    for (const Run *r = begin, *next; r != end; r = next) {
+      next = std::find_if(r, static_cast<const Run*>(end), [r](const Run& other) { return other.high != r->high; });
+      if (next - r != 2 || r->high == static_cast<std::int32_t>(v)) continue;
+      const auto face_of = [](const Run& run) { return static_cast<std::int32_t>(run.halfedge / 3); };
+      const auto ascends = [&](const Run& run) {
+        return mesh.faces[run.halfedge / 3][run.halfedge % 3] == static_cast<std::int32_t>(v);
+      };
+      if (ascends(r[0]) == ascends(r[1])) continue;
+      const Run &up = ascends(r[0]) ? r[0] : r[1], &down = ascends(r[0]) ? r[1] : r[0];
+      add_if_reflex(static_cast<std::int32_t>(v), r->high, face_of(up), face_of(down));
+    }
+  }
+  return found;
+}
 
 Vec3 divided(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
 
@@ -187,10 +242,7 @@ double above_face(const Mesh& mesh, const Triangle& face, Vec3 outward) {
 
 // Of the two representations of a plane, the one whose normal has a positive largest coordinate.
 CandidatePlane turned(const CandidatePlane& plane) {
-  int largest = 0;
-  for (const int axis : {1, 2})
-    if (std::fabs(plane.normal[axis]) > std::fabs(plane.normal[largest])) largest = axis;
-  if (plane.normal[largest] > 0) return plane;
+  if (plane.normal[longest_axis(plane.normal)] > 0) return plane;
   return {Vec3{} - plane.normal, -plane.offset};
 }
 
@@ -243,9 +295,8 @@ std::vector<CandidatePlane> concave_planes(const Mesh& mesh, const Mesh& hull, s
 std::vector<CandidatePlane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int per_axis) {
   constexpr double kSameAxis = 1e-3;  // sine of an angle
   std::vector<Vec3> directions = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (const Vec3 axis : principal_axes(mesh.vertices, mesh.faces)) {
-    const Vec3 size = {std::fabs(axis.x), std::fabs(axis.y), std::fabs(axis.z)};
-    const int nearest = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  for (const Vec3 axis : principal_axes(mesh)) {
+    const int nearest = longest_axis(axis);
     Vec3 rest = axis;
     rest[nearest] = 0;
     directions.push_back(norm(rest) < kSameAxis ? directions[static_cast<std::size_t>(nearest)] : axis);

@@ -14,7 +14,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "cut/reflex_edges.hpp"
+#include "base/geometry.hpp"
 
 namespace rlacd {
 

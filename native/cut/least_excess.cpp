@@ -1,4 +1,3 @@
-// The plane of least excess: see least_excess.hpp for input, output and algorithm.
 #include "cut/least_excess.hpp"
 
 #include <algorithm>
@@ -89,7 +88,6 @@ class Direction {
   // Numbers are those of the bundle's planes among all candidates. The slack exceeds the rounding of volumes.
   Direction(const SolidMesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers, double slack)
       : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(slack) {
-    sections_.drop_heights();
     std::size_t placed = 0;
     for (std::size_t j = 0; j < planes(); ++j) {
       RLACD_ASSERT(j == 0 || sections_.offset(j - 1) < sections_.offset(j));

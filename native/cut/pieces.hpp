@@ -2,7 +2,7 @@
 //
 // Input:  a closed oriented triangle mesh.
 // Output: its sides below and above a plane, its connected pieces, or what it fills of a convex polytope; closed.
-// Algorithm: cut by the plane and capped; bodies (bodies.hpp), with each cavity in the smallest shell around it.
+// Algorithm: cut by the plane and capped; bodies, with each cavity in the smallest shell around it.
 #pragma once
 
 #include <array>
@@ -22,6 +22,17 @@ struct Piece {
 std::optional<Piece> piece_of(Mesh mesh, double least);
 
 std::array<std::optional<Piece>, 2> cut(const Mesh& mesh, Vec3 normal, double offset, double least);
+
+struct HullAround {
+  const std::vector<Vec3>* corners;
+  double volume;
+};
+
+// The sides below and above a plane at a share of a piece's length across the direction between the middles of the two
+// hulls around that would grow the least by all of it; none if there are no two such hulls apart. Around a round hole
+// the plane follows the hole, which no axis does.
+std::array<std::optional<Piece>, 2> halve(const Mesh& piece, const std::vector<Vec3>& corners,
+                                          const std::vector<HullAround>& around, double share, double least);
 
 // Nothing if all is one piece.
 std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least);

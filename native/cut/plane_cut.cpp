@@ -1,4 +1,3 @@
-// Cutting by a plane: see plane_cut.hpp for input, output and algorithm.
 #include "cut/plane_cut.hpp"
 
 #include <algorithm>
@@ -14,19 +13,13 @@ namespace {
 
 constexpr double kOnPlane = 1e-13;  // relative to the mesh's largest coordinate: above the rounding of a height
 constexpr double kFlat = 1e-12;     // relative to the same: corners this close to a line or a plane lie in it
-constexpr double kPi = 3.14159265358979323846;
 
 using Edge = std::array<std::int32_t, 2>;
-
-int dominant_axis(Vec3 n) {
-  const Vec3 a = {std::fabs(n.x), std::fabs(n.y), std::fabs(n.z)};
-  return a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
-}
 
 class Cutter {
  public:
   Cutter(const Mesh& mesh, Vec3 normal, double offset)
-      : mesh_(mesh), normal_(normal), offset_(offset), axis_(dominant_axis(normal)), points_(mesh.vertices) {
+      : mesh_(mesh), normal_(normal), offset_(offset), axis_(longest_axis(normal)), points_(mesh.vertices) {
     for (const Vec3 p : points_) farthest_ = std::max(farthest_, max_abs(p));
     heights_.reserve(points_.size());
     sides_.reserve(points_.size());
@@ -275,7 +268,7 @@ class Cutter {
 }  // namespace
 
 std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal) {
-  const int axis = dominant_axis(normal);
+  const int axis = longest_axis(normal);
   int u = (axis + 1) % 3, v = (axis + 2) % 3;
   if (normal[axis] < 0) std::swap(u, v);
   std::vector<PlanePoint> flat;

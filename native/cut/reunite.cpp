@@ -315,10 +315,10 @@ std::optional<Mesh> reunited(const std::vector<Mesh>& solids) {
   if (!united) return std::nullopt;
   double volume = 0, area = 0;
   for (const Mesh& solid : solids) {
-    volume += mesh_volume(solid.vertices, solid.faces);
-    area += mesh_area(solid.vertices, solid.faces);
+    volume += mesh_volume(solid);
+    area += mesh_area(solid);
   }
-  if (std::fabs(mesh_volume(united->vertices, united->faces) - volume) > kFilm * area) return std::nullopt;
+  if (std::fabs(mesh_volume(*united) - volume) > kFilm * area) return std::nullopt;
   return united;
 }
 

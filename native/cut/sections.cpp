@@ -1,4 +1,3 @@
-// Parallel planes through a mesh: see sections.hpp for input, output and algorithm.
 #include "cut/sections.hpp"
 
 #include <algorithm>
@@ -76,12 +75,10 @@ void reduce_to_planar_hull(std::vector<Vec3>& points) {
 
 // The same, dropping the coordinate that the plane's normal determines best.
 void reduce_to_planar_hull(std::vector<Vec3>& points, Vec3 n) {
-  if (std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z))
-    reduce_to_planar_hull<0>(points);
-  else if (std::fabs(n.y) >= std::fabs(n.z))
-    reduce_to_planar_hull<1>(points);
-  else
-    reduce_to_planar_hull<2>(points);
+  const int axis = longest_axis(n);
+  axis == 0   ? reduce_to_planar_hull<0>(points)
+  : axis == 1 ? reduce_to_planar_hull<1>(points)
+              : reduce_to_planar_hull<2>(points);
 }
 
 // Integral of min(s - d, 0) over a triangle with corner values s0 <= s1 <= s2, divided by its area.
@@ -94,27 +91,6 @@ double mean_below(double s0, double s1, double s2, double d) {
   }
   const double t = (s2 - d) * (s2 - d) / ((s2 - s0) * (s2 - s1));
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
-}
-
-// The directions from each vertex to its neighbours, one per face: those of vertex v are edges[first[v]..first[v + 1]).
-struct VertexEdges {
-  std::vector<std::size_t> first;
-  std::vector<Vec3> edges;
-};
-
-VertexEdges edges_by_vertex(const Mesh& mesh) {
-  const std::size_t count = mesh.vertices.size();
-  VertexEdges out;
-  out.first.assign(count + 1, 0);
-  for (const Triangle& f : mesh.faces)
-    for (const std::int32_t corner : f) ++out.first[corner + 1];
-  for (std::size_t v = 0; v < count; ++v) out.first[v + 1] += out.first[v];
-  out.edges.resize(out.first.back());
-  std::vector<std::size_t> next(out.first.begin(), out.first.end() - 1);
-  for (const Triangle& f : mesh.faces)
-    for (int e = 0; e < 3; ++e)
-      out.edges[next[f[e]]++] = normalized(mesh.vertices[f[(e + 1) % 3]] - mesh.vertices[f[e]]);
-  return out;
 }
 
 bool all_below(const Vec3* begin, const Vec3* end, Vec3 w, double height) {
@@ -154,10 +130,17 @@ bool sticks_out(const Vec3* begin, const Vec3* end) {
 }
 
 std::vector<char> vertices_that_stick_out(const Mesh& mesh) {
-  const VertexEdges of = edges_by_vertex(mesh);
+  Buckets<Vec3> edges(mesh.vertices.size());  // the directions from each vertex to its neighbours, one per face
+  for (const Triangle& f : mesh.faces)
+    for (const std::int32_t corner : f) edges.count(corner);
+  edges.allocate();
+  for (const Triangle& f : mesh.faces)
+    for (int e = 0; e < 3; ++e) edges.add(f[e], normalized(mesh.vertices[f[(e + 1) % 3]] - mesh.vertices[f[e]]));
   std::vector<char> result(mesh.vertices.size(), 0);
-  for (std::size_t v = 0; v < result.size(); ++v)
-    result[v] = sticks_out(of.edges.data() + of.first[v], of.edges.data() + of.first[v + 1]);
+  for (std::size_t v = 0; v < result.size(); ++v) {
+    const auto [begin, end] = edges.range(v);
+    result[v] = sticks_out(begin, end);
+  }
   return result;
 }
 
@@ -171,11 +154,16 @@ SolidMesh::SolidMesh(const Mesh& solid)
     area.push_back(0.5 * cross(b - a, c - a));
     for (const std::int32_t corner : f) is_corner[corner] = 1;
   }
-  volume = mesh_volume(mesh.vertices, mesh.faces);
+  volume = mesh_volume(mesh);
 }
 
 Sections::Sections(const SolidMesh& solid, Vec3 normal, std::vector<double> offsets)
-    : solid_(solid), mesh_(solid.mesh), normal_(normal), axis_(axis_of(normal)), offsets_(std::move(offsets)) {
+    : solid_(solid),
+      mesh_(solid.mesh),
+      normal_(normal),
+      axis_(axis_of(normal)),
+      offsets_(std::move(offsets)),
+      slabs_(offsets_.size() + 1) {
   RLACD_ASSERT(std::is_sorted(offsets_.begin(), offsets_.end()));
   project();
   fill_slabs();
@@ -250,12 +238,9 @@ void Sections::fill_slabs() {
     if (!on_plane || (sides[i] & 2) != 0) entries.push_back({j, i});
     if (on_plane && (sides[i] & 1) != 0) entries.push_back({j - 1, i});
   }
-  first_.assign(offsets_.size() + 2, 0);
-  for (const Entry& e : entries) ++first_[e.slab + 1];
-  for (std::size_t j = 1; j < first_.size(); ++j) first_[j] += first_[j - 1];
-  order_.resize(entries.size());
-  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-  for (const Entry& e : entries) order_[next[e.slab]++] = e.vertex;
+  for (const Entry& e : entries) slabs_.count(e.slab);
+  slabs_.allocate();
+  for (const Entry& e : entries) slabs_.add(e.slab, e.vertex);
 }
 
 // The point where an edge meets a plane; exactly on the plane when n is a coordinate axis.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/geometry.hpp"
+#include "mesh/edges.hpp"
 
 namespace rlacd {
 
@@ -47,7 +48,7 @@ class Sections {
   // if the surface continues there: a face that lies in the plane bounds the solid on one side of it only.
   template <class Task>
   void for_each_inside(std::size_t from, std::size_t to, const Task& task) const {
-    for (std::size_t i = first_[from]; i < first_[to]; ++i) task(mesh_.vertices[order_[i]]);
+    slabs_.for_each(from, to, [&](std::int32_t vertex) { task(mesh_.vertices[vertex]); });
   }
   // Corners of the section's convex hull, in the order of its outline.
   const std::vector<Vec3>& outline(std::size_t plane) const { return outlines_[plane]; }
@@ -62,12 +63,6 @@ class Sections {
     double area = 0, perimeter = 0;
   };
   std::vector<Measures> measure_sections() const;
-
-  // Frees the memory that only `measure_sections` needs.
-  void drop_heights() {
-    heights_ = {};
-    above_ = {};
-  }
 
  private:
   void project();
@@ -90,9 +85,8 @@ class Sections {
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
   double film_ = 0;
-  bool is_on_plane_ = false;         // whether any vertex lies on a plane
-  std::vector<std::int32_t> order_;  // vertices slab by slab
-  std::vector<std::size_t> first_;   // M + 2 offsets into order_
+  bool is_on_plane_ = false;     // whether any vertex lies on a plane
+  Buckets<std::int32_t> slabs_;  // their vertices
   std::vector<std::vector<Vec3>> outlines_;
   std::vector<double> solid_below_;
 };

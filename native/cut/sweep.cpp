@@ -1,4 +1,3 @@
-// Plane sweep: see sweep.hpp for input, output and algorithm.
 #include "cut/sweep.hpp"
 
 #include <algorithm>
@@ -90,10 +89,6 @@ class DirectionSweep {
 };
 
 }  // namespace
-
-std::vector<PlaneScore> sweep_direction(const Mesh& mesh, Vec3 direction, const std::vector<double>& offsets) {
-  return DirectionSweep(SolidMesh(mesh), direction, offsets).run();
-}
 
 std::vector<PlaneScore> sweep(const Mesh& mesh, const std::vector<Vec3>& directions, const std::vector<double>& offsets,
                               int threads) {

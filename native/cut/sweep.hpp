@@ -6,8 +6,6 @@
 // Algorithm: the planes of one direction cut the mesh into M + 1 slabs. Each slab's points are the vertices inside it
 // and the points where edges cross its two planes. The hull below plane j grows from the hull below plane j - 1 by the
 // points of slab j, since the hull of a union is the hull of the hulls; the hulls above grow in the other direction.
-// Solid volumes come from the divergence theorem with the field (n.x - d) n, which vanishes on the cut, so that no cap
-// is needed.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +22,6 @@ struct PlaneScore {
   double thickness_below = 0, thickness_above = 0;  // extents of the two sides along n
   double extent_below = 0, extent_above = 0;        // largest extents of the two sides' boxes along n, u, v
 };
-
-// Scores of the M planes of one direction. Deterministic.
-std::vector<PlaneScore> sweep_direction(const Mesh& mesh, Vec3 direction, const std::vector<double>& offsets);
 
 // Scores [K * M] of K directions times M offsets (row-major), the directions spread over threads. Rows with the same
 // direction are swept together.

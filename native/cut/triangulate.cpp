@@ -1,4 +1,3 @@
-// Triangulation of loops: see triangulate.hpp for input, output and algorithm.
 #include "cut/triangulate.hpp"
 
 #include <algorithm>
@@ -13,7 +12,6 @@ namespace {
 
 constexpr double kFlat = 1e-12;     // sine of an angle: rounding
 constexpr std::size_t kFlips = 64;  // for each triangle; far more than any triangulation needs
-constexpr double kFullTurn = 2 * 3.14159265358979323846;
 constexpr std::size_t kNone = ~std::size_t{0};
 
 using Loop = std::vector<std::int32_t>;
@@ -279,7 +277,7 @@ std::vector<Loop> untangled(const std::vector<std::vector<PlanePoint>>& loops, c
         const PlanePoint to = points[after[p]];
         const double bx = back[0] - at[0], by = back[1] - at[1], ex = to[0] - at[0], ey = to[1] - at[1];
         const double turn = std::atan2(ex * by - ey * bx, ex * bx + ey * by);
-        return turn > 0 ? turn : turn + kFullTurn;
+        return turn > 0 ? turn : turn + 2 * kPi;
       };
       const auto best = std::min_element(left.begin(), left.end(),
                                          [&](std::int32_t a, std::int32_t b) { return angle(a) < angle(b); });

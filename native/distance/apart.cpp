@@ -18,11 +18,6 @@ struct Ball {
   double radius;  // of free space around the centre
 };
 
-double distance2_to_segment(Vec3 p, Vec3 a, Vec3 along, double length2) {
-  const double t = length2 > 0 ? std::clamp(dot(p - a, along) / length2, 0.0, 1.0) : 0;
-  return norm2(a + t * along - p);
-}
-
 // The exterior of a solid at a reach, as far as it is known.
 class Exterior {
  public:
@@ -41,11 +36,11 @@ class Exterior {
   // Whether the segment is found to meet it.
   bool is_met(Vec3 a, Vec3 b) {
     const Vec3 along = b - a;
-    const double length2 = norm2(along), length = std::sqrt(length2);
+    const double length = norm(along);
     if (length <= 2 * reach_) return false;  // each point of the segment is within T of one of its ends
     for (std::size_t i = 0; i < outer_.size(); ++i) {
       const double room = outer_[i].radius - reach_;
-      if (distance2_to_segment(outer_[i].centre, a, along, length2) < room * room) {
+      if (norm2(closest_on_segment(a, along, outer_[i].centre) - outer_[i].centre) < room * room) {
         if (i > 0) std::swap(outer_[i], outer_[i / 2]);  // those that are of use come first
         return true;
       }
@@ -122,14 +117,7 @@ class Exterior {
   }
 
   // Farther from the box around the surface than the reach: such points are joined to infinity.
-  bool is_far(Vec3 x) const {
-    double away2 = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double away = std::max({box_.lower[axis] - x[axis], x[axis] - box_.upper[axis], 0.0});
-      away2 += away * away;
-    }
-    return away2 > reach_ * reach_;
-  }
+  bool is_far(Vec3 x) const { return box_.distance2(x) > reach_ * reach_; }
 
   const Surface& surface_;
   const double reach_;

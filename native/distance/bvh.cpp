@@ -1,7 +1,5 @@
 #include "distance/bvh.hpp"
 
-#include <utility>
-
 #include "base/parallel.hpp"
 #include "base/stop.hpp"
 
@@ -16,13 +14,6 @@ constexpr int kDeepestHeuristicSplit = 48;
 constexpr int kStack = 96;
 constexpr std::size_t kBetweenPolls = 1024;
 constexpr std::ptrdiff_t kAlone = 20'000;  // trees over no more triangles are made in one thread
-
-double distance2_to_box(const Box& box, Vec3 p) {
-  const double x = std::max(std::max(box.lower.x - p.x, p.x - box.upper.x), 0.0);
-  const double y = std::max(std::max(box.lower.y - p.y, p.y - box.upper.y), 0.0);
-  const double z = std::max(std::max(box.lower.z - p.z, p.z - box.upper.z), 0.0);
-  return x * x + y * y + z * z;
-}
 
 // Lower and negated upper ends along the three axes: all are minima, so that they are extended at once.
 struct Ends {
@@ -89,7 +80,7 @@ Halves halve(Items first, Items last, int axis) {
 // One pass sorts the items into bins; the bounds of both halves are those of their bins.
 Halves split(Items first, Items last, const Ends& centres, int depth) {
   const Vec3 extent = centres.extent();
-  const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+  const int axis = longest_axis(extent);
   // Below or above these numbers, the scale would vanish or overflow.
   const bool is_told_apart = extent[axis] > 0x1p-1000 && extent[axis] <= std::numeric_limits<double>::max();
   if (depth >= kDeepestHeuristicSplit || !is_told_apart) return halve(first, last, axis);
@@ -129,11 +120,11 @@ Halves split(Items first, Items last, const Ends& centres, int depth) {
   return halves;
 }
 
-std::vector<Item> items_of(const Mesh& mesh, std::size_t first) {
-  std::vector<Item> items(mesh.faces.size() - first);
+std::vector<Item> items_of(const Mesh& mesh) {
+  std::vector<Item> items(mesh.faces.size());
   for (std::size_t i = 0; i < items.size(); ++i) {
-    for (const std::int32_t corner : mesh.faces[first + i]) items[i].ends.extend(Ends(mesh.vertices[corner]));
-    items[i].face = static_cast<std::int32_t>(first + i);
+    for (const std::int32_t corner : mesh.faces[i]) items[i].ends.extend(Ends(mesh.vertices[corner]));
+    items[i].face = static_cast<std::int32_t>(i);
   }
   return items;
 }
@@ -147,9 +138,9 @@ struct Range {
 };
 
 // Sets the boxes and leaves of a node; calls open_child(side, range) for each child that is no leaf, before which
-// range.node is unknown. Leaves have slots from `first_slot` on, that of the item at `begin`.
+// range.node is unknown. The item at `begin` has the first slot.
 template <class OpenChild>
-void fill(Bvh::Node& node, const Range& range, Items begin, std::int32_t first_slot, const OpenChild& open_child) {
+void fill(Bvh::Node& node, const Range& range, Items begin, const OpenChild& open_child) {
   // A mesh of one triangle cannot be halved: its second child stays an empty leaf.
   const Halves halves = range.last - range.first > 1 ? split(range.first, range.last, range.centres, range.depth)
                                                      : Halves{range.last, {bounds(range.first, range.last), {}}};
@@ -158,7 +149,7 @@ void fill(Bvh::Node& node, const Range& range, Items begin, std::int32_t first_s
     const auto count = static_cast<std::int32_t>(ends[side + 1] - ends[side]);
     node.box[side] = halves.bounds[side].box.box();
     if (count <= kLeafSize) {
-      node.child[side] = ~(first_slot + static_cast<std::int32_t>(ends[side] - begin));
+      node.child[side] = ~static_cast<std::int32_t>(ends[side] - begin);
       node.leaf_size[side] = count;
     } else {
       open_child(side, Range{ends[side], ends[side + 1], -1, range.depth + 1, halves.bounds[side].centres});
@@ -167,7 +158,7 @@ void fill(Bvh::Node& node, const Range& range, Items begin, std::int32_t first_s
 }
 
 // The nodes over some items, the first of them the root, which are sorted into the order of its leaves.
-std::vector<Bvh::Node> nodes_over(Range root, Items begin, std::int32_t first_slot) {
+std::vector<Bvh::Node> nodes_over(Range root, Items begin) {
   std::vector<Bvh::Node> nodes(1);
   nodes.reserve(static_cast<std::size_t>(root.last - root.first) / 2 + 1);
   root.node = 0;
@@ -177,7 +168,7 @@ std::vector<Bvh::Node> nodes_over(Range root, Items begin, std::int32_t first_sl
     const Range range = open.back();
     open.pop_back();
     Bvh::Node node;
-    fill(node, range, begin, first_slot, [&](int side, Range child) {
+    fill(node, range, begin, [&](int side, Range child) {
       child.node = node.child[side] = static_cast<std::int32_t>(nodes.size());
       nodes.emplace_back();
       open.push_back(child);
@@ -187,9 +178,9 @@ std::vector<Bvh::Node> nodes_over(Range root, Items begin, std::int32_t first_sl
   return nodes;
 }
 
-// Appends the nodes of a tree over some items, which are sorted into the order of its leaves; the first item gets the
-// slot `first_slot`. The topmost nodes are made level by level, the trees below them side by side.
-void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, std::int32_t first_slot, int threads) {
+// Appends the nodes of a tree over some items, which are sorted into the order of its leaves.
+// The topmost nodes are made level by level, the trees below them side by side.
+void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, int threads) {
   const auto root = static_cast<std::int32_t>(nodes.size());
   nodes.emplace_back();
   std::vector<Range> level = {{items.begin(), items.end(), root, 0, bounds(items.begin(), items.end()).centres}}, small;
@@ -202,7 +193,7 @@ void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, std::int32_t 
     for (const Range& range : level) (range.last - range.first > kAlone ? large : small).push_back(range);
     std::vector<Made> made(large.size());
     parallel_for(large.size(), threads, [&](std::size_t i) {
-      fill(made[i].node, large[i], items.begin(), first_slot,
+      fill(made[i].node, large[i], items.begin(),
            [&](int side, const Range& child) { made[i].children.emplace_back(side, child); });
     });
     level.clear();
@@ -216,8 +207,7 @@ void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, std::int32_t 
     }
   }
   std::vector<std::vector<Bvh::Node>> trees(small.size());
-  parallel_for(small.size(), threads,
-               [&](std::size_t i) { trees[i] = nodes_over(small[i], items.begin(), first_slot); });
+  parallel_for(small.size(), threads, [&](std::size_t i) { trees[i] = nodes_over(small[i], items.begin()); });
   std::size_t count = nodes.size();
   for (const std::vector<Bvh::Node>& tree : trees) count += tree.size() - 1;
   nodes.reserve(count);
@@ -232,60 +222,18 @@ void grow(std::vector<Bvh::Node>& nodes, std::vector<Item>& items, std::int32_t 
   }
 }
 
-Box box_around(const Bvh::Node& node) {
-  Box box = node.box[0];
-  if (!node.box[1].is_empty()) box.extend(node.box[1]);
-  return box;
-}
-
 }  // namespace
 
 Bvh::Bvh(const Mesh& mesh, int threads) {
-  std::vector<Item> items = items_of(mesh, 0);
-  grow(nodes_, items, 0, threads);
+  std::vector<Item> items = items_of(mesh);
+  grow(nodes_, items, threads);
   triangles_.reserve(items.size());
   faces_.reserve(items.size());
-  for (const Item& item : items) hold(mesh, item.face);
-}
-
-Bvh::Bvh(const Mesh& mesh, const TreeShape& shape) {
-  std::vector<Item> others = items_of(mesh, shape.faces);
-  triangles_.reserve(mesh.faces.size());
-  faces_.reserve(mesh.faces.size());
-  if (!others.empty()) {
-    nodes_.emplace_back();  // joins the two trees
-    nodes_[0].child[0] = 1;
-    nodes_[0].child[1] = static_cast<std::int32_t>(1 + shape.nodes.size());
+  for (const Item& item : items) {
+    const auto [a, b, c] = corners_of(mesh, mesh.faces[item.face]);
+    triangles_.emplace_back(a, b, c);
+    faces_.push_back(item.face);
   }
-  const auto root = static_cast<std::int32_t>(nodes_.size());
-  nodes_.resize(nodes_.size() + shape.nodes.size());
-  for (std::size_t i = shape.nodes.size(); i-- > 0;) {  // children before their parents
-    if (i % kBetweenPolls == 0) poll_stop();
-    Node& node = nodes_[root + static_cast<std::int32_t>(i)];
-    for (int side = 0; side < 2; ++side) {
-      node.child[side] = shape.nodes[i].child[side];
-      node.leaf_size[side] = shape.nodes[i].leaf_size[side];
-      if (node.child[side] >= 0) {
-        node.child[side] += root;
-        node.box[side] = box_around(nodes_[node.child[side]]);
-      }
-      for (std::int32_t k = 0; k < node.leaf_size[side]; ++k)
-        for (const std::int32_t corner : mesh.faces[~node.child[side] + k])
-          node.box[side].extend(mesh.vertices[corner]);
-    }
-  }
-  for (std::size_t f = 0; f < shape.faces; ++f) hold(mesh, static_cast<std::int32_t>(f));
-  if (others.empty()) return;
-  grow(nodes_, others, static_cast<std::int32_t>(shape.faces), 1);
-  for (const Item& item : others) hold(mesh, item.face);
-  for (int side = 0; side < 2; ++side) nodes_[0].box[side] = box_around(nodes_[nodes_[0].child[side]]);
-}
-
-// Puts a face into the next slot.
-void Bvh::hold(const Mesh& mesh, std::int32_t face) {
-  const auto [a, b, c] = mesh.faces[face];
-  triangles_.emplace_back(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
-  faces_.push_back(face);
 }
 
 Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) const {
@@ -316,12 +264,48 @@ Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) c
     const Node& node = nodes_[visit.child];
     Visit next[2];
     for (int side = 0; side < 2; ++side)
-      next[side] = {node.child[side], node.leaf_size[side], distance2_to_box(node.box[side], p)};
+      next[side] = {node.child[side], node.leaf_size[side], node.box[side].distance2(p)};
     const int nearer = next[1].distance2 < next[0].distance2 ? 1 : 0;
     if (next[1 - nearer].distance2 < best.distance2) stack[top++] = next[1 - nearer];
     if (next[nearer].distance2 < best.distance2) stack[top++] = next[nearer];
   }
   return best;
+}
+
+void Bvh::within(Vec3 x, double radius, std::vector<std::int32_t>& found) const {
+  const std::size_t before = found.size();
+  const double most = radius * radius;
+  std::vector<std::int32_t> open = {0};
+  while (!open.empty()) {
+    const Node& node = nodes_[open.back()];
+    open.pop_back();
+    for (int side = 0; side < 2; ++side) {
+      const std::int32_t child = node.child[side];
+      if (node.box[side].distance2(x) > most) continue;
+      if (child >= 0) open.push_back(child);
+      for (std::int32_t slot = ~child; child < 0 && slot < ~child + node.leaf_size[side]; ++slot)
+        if (norm2(triangles_[slot].a - x) <= most) found.push_back(faces_[slot]);
+    }
+  }
+  std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
+}
+
+std::pair<std::vector<std::int64_t>, std::vector<std::int32_t>> points_within(const std::vector<Vec3>& points,
+                                                                              const std::vector<Vec3>& centres,
+                                                                              const std::vector<double>& radii,
+                                                                              std::size_t most) {
+  Mesh mesh{points, {}};
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(points.size()); ++i) mesh.faces.push_back({i, i, i});
+  const Bvh tree(mesh);
+  std::vector<std::int64_t> counts(centres.size());
+  std::vector<std::int32_t> found;
+  for (std::size_t i = 0; i < centres.size() && found.size() <= most; ++i) {
+    if (i % kBetweenPolls == 0) poll_stop();
+    const std::size_t before = found.size();
+    tree.within(centres[i], radii[i], found);
+    counts[i] = static_cast<std::int64_t>(found.size() - before);
+  }
+  return {std::move(counts), std::move(found)};
 }
 
 }  // namespace rlacd

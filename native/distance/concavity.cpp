@@ -16,9 +16,7 @@ class DepthField {
  public:
   DepthField(const ConvexPlanes& planes, const Mesh& hull) : planes_(planes) {
     settled_.fill(-1);
-    Box box;
-    for (const Triangle& face : hull.faces)
-      for (const std::int32_t corner : face) box.extend(hull.vertices[corner]);
+    const Box box = box_of_faces(hull);
     centre_ = 0.5 * (box.lower + box.upper);
     const Vec3 half = 0.5 * (box.upper - box.lower);
     for (int axis = 0; axis < 3; ++axis) shrink_[axis] = half[axis] > 0 ? 1 / half[axis] : 0;
@@ -45,8 +43,7 @@ class DepthField {
   std::size_t direction_of(const Corners& corner) const {
     Vec3 d = (1.0 / 3.0) * (corner[0] + corner[1] + corner[2]) - centre_;
     for (int axis = 0; axis < 3; ++axis) d[axis] *= shrink_[axis];
-    const int axis = std::fabs(d.x) >= std::fabs(d.y) ? (std::fabs(d.x) >= std::fabs(d.z) ? 0 : 2)
-                                                      : (std::fabs(d.y) >= std::fabs(d.z) ? 1 : 2);
+    const int axis = longest_axis(d);
     const double longest = std::fabs(d[axis]);
     if (!(longest > 0)) return 0;
     const auto grid = [&](double t) {

@@ -49,7 +49,7 @@ class Clip {
 
   std::optional<ConvexClip> run() {
     for (std::size_t i = 0; i < polytope_.facets.size(); ++i) crossing_.push_back(static_cast<std::int32_t>(i));
-    finish_shape(visit(0, 0));
+    visit(0, 0);
     if (is_contradictory_ || !find_states() || !add_edges() || !link()) return std::nullopt;
     return std::move(result_);
   }
@@ -70,19 +70,11 @@ class Clip {
     std::int32_t side;
   };
 
-  // A child of a tree's node: a node, or a leaf of the faces made so far, empty if nothing is inside.
-  struct Child {
-    std::int32_t node = -1;
-    std::int32_t leaf_size = 0;
-    bool is_empty() const { return node < 0 && leaf_size == 0; }
-  };
-
   // Clips all below a node of the solid's tree. The facets that cross it are crossing_[first, ...).
-  Child visit(std::int32_t at, std::size_t first) {
+  void visit(std::int32_t at, std::size_t first) {
     poll_stop();
     const Bvh::Node& node = surface_.bvh().nodes()[at];
     const std::size_t last = crossing_.size();
-    Child below[2];
     for (int side = 0; side < 2; ++side) {
       const Box& box = node.box[side];
       if (box.is_empty()) continue;
@@ -97,22 +89,15 @@ class Clip {
         is_outside = depth < -reach;
         if (depth < reach) crossing_.push_back(facet);
       }
-      if (!is_outside)
-        below[side] = node.child[side] >= 0 ? visit(node.child[side], last)
-                                            : clip_leaf(~node.child[side], node.leaf_size[side], last);
+      if (!is_outside && node.child[side] >= 0)
+        visit(node.child[side], last);
+      else if (!is_outside)
+        clip_leaf(~node.child[side], node.leaf_size[side], last);
       crossing_.resize(last);
     }
-    if (below[0].is_empty()) return below[1];
-    if (below[1].is_empty()) return below[0];
-    TreeShape::Node made;
-    for (int side = 0; side < 2; ++side)
-      made.child[side] = below[side].node, made.leaf_size[side] = below[side].leaf_size;
-    result_.shape.nodes.push_back(made);
-    return {static_cast<std::int32_t>(result_.shape.nodes.size()) - 1, 0};
   }
 
-  Child clip_leaf(std::int32_t slot, std::int32_t count, std::size_t first) {
-    const auto before = static_cast<std::int32_t>(result_.mesh.faces.size());
+  void clip_leaf(std::int32_t slot, std::int32_t count, std::size_t first) {
     for (std::int32_t k = 0; k < count; ++k) {
       const std::int32_t face = surface_.bvh().face(slot + k);
       if (first == crossing_.size())
@@ -120,20 +105,6 @@ class Clip {
       else
         clip(face, first);
     }
-    return {~before, static_cast<std::int32_t>(result_.mesh.faces.size()) - before};
-  }
-
-  // The nodes were made after their children; they come before them.
-  void finish_shape(Child root) {
-    TreeShape& shape = result_.shape;
-    shape.faces = result_.mesh.faces.size();
-    if (root.node < 0 && root.leaf_size > 0) shape.nodes = {{{root.node, -1}, {root.leaf_size, 0}}};
-    if (root.node < 0) return;
-    const auto last = static_cast<std::int32_t>(shape.nodes.size()) - 1;
-    std::reverse(shape.nodes.begin(), shape.nodes.end());
-    for (TreeShape::Node& node : shape.nodes)
-      for (std::int32_t& child : node.child)
-        if (child >= 0) child = last - child;
   }
 
   // A face of the solid that no facet crosses.

@@ -24,8 +24,7 @@ struct ConvexClip {
     Vec3 normal;                                  // of the facet, outwards
     std::vector<std::vector<std::int32_t>> rims;  // loops of vertices, counter-clockwise around what is inside
   };
-  Mesh mesh;        // without the caps
-  TreeShape shape;  // of a tree over its faces, the same as the solid's
+  Mesh mesh;  // without the caps
   std::vector<Section> sections;
 };
 

@@ -97,12 +97,6 @@ class Depths {
   std::int32_t last_ = 0;  // the plane that excluded the last object
 };
 
-Mesh joint_hull(const std::vector<Vec3>& first, const std::vector<Vec3>& second) {
-  std::vector<Vec3> both = first;
-  both.insert(both.end(), second.begin(), second.end());
-  return hull_mesh(both);
-}
-
 struct Cell {
   Corners corner;
   Vec3 middle;
@@ -144,9 +138,9 @@ HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)), b
 
 Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCorners& second, double threshold) const {
   const bool are_all = first.some.size() == first.all.size() && second.some.size() == second.all.size();
-  Mesh hull = joint_hull(first.some, second.some);
+  Mesh hull = hull_mesh(joined(first.some, second.some));
   if (!hull.faces.empty() && comes_deeper(hull, threshold)) return {0, Feasibility::kNever};
-  if (!are_all) hull = joint_hull(first.all, second.all);
+  if (!are_all) hull = hull_mesh(joined(first.all, second.all));
   std::vector<char> is_new(hull.faces.size(), 1);
   for (const std::vector<Vec3>* own : {&first.all, &second.all}) {
     std::vector<char> is_own(hull.vertices.size());
@@ -160,7 +154,7 @@ Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCo
   std::vector<Triangle> facets;
   for (std::size_t f = 0; f < hull.faces.size(); ++f)
     if (is_new[f]) facets.push_back(hull.faces[f]);
-  const double volume = mesh_volume(hull.vertices, hull.faces);
+  const double volume = mesh_volume(hull);
   if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Feasibility::kNo};
   if (!are_all && comes_deeper(hull, threshold)) return {volume, Feasibility::kNever};
   return {volume, is_missed(hull, facets, threshold, kMostCellsOfPair) ? Feasibility::kNo : Feasibility::kMaybe};
@@ -233,15 +227,10 @@ ClippedSolid Filling::clipped(const Mesh& hull) const {
     CapArea area;
     for (const ConvexClip::Section& section : clip->sections)
       add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal, area);
-    if (area.folded <= kFolded * area.all) {
-      out.mesh = std::move(clip->mesh);
-      out.shape = std::move(clip->shape);
-    } else {
-      clip.reset();
-    }
+    if (area.folded > kFolded * area.all) clip.reset();
   }
-  if (!clip) out.mesh = inside_all(solid_, hull);
-  out.volume = std::fmax(0, mesh_volume(out.mesh.vertices, out.mesh.faces));
+  out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull);
+  out.volume = std::fmax(0, mesh_volume(out.mesh));
   return out;
 }
 

@@ -11,12 +11,17 @@
 #pragma once
 
 #include "distance/convex_clip.hpp"
-#include "distance/grow.hpp"
 #include "distance/surface.hpp"
-#include "distance/uncovered.hpp"
 #include "hull/convex_planes.hpp"
 
 namespace rlacd {
+
+// Hulls grow by at most `grain` more than they must. A hull whose box is farther from a triangle than `reach` takes it
+// only if all are.
+std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
+                                         double grain, int threads);
+
+std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const Mesh& hull, double depth);
 
 enum class Feasibility : std::int32_t {
   kMaybe = 0,
@@ -34,7 +39,6 @@ struct HullCorners {
 
 struct ClippedSolid {
   Mesh mesh;
-  TreeShape shape;  // of a tree over its first faces
   double volume = 0;
 };
 

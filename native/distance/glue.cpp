@@ -1,4 +1,3 @@
-// Gluing two solids that touch: see glue.hpp for input, output and algorithm.
 #include "distance/glue.hpp"
 
 #include <algorithm>
@@ -9,15 +8,11 @@ namespace rlacd {
 
 namespace {
 
-struct Point2 {
-  double u, v;
-};
-using Polygon = std::vector<Point2>;
+using Polygon = std::vector<PlanePoint>;
 
-double doubled_area(const Polygon& p) {
+double doubled_area_of(const Polygon& p) {
   double sum = 0;
-  for (std::size_t i = 1; i + 1 < p.size(); ++i)
-    sum += (p[i].u - p[0].u) * (p[i + 1].v - p[0].v) - (p[i].v - p[0].v) * (p[i + 1].u - p[0].u);
+  for (std::size_t i = 1; i + 1 < p.size(); ++i) sum += doubled_area(p[0], p[i], p[i + 1]);
   return sum;
 }
 
@@ -26,33 +21,32 @@ bool is_film(const Polygon& p) {
   double longest2 = 0;
   for (std::size_t i = 0; i < p.size(); ++i)
     for (std::size_t j = i + 1; j < p.size(); ++j)
-      longest2 = std::max(longest2, (p[i].u - p[j].u) * (p[i].u - p[j].u) + (p[i].v - p[j].v) * (p[i].v - p[j].v));
-  return doubled_area(p) <= kCoincident * std::sqrt(longest2);
+      longest2 =
+          std::max(longest2, (p[i][0] - p[j][0]) * (p[i][0] - p[j][0]) + (p[i][1] - p[j][1]) * (p[i][1] - p[j][1]));
+  return doubled_area_of(p) <= kCoincident * std::sqrt(longest2);
 }
 
-// Positive for a point left of the line from a to b, negative right of it.
-double side_of(Point2 a, Point2 b, Point2 q) { return (b.u - a.u) * (q.v - a.v) - (b.v - a.v) * (q.u - a.u); }
-
 // Whether an edge of the triangle has all of a polygon on its right: they share no area.
-bool is_beside(const Polygon& p, const std::array<Point2, 3>& triangle) {
+bool is_beside(const Polygon& p, const std::array<PlanePoint, 3>& triangle) {
   for (int e = 0; e < 3; ++e)
-    if (std::all_of(p.begin(), p.end(), [&](Point2 q) { return side_of(triangle[e], triangle[(e + 1) % 3], q) <= 0; }))
+    if (std::all_of(p.begin(), p.end(),
+                    [&](PlanePoint q) { return doubled_area(triangle[e], triangle[(e + 1) % 3], q) <= 0; }))
       return true;
   return false;
 }
 
 // Splits a convex polygon by the line through a and b into the part left of it (inside) and right of it (outside).
-void split(const Polygon& p, Point2 a, Point2 b, Polygon& inside, Polygon& outside) {
+void split(const Polygon& p, PlanePoint a, PlanePoint b, Polygon& inside, Polygon& outside) {
   inside.clear();
   outside.clear();
   for (std::size_t i = 0; i < p.size(); ++i) {
-    const Point2 q = p[i], r = p[(i + 1) % p.size()];
-    const double sq = side_of(a, b, q), sr = side_of(a, b, r);
+    const PlanePoint q = p[i], r = p[(i + 1) % p.size()];
+    const double sq = doubled_area(a, b, q), sr = doubled_area(a, b, r);
     if (sq >= 0) inside.push_back(q);
     if (sq <= 0) outside.push_back(q);
     if ((sq > 0 && sr < 0) || (sq < 0 && sr > 0)) {
       const double t = sq / (sq - sr);
-      const Point2 x{q.u + t * (r.u - q.u), q.v + t * (r.v - q.v)};
+      const PlanePoint x{q[0] + t * (r[0] - q[0]), q[1] + t * (r[1] - q[1])};
       inside.push_back(x);
       outside.push_back(x);
     }
@@ -60,7 +54,7 @@ void split(const Polygon& p, Point2 a, Point2 b, Polygon& inside, Polygon& outsi
 }
 
 // Removes a triangle (counter-clockwise) from convex polygons.
-void subtract(std::vector<Polygon>& polygons, const std::array<Point2, 3>& triangle) {
+void subtract(std::vector<Polygon>& polygons, const std::array<PlanePoint, 3>& triangle) {
   std::vector<Polygon> left;
   Polygon inside, outside;
   for (Polygon& p : polygons) {
@@ -101,21 +95,19 @@ struct Facet {
     height = longest2 > 0 ? norm(n) / std::sqrt(longest2) : 0;
     normal = normalized(n);
     offset = dot(normal, corner[0]);
-    const int drop = std::fabs(n.x) >= std::fabs(n.y) && std::fabs(n.x) >= std::fabs(n.z) ? 0
-                     : std::fabs(n.y) >= std::fabs(n.z)                                   ? 1
-                                                                                          : 2;
+    const int drop = longest_axis(n);
     u = (drop + 1) % 3;
     v = (drop + 2) % 3;
     if (n[drop] < 0) std::swap(u, v);  // so that the triangle is counter-clockwise in (u, v)
   }
 
-  Point2 project(Vec3 p) const { return {p[u], p[v]}; }
-  Vec3 lift(Point2 p) const {
+  PlanePoint project(Vec3 p) const { return {p[u], p[v]}; }
+  Vec3 lift(PlanePoint p) const {
     const int drop = 3 - u - v;
     Vec3 x;
-    x[u] = p.u;
-    x[v] = p.v;
-    x[drop] = (offset - normal[u] * p.u - normal[v] * p.v) / normal[drop];
+    x[u] = p[0];
+    x[v] = p[1];
+    x[drop] = (offset - normal[u] * p[0] - normal[v] * p[1]) / normal[drop];
     return x;
   }
 
@@ -134,13 +126,6 @@ std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
     if (facet.height > kCoincident && facet.box.meets(box, kCoincident)) result.push_back(facet);
   }
   return result;
-}
-
-Box box_of(const Mesh& mesh) {
-  Box box;
-  for (const Triangle& face : mesh.faces)
-    for (const std::int32_t corner : face) box.extend(mesh.vertices[corner]);
-  return box;
 }
 
 // Appends to `out` the part of mesh `a` that does not touch `b`.
@@ -180,17 +165,32 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
     }
     for (const Polygon& p : polygons) {
       const auto first = static_cast<std::int32_t>(out.vertices.size());
-      for (const Point2 q : p) out.vertices.push_back(facet.lift(q));
+      for (const PlanePoint q : p) out.vertices.push_back(facet.lift(q));
       for (std::int32_t i = 1; i + 1 < static_cast<std::int32_t>(p.size()); ++i)
         out.faces.push_back({first, first + i, first + i + 1});
     }
   }
 }
 
+// Whether a triangle of one solid and an opposite one of the other share more than an edge.
+bool share_area(const Facet& facet, const Facet& other) {
+  if (!facet.box.meets(other.box, kCoincident) || !facet.touches(other)) return false;
+  Polygon common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
+  const PlanePoint outline[3] = {facet.project(other.corner[0]), facet.project(other.corner[2]),
+                                 facet.project(other.corner[1])};
+  Polygon inside, outside;
+  for (int e = 0; e < 3; ++e) {
+    split(common, outline[e], outline[(e + 1) % 3], inside, outside);
+    if (inside.size() < 3 || is_film(inside)) return false;
+    common = inside;
+  }
+  return true;
+}
+
 }  // namespace
 
 Mesh glue(const Mesh& a, const Mesh& b) {
-  const Box box_a = box_of(a), box_b = box_of(b);
+  const Box box_a = box_of_faces(a), box_b = box_of_faces(b);
   Box common;
   for (int axis = 0; axis < 3; ++axis) {
     common.lower[axis] = std::max(box_a.lower[axis], box_b.lower[axis]);
@@ -206,28 +206,9 @@ Mesh glue(const Mesh& a, const Mesh& b) {
   return out;
 }
 
-namespace {
-
-// Whether a triangle of one solid and an opposite one of the other share more than an edge.
-bool share_area(const Facet& facet, const Facet& other) {
-  if (!facet.box.meets(other.box, kCoincident) || !facet.touches(other)) return false;
-  Polygon common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
-  const Point2 outline[3] = {facet.project(other.corner[0]), facet.project(other.corner[2]),
-                             facet.project(other.corner[1])};
-  Polygon inside, outside;
-  for (int e = 0; e < 3; ++e) {
-    split(common, outline[e], outline[(e + 1) % 3], inside, outside);
-    if (inside.size() < 3 || is_film(inside)) return false;
-    common = inside;
-  }
-  return true;
-}
-
-}  // namespace
-
 bool do_touch(const Mesh& a, const Mesh& b) {
-  const std::vector<Facet> others = facets_within(b, box_of(a));
-  for (const Facet& facet : facets_within(a, box_of(b))) {
+  const std::vector<Facet> others = facets_within(b, box_of_faces(a));
+  for (const Facet& facet : facets_within(a, box_of_faces(b))) {
     poll_stop();
     if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
       return true;
@@ -236,8 +217,8 @@ bool do_touch(const Mesh& a, const Mesh& b) {
 }
 
 void add_touching_planes(std::vector<TouchingPlane>& planes, const Mesh& a, const Mesh& b) {
-  const std::vector<Facet> others = facets_within(b, box_of(a));
-  std::vector<Facet> own = facets_within(a, box_of(b));
+  const std::vector<Facet> others = facets_within(b, box_of_faces(a));
+  std::vector<Facet> own = facets_within(a, box_of_faces(b));
   // Large faces first: their planes are the most exact.
   std::stable_sort(own.begin(), own.end(), [](const Facet& f, const Facet& g) { return f.height > g.height; });
   for (const Facet& facet : own) {

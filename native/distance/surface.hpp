@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <mutex>
-#include <utility>
 
 #include "distance/bvh.hpp"
 #include "distance/winding.hpp"
@@ -31,20 +30,12 @@ class Surface {
 // The tree of one surface that several tests may need, made by the first of them.
 class TreeCache {
  public:
-  TreeCache() = default;
-  // The shape is that of the surface's first faces.
-  explicit TreeCache(TreeShape shape) : shape_(std::move(shape)) {}
-
   const Bvh& of(const Mesh& surface) const {
-    std::call_once(made_, [&] {
-      bvh_ = shape_.nodes.empty() ? std::make_unique<Bvh>(surface) : std::make_unique<Bvh>(surface, shape_);
-      shape_ = {};
-    });
+    std::call_once(made_, [&] { bvh_ = std::make_unique<Bvh>(surface); });
     return *bvh_;
   }
 
  private:
-  mutable TreeShape shape_;
   mutable std::once_flag made_;
   mutable std::unique_ptr<Bvh> bvh_;
 };

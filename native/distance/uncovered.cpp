@@ -1,10 +1,17 @@
-#include "distance/uncovered.hpp"
+// What of a surface is not covered by hulls that were made for a simpler copy of it, and which hull takes it in.
+//
+// In:  a triangle mesh and a tree of boxes over it; convex hulls whose union nearly covers it.
+// Out: for each hull the points it has to take in, so that together the hulls cover the mesh.
+// How: A hull that holds the corners of a triangle holds the triangle. The hull that has to grow least takes it;
+//      triangles on the border of several hulls are halved until each piece is taken by the hull that its corners would
+//      choose, or nearly so.
 
 #include <algorithm>
 #include <array>
 
 #include "base/parallel.hpp"
 #include "base/stop.hpp"
+#include "distance/filling.hpp"
 #include "hull/convex_planes.hpp"
 
 namespace rlacd {

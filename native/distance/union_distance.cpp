@@ -1,7 +1,10 @@
 #include "distance/union_distance.hpp"
 
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
 #include "base/stop.hpp"
-#include "cut/clip.hpp"
 #include "distance/surface_field.hpp"
 #include "mesh/curve.hpp"
 #include "mesh/weld.hpp"
@@ -20,6 +23,119 @@ constexpr std::size_t kMostPieces = 4096;
 
 // Two facets face the same way when the angle between them is below 60 degrees.
 constexpr double kSameWay = 0.5;
+
+using Polygon = std::vector<Vec3>;  // convex and flat
+
+// Corners this close to a plane count as on it: no clipped polygon is thinner than rounding.
+constexpr double kOnPlane = 1e-12;
+
+// The facet planes of a convex polytope, each offset along its normal: the points with n_i . x <= offset_i for all i.
+struct HalfSpaces {
+  explicit HalfSpaces(const ConvexPlanes& facets) : planes(&facets), offset(facets.offsets()) {}
+
+  const ConvexPlanes* planes;
+  std::vector<double> offset;  // padded like the planes
+};
+
+// Keeps only its buffers between calls: many small polygons would otherwise allocate them again and again.
+class Clipper {
+ public:
+  // Replaces every polygon by its part outside the intersection of half-spaces. A polygon that does not meet the
+  // intersection stays whole.
+  void subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex);
+
+ private:
+  // Whether a single half-space shows that a polygon does not reach into the intersection; if not, the planes that the
+  // polygon crosses are stored in `crossed_`.
+  bool is_separated(const Polygon& polygon, const HalfSpaces& convex);
+  void split(const Polygon& polygon, Vec3 normal, double offset);
+
+  std::vector<std::int32_t> crossed_;
+  std::vector<Polygon> left_, cut_off_;
+  Polygon rest_, inside_, outside_;
+};
+
+void Clipper::subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex) {
+  left_.clear();
+  for (Polygon& polygon : polygons) {
+    if (is_separated(polygon, convex)) {
+      left_.push_back(std::move(polygon));
+      continue;
+    }
+    cut_off_.clear();
+    rest_ = polygon;
+    for (const std::int32_t i : crossed_) {
+      split(rest_, convex.planes->normal(i), convex.offset[i]);
+      rest_.swap(inside_);
+      if (rest_.empty()) break;
+      if (!outside_.empty()) cut_off_.push_back(outside_);
+    }
+    if (rest_.empty())
+      left_.push_back(std::move(polygon));
+    else
+      std::move(cut_off_.begin(), cut_off_.end(), std::back_inserter(left_));
+  }
+  polygons.swap(left_);
+}
+
+RLACD_WIDE bool Clipper::is_separated(const Polygon& polygon, const HalfSpaces& convex) {
+  constexpr std::size_t kBlock = ConvexPlanes::kBlock;
+  const double *x = convex.planes->x(), *y = convex.planes->y(), *z = convex.planes->z();
+  crossed_.clear();
+  for (std::size_t start = 0; start < convex.planes->size(); start += kBlock) {
+    double least[kBlock], most[kBlock];  // heights of the corners above each plane
+    std::fill(least, least + kBlock, std::numeric_limits<double>::infinity());
+    std::fill(most, most + kBlock, -std::numeric_limits<double>::infinity());
+    for (const Vec3 p : polygon)
+      for (std::size_t i = 0; i < kBlock; ++i) {
+        const std::size_t k = start + i;
+        const double height = x[k] * p.x + y[k] * p.y + z[k] * p.z - convex.offset[k];
+        least[i] = least[i] < height ? least[i] : height;
+        most[i] = most[i] > height ? most[i] : height;
+      }
+    for (std::size_t i = 0; i < kBlock; ++i) {
+      if (least[i] >= -kOnPlane) return true;
+      if (most[i] > kOnPlane) crossed_.push_back(static_cast<std::int32_t>(start + i));
+    }
+  }
+  return false;
+}
+
+// The parts of a polygon inside and outside a half-space. A polygon that only touches the plane stays whole: outside,
+// or inside if it lies in the plane.
+void Clipper::split(const Polygon& polygon, Vec3 normal, double offset) {
+  inside_.clear();
+  outside_.clear();
+  const auto height = [&](Vec3 p) {
+    const double h = dot(normal, p) - offset;
+    return std::fabs(h) <= kOnPlane ? 0.0 : h;
+  };
+  double least = 0, most = 0;
+  for (const Vec3 p : polygon) {
+    const double h = height(p);
+    least = std::min(least, h);
+    most = std::max(most, h);
+  }
+  if (most <= 0) {
+    inside_ = polygon;
+    return;
+  }
+  if (least >= 0) {
+    outside_ = polygon;
+    return;
+  }
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec3 p = polygon[i], q = polygon[i + 1 == polygon.size() ? 0 : i + 1];
+    const double hp = height(p), hq = height(q);
+    if (hp <= 0) inside_.push_back(p);
+    if (hp >= 0) outside_.push_back(p);
+    if ((hp < 0 && hq > 0) || (hp > 0 && hq < 0)) {
+      const Vec3 crossing = p + (hp / (hp - hq)) * (q - p);
+      inside_.push_back(crossing);
+      outside_.push_back(crossing);
+    }
+  }
+}
 
 // Polygons merged into one mesh, in which equal corners are one vertex: its distance is computed once.
 class Gathering {
@@ -46,20 +162,6 @@ class Gathering {
  private:
   Mesh soup_;
 };
-
-// Whether a triangle lies farther than `gap` beyond a plane.
-bool is_beyond(const ConvexPlanes& planes, std::int32_t plane, const Corners& corner, double gap) {
-  return planes.depth(plane, corner[0]) < -gap && planes.depth(plane, corner[1]) < -gap &&
-         planes.depth(plane, corner[2]) < -gap;
-}
-
-// A plane that a triangle lies farther than `gap` beyond, or -1. The given plane is tried first.
-std::int32_t plane_before(const ConvexPlanes& planes, const Corners& corner, double gap, std::int32_t first) {
-  if (first >= 0 && is_beyond(planes, first, corner, gap)) return first;
-  for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i)
-    if (is_beyond(planes, i, corner, gap)) return i;
-  return -1;
-}
 
 }  // namespace
 
@@ -111,7 +213,6 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
   std::vector<std::vector<Facet>> facets(members_.size());
   parallel_for(members_.size(), threads, [&](std::size_t own) {
     const Mesh& mesh = members_[own]->mesh();
-    std::vector<std::int32_t> between(members_.size(), -1);  // the plane that the last facet lay beyond
     Clipper clipper;
     for (const Triangle& face : mesh.faces) {
       poll_stop();
@@ -126,10 +227,6 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
         // covered. If it faces the same way, the hull is shrunk by less than that: of two facets in one plane neither
         // covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
         const ConvexPlanes& planes = members_[m]->planes();
-        if (const std::int32_t plane = plane_before(planes, corner, gap, between[m]); plane >= 0) {
-          between[m] = plane;
-          continue;
-        }
         HalfSpaces halves(planes);
         for (std::size_t i = 0; i < halves.offset.size(); ++i) {
           const double same_way = planes.x()[i] * normal.x + planes.y()[i] * normal.y + planes.z()[i] * normal.z;

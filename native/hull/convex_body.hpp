@@ -45,4 +45,8 @@ class ConvexBody {
   mutable std::unique_ptr<Bvh> bvh_;
 };
 
+// Whether a ball fits into a convex hull whose longest side may have any length: a linear program in the three
+// coordinates of its centre.
+bool holds_ball(const Mesh& hull, double radius);
+
 }  // namespace rlacd

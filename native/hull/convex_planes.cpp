@@ -3,7 +3,6 @@
 #include <stdexcept>
 
 #include "base/stop.hpp"
-#include "hull/wide.hpp"
 
 namespace rlacd {
 namespace {
@@ -38,13 +37,6 @@ struct Facet {
         normal(n) {}
   bool operator<(const Facet& other) const { return key != other.key ? key < other.key : area > other.area; }
 };
-
-double extent_of(const Mesh& hull) {
-  Box box;
-  for (const Triangle& face : hull.faces)
-    for (const std::int32_t corner : face) box.extend(hull.vertices[corner]);
-  return norm(box.upper - box.lower);
-}
 
 bool is_thin(const Mesh& hull, double extent) {
   double volume = 0, area = 0;  // six times and twice
@@ -94,7 +86,8 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
     facets.emplace_back(area, n);
   }
   if (facets.empty()) throw std::invalid_argument("the hull has no facet with an area");
-  if (const double extent = extent_of(hull); is_thin(hull, extent)) add_around(hull, extent, facets);
+  const Box box = box_of_faces(hull);
+  if (const double extent = norm(box.upper - box.lower); is_thin(hull, extent)) add_around(hull, extent, facets);
   std::sort(facets.begin(), facets.end());
   facets.erase(std::unique(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.key == b.key; }),
                facets.end());

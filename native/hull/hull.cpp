@@ -1,4 +1,3 @@
-// Convex hull of points: see hull.hpp for input, output and algorithm.
 #include "hull/hull.hpp"
 
 #include <cmath>

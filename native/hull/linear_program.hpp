@@ -29,17 +29,13 @@ struct Above2 {
   double x, y, offset;
 };
 
-struct Point2 {
-  double x, y;
-};
-
 // On a line start + t along, |t| <= reach; constraints [0, count).
-inline std::optional<Point2> on_line(Point2 start, Point2 along, double slope, const Above2* constraints,
-                                     std::size_t count, double reach) {
+inline std::optional<PlanePoint> on_line(PlanePoint start, PlanePoint along, double slope, const Above2* constraints,
+                                         std::size_t count, double reach) {
   double low = -reach, high = reach;
   for (std::size_t i = 0; i < count; ++i) {
     const Above2& c = constraints[i];
-    const double rate = c.x * along.x + c.y * along.y, missing = c.offset - (c.x * start.x + c.y * start.y);
+    const double rate = c.x * along[0] + c.y * along[1], missing = c.offset - (c.x * start[0] + c.y * start[1]);
     if (rate > kParallel)
       low = std::max(low, missing / rate);
     else if (rate < -kParallel)
@@ -49,20 +45,21 @@ inline std::optional<Point2> on_line(Point2 start, Point2 along, double slope, c
   }
   if (low > high + kViolated) return std::nullopt;
   const double t = slope >= 0 ? low : high;
-  return Point2{start.x + t * along.x, start.y + t * along.y};
+  return PlanePoint{start[0] + t * along[0], start[1] + t * along[1]};
 }
 
-inline std::optional<Point2> lowest2(Point2 objective, const std::vector<Above2>& constraints, double reach) {
-  Point2 best = {objective.x > 0 ? -reach : reach, objective.y > 0 ? -reach : reach};
+inline std::optional<PlanePoint> lowest2(PlanePoint objective, const std::vector<Above2>& constraints, double reach) {
+  PlanePoint best = {objective[0] > 0 ? -reach : reach, objective[1] > 0 ? -reach : reach};
   for (std::size_t i = 0; i < constraints.size(); ++i) {
     const Above2& c = constraints[i];
-    if (c.x * best.x + c.y * best.y >= c.offset - kViolated) continue;
+    if (c.x * best[0] + c.y * best[1] >= c.offset - kViolated) continue;
     const double length2 = c.x * c.x + c.y * c.y;
     if (!(length2 > kParallel * kParallel)) return std::nullopt;
     const double length = std::sqrt(length2);
-    const Point2 start = {c.offset * c.x / length2, c.offset * c.y / length2}, along = {-c.y / length, c.x / length};
-    const double slope = objective.x * along.x + objective.y * along.y;
-    const std::optional<Point2> found = on_line(start, along, slope, constraints.data(), i, 2 * reach);
+    const PlanePoint start = {c.offset * c.x / length2, c.offset * c.y / length2},
+                     along = {-c.y / length, c.x / length};
+    const double slope = objective[0] * along[0] + objective[1] * along[1];
+    const std::optional<PlanePoint> found = on_line(start, along, slope, constraints.data(), i, 2 * reach);
     if (!found) return std::nullopt;
     best = *found;
   }
@@ -90,9 +87,9 @@ inline std::optional<Vec3> lowest_point(Vec3 objective, const std::vector<Above>
       const Vec3 m = constraints[k].normal;
       flat.push_back({dot(m, u), dot(m, v), constraints[k].offset - dot(m, origin)});
     }
-    const std::optional<Point2> found = lowest2({dot(objective, u), dot(objective, v)}, flat, 2 * reach);
+    const std::optional<PlanePoint> found = lowest2({dot(objective, u), dot(objective, v)}, flat, 2 * reach);
     if (!found) return std::nullopt;
-    best = origin + found->x * u + found->y * v;
+    best = origin + (*found)[0] * u + (*found)[1] * v;
   }
   return best;
 }

@@ -11,7 +11,7 @@
 //      adds least volume is a linear program in three variables (Sander, Gu, Gortler, Hoppe, Snyder: "Silhouette
 //      Clipping", 2000). The polytope is replaced by its hull with that point, which swallows both corners (and maybe
 //      more), so it stays convex and only grows. Cheapest first. (2) Relaxation: the remaining corners move, one at a
-//      time, to where the volume is least (convex_relax.hpp). (3) For very few corners, and if no edge can be
+//      time, to where the volume is least. (3) For very few corners, and if no edge can be
 //      collapsed, boxes, prisms and tetrahedra around the hull are relaxed too, and the smallest result is kept: there
 //      always is one.
 // Selecting a subset of the hull's planes (greedily, by the volume cut off) was tried against (1): it added two to five

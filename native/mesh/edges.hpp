@@ -25,6 +25,11 @@ class Buckets {
   std::pair<Item*, Item*> range(std::size_t key) {
     return {items_.data() + begin_[key], items_.data() + begin_[key + 1]};
   }
+  // Calls task(item) for those with keys in [from, to).
+  template <class Task>
+  void for_each(std::size_t from, std::size_t to, const Task& task) const {
+    for (std::size_t i = begin_[from]; i < begin_[to]; ++i) task(items_[i]);
+  }
 
  private:
   std::vector<std::size_t> begin_, next_;
@@ -50,12 +55,14 @@ Edges edges_of(const std::vector<Triangle>& faces, std::size_t vertices);
 class Groups {
  public:
   explicit Groups(std::size_t nodes);
+  void add() { parent_.push_back(static_cast<std::int64_t>(parent_.size())); }
   void join(std::int64_t a, std::int64_t b);
+  // A node that all of its group share.
+  std::int64_t root(std::int64_t node);
   // The number of groups, and the group of each node.
   std::pair<std::int64_t, std::vector<std::int64_t>> labels();
 
  private:
-  std::int64_t root(std::int64_t node);
   std::vector<std::int64_t> parent_;  // never larger than the node
 };
 
@@ -73,8 +80,20 @@ struct ClosedBodies {
 // No count if there are other edges.
 ClosedBodies closed_bodies(const Mesh& mesh);
 
-// A closed mesh in which faces that meet at a vertex only have a vertex each: all but the first fan of faces around a
-// vertex get a copy of it, after all others.
-Mesh separate_fans(const Mesh& mesh);
+// The wedges of space around the edges, and which sides of faces bound each. n log n time.
+using Pair = std::array<std::int64_t, 2>;
+
+struct Wedges {
+  // [3F], halfedges: going around their edge from its smaller to its larger vertex by the right-hand rule, the second
+  // follows the first with nothing in between. Both are the same on a free edge.
+  std::vector<Pair> halfedges;
+  // [3F], the side that each of them shows to the wedge: 2 f is the front of face f, 2 f + 1 its back.
+  std::vector<Pair> sides;
+};
+
+// Faces are ordered by their angles around the edge; those that coincide, and all around edges none of whose faces is
+// in doubt (`trusted`, [F] or empty), alternate as their windings require.
+Wedges wedges_of(const Mesh& mesh, const std::vector<std::int64_t>& edge_of_halfedge, std::size_t edges,
+                 const std::vector<bool>& trusted);
 
 }  // namespace rlacd

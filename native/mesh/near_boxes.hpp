@@ -2,7 +2,6 @@
 //
 // Input:  boxes, which of them are new, and a distance.
 // Output: pairs of a new box and any other, ascending: those within reach of each other, or of a common third box.
-// Algorithm: boxes are sorted along the axis on which they overlap least.
 #pragma once
 
 #include <array>

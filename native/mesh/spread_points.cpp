@@ -1,6 +1,11 @@
 #include "mesh/spread_points.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
 #include "base/stop.hpp"
+#include "mesh/edges.hpp"
 
 namespace rlacd {
 namespace {
@@ -46,6 +51,20 @@ void spread_over(const Mesh& mesh, const Triangle& face, double spacing, bool co
   take(c);
 }
 
+// Uniform in [0, 1), a function of the seed and the counter alone (Steele, Lea, Flood: SplitMix64, 2014).
+double uniform(std::uint64_t seed, std::uint64_t counter) {
+  std::uint64_t z = seed + (counter + 1) * 0x9e3779b97f4a7c15u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  z ^= z >> 31;
+  return static_cast<double>(z >> 11) * 0x1p-53;
+}
+
+double fraction(double x) { return x - std::floor(x); }
+
+// 1 / g and 1 / g^2 for the plastic number g, the real root of g^3 = g + 1.
+constexpr double kStepU = 0.7548776662466927, kStepV = 0.5698402909980532;
+
 }  // namespace
 
 SpreadPoints spread_points(const Mesh& mesh, double spacing) {
@@ -84,6 +103,76 @@ MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int6
     cells.marks[(cell[0] * cells.shape[1] + cell[1]) * cells.shape[2] + cell[2]] = 1;
   });
   return cells;
+}
+
+std::vector<std::int64_t> label_cells(const bool* marks, Cell shape) {
+  const std::int64_t steps[3] = {shape[1] * shape[2], shape[2], 1}, count = shape[0] * steps[0];
+  Groups groups(static_cast<std::size_t>(count));
+  for (std::int64_t cell = 0; cell < count; ++cell) {
+    if (cell % (1 << 16) == 0) poll_stop();
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (marks[cell] && cell / steps[axis] % shape[axis] > 0 && marks[cell - steps[axis]])
+        groups.join(cell, cell - steps[axis]);
+  }
+  std::vector<std::int64_t> labels = groups.labels().second;
+  for (std::int64_t cell = 0; cell < count; ++cell) labels[cell] = marks[cell] ? labels[cell] + 1 : 0;
+  return labels;
+}
+
+std::vector<std::int64_t> nearest_labels(const std::int64_t* labels, Cell shape, const std::vector<Cell>& cells,
+                                         double reach) {
+  std::vector<Cell> offsets;
+  const auto norm2 = [](const Cell& c) { return c[0] * c[0] + c[1] * c[1] + c[2] * c[2]; };
+  const auto most = static_cast<std::int64_t>(std::floor(reach));
+  for (std::int64_t i = -most; i <= most; ++i)
+    for (std::int64_t j = -most; j <= most; ++j)
+      for (std::int64_t k = -most; k <= most; ++k)
+        if (static_cast<double>(norm2({i, j, k})) <= reach * reach) offsets.push_back({i, j, k});
+  std::stable_sort(offsets.begin(), offsets.end(), [&](const Cell& a, const Cell& b) { return norm2(a) < norm2(b); });
+  std::vector<std::int64_t> nearest;
+  nearest.reserve(cells.size());
+  for (std::size_t n = 0; n < cells.size(); ++n) {
+    if (n % 1024 == 0) poll_stop();
+    std::int64_t found = 0;
+    for (std::size_t o = 0; o < offsets.size() && found == 0; ++o) {
+      const std::int64_t i = cells[n][0] + offsets[o][0], j = cells[n][1] + offsets[o][1],
+                         k = cells[n][2] + offsets[o][2];
+      if (i >= 0 && j >= 0 && k >= 0 && i < shape[0] && j < shape[1] && k < shape[2])
+        found = labels[(i * shape[1] + j) * shape[2] + k];
+    }
+    nearest.push_back(found);
+  }
+  return nearest;
+}
+
+SpreadPoints sample_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed) {
+  std::vector<double> area_up_to(mesh.faces.size());
+  double area = 0;
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    area += norm(long_normal(mesh, mesh.faces[f]));
+    area_up_to[f] = area;
+  }
+  SpreadPoints samples;
+  if (count == 0) return samples;
+  if (!(area > 0)) throw std::invalid_argument("the surface has no area to sample");
+
+  samples.points.resize(count);
+  samples.faces.resize(count);
+  const double shift_u = uniform(seed, 0), shift_v = uniform(seed, 1);
+  std::size_t f = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double along = (static_cast<double>(i) + uniform(seed, i + 2)) / static_cast<double>(count) * area;
+    // Rounding can put the last position at the very end; faces of zero area are never the first to reach beyond it.
+    while (f + 1 < area_up_to.size() && area_up_to[f] <= along) ++f;
+    while (area_up_to[f] <= (f > 0 ? area_up_to[f - 1] : 0.0)) --f;
+    const double step = static_cast<double>(i + 1);
+    double u = fraction(shift_u + step * kStepU), v = fraction(shift_v + step * kStepV);
+    if (u + v > 1) u = 1 - u, v = 1 - v;
+    const auto [a, b, c] = corners_of(mesh, mesh.faces[f]);
+    samples.points[i] = a + u * (b - a) + v * (c - a);
+    samples.faces[i] = static_cast<std::int32_t>(f);
+  }
+  return samples;
 }
 
 }  // namespace rlacd

@@ -1,7 +1,8 @@
 #include "mesh/weld.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <functional>
+#include <unordered_map>
 
 #include "base/stop.hpp"
 #include "mesh/edges.hpp"
@@ -12,17 +13,14 @@ namespace {
 
 constexpr std::size_t kBetweenPolls = 4096;
 
-std::uint64_t hash_of(Vec3 p) {
-  std::uint64_t hash = 0;
-  for (const double x : {p.x, p.y, p.z}) {
-    const double plain = x + 0.0;  // -0.0 is equal to 0.0
-    std::uint64_t bits;
-    std::memcpy(&bits, &plain, sizeof bits);
-    hash = (hash ^ (bits >> 29) ^ bits) * 0x9e3779b97f4a7c15u;
-    hash ^= hash >> 32;
+struct Hash {
+  std::size_t operator()(Vec3 p) const {
+    std::size_t hash = 0;
+    for (const double x : {p.x, p.y, p.z})  // -0.0 has the hash of 0.0
+      hash = (hash ^ std::hash<double>()(x) ^ hash >> 29) * static_cast<std::size_t>(0x9e3779b97f4a7c15u);
+    return hash;
   }
-  return hash;
-}
+};
 
 enum Worth : char { kDropped, kFace, kFilm };
 
@@ -93,18 +91,12 @@ std::vector<char> worth_keeping(const std::vector<Triangle>& faces, std::size_t 
 }  // namespace
 
 std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points) {
-  std::size_t size = 16;
-  while (size < 2 * points.size()) size *= 2;
-  std::vector<std::int32_t> table(size, -1), first(points.size());
+  std::unordered_map<Vec3, std::int32_t, Hash> known;
+  known.reserve(points.size());
+  std::vector<std::int32_t> first(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i % kBetweenPolls == 0) poll_stop();
-    const Vec3 p = points[i];
-    std::size_t slot = hash_of(p) & (size - 1);
-    for (; table[slot] >= 0; slot = (slot + 1) & (size - 1)) {
-      if (points[table[slot]] == p) break;
-    }
-    if (table[slot] < 0) table[slot] = static_cast<std::int32_t>(i);
-    first[i] = table[slot];
+    first[i] = known.try_emplace(points[i], static_cast<std::int32_t>(i)).first->second;
   }
   return first;
 }

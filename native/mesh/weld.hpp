@@ -8,7 +8,7 @@
 
 namespace rlacd {
 
-// For each point, the first point at the same place, by hashing with open addressing. Zeros of either sign are equal.
+// For each point, the first point at the same place. Zeros of either sign are equal.
 std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points);
 
 // The distinct places of the vertices that faces use, in the order in which any vertex first has them, without zeros of

@@ -20,9 +20,8 @@ BallReach::BallReach(const NavigableField& field, ClearanceGrid& grid)
     : field_(field),
       grid_(grid),
       least_(field.radius() * (1 - kRounding)),
-      half_diagonal_(0.5 * std::sqrt(3.0) * grid.pitch * (1 + kRounding)) {
-  parent_.resize(1 + grid_.size());
-  for (std::size_t i = 0; i < parent_.size(); ++i) parent_[i] = static_cast<std::int32_t>(i);
+      half_diagonal_(0.5 * std::sqrt(3.0) * grid.pitch * (1 + kRounding)),
+      regions_(static_cast<std::size_t>(1 + grid.size())) {
   join_cells();
 }
 
@@ -30,20 +29,9 @@ std::int32_t BallReach::add(Vec3 point, double clearance) {
   const auto number = static_cast<std::int32_t>(points_.size());
   points_.push_back(point);
   clearance_.push_back(clearance);
-  parent_.push_back(node_of(number));
+  regions_.add();
   join_point(number);
   return number;
-}
-
-std::int32_t BallReach::root(std::int32_t node) {
-  while (parent_[node] != node) node = parent_[node] = parent_[parent_[node]];
-  return node;
-}
-
-bool BallReach::join(std::int32_t a, std::int32_t b) {
-  a = root(a), b = root(b);
-  parent_[std::max(a, b)] = std::min(a, b);
-  return a != b;
 }
 
 template <class Action>

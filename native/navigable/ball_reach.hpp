@@ -13,6 +13,7 @@
 
 #include <unordered_map>
 
+#include "mesh/edges.hpp"
 #include "navigable/clearance_grid.hpp"
 
 namespace rlacd {
@@ -50,8 +51,8 @@ class BallReach {
 
   std::int32_t node_of(std::int32_t point) const { return 1 + grid_.size() + point; }
   static std::int32_t node_of_cell(std::int32_t cell) { return 1 + cell; }
-  std::int32_t root(std::int32_t node);
-  bool join(std::int32_t a, std::int32_t b);  // returns whether they were separate
+  std::int32_t root(std::int32_t node) { return static_cast<std::int32_t>(regions_.root(node)); }
+  void join(std::int32_t a, std::int32_t b) { regions_.join(a, b); }
 
   void start_on_border();
   bool is_free(std::int32_t cell) const { return grid_.clearance[cell] >= least_; }
@@ -72,7 +73,7 @@ class BallReach {
   std::vector<double> clearance_;  // of the points
   double least_, half_diagonal_;
   bool from_outside_ = false;
-  std::vector<std::int32_t> parent_;
+  Groups regions_;
   std::unordered_map<std::int32_t, Place> places_;  // clearance 0: the cell has none
   // By cell: the region whose search has seen it, or a mark that everything reachable from it has been seen.
   std::vector<std::int32_t> mark_;

@@ -16,14 +16,9 @@
 
 namespace rlacd {
 
-// Balls keep out of normal . x < offset; the normal has length 1.
-struct HalfSpace {
-  Vec3 normal;
-  double offset;
-};
-
 class NavigableField {
  public:
+  // Balls keep out of the closed half-spaces, whose normals have length 1.
   NavigableField(const Bvh& surface, const ConvexBody& hull, std::vector<HalfSpace> closed, double radius,
                  double tolerance)
       : surface_(surface), hull_(hull), closed_(std::move(closed)), radius_(radius), tolerance_(tolerance) {}
@@ -46,12 +41,24 @@ class NavigableField {
   Value room_near(Vec3 x, std::int32_t hint = -1) const { return by_surface_and_ground(x, hint, tolerance_); }
 
   // Distance to the nearest closed half-space, negative inside it.
-  double above_ground(Vec3 x) const;
+  double above_ground(Vec3 x) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const HalfSpace& closed : closed_) least = std::min(least, dot(closed.normal, x) - closed.offset);
+    return least;
+  }
   // The room's term of the hull at distance `away`: the room ends at r from the hull.
   double room_by_hull(double away) const { return level() + radius_ - away; }
 
  private:
-  Value by_surface_and_ground(Vec3 x, std::int32_t hint, double margin) const;
+  Value by_surface_and_ground(Vec3 x, std::int32_t hint, double margin) const {
+    const Bvh::Hit hit = surface_.closest(x, hint);
+    Value value = {std::sqrt(hit.distance2), normalized(x - hit.point), hit.slot, Limit::kSurface};
+    for (const HalfSpace& closed : closed_) {
+      const double above = dot(closed.normal, x) - closed.offset + margin;
+      if (above < value.value) value.value = above, value.uphill = closed.normal, value.by = Limit::kGround;
+    }
+    return value;
+  }
 
   const Bvh& surface_;
   const ConvexBody& hull_;

@@ -296,7 +296,6 @@ class Spreading {
     }
     std::sort(taken.begin(), taken.end());
     Balls balls;
-    balls.pitch = grid_.pitch;
     for (const std::int32_t c : taken) {
       balls.centres.push_back(candidates[c].at);
       balls.radii.push_back(candidates[c].radius);
@@ -351,6 +350,26 @@ class Spreading {
 Balls spread_balls(const Surface& surface, const NavigableField& field, const BallSources& sources, double pitch,
                    int threads) {
   return Spreading(surface, field, pitch, threads).run(sources);
+}
+
+std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
+                                  const std::vector<std::int32_t>* candidates, double least, bool first) {
+  std::vector<Intrusion> found;
+  const Box& box = hull.box();
+  const std::size_t count = candidates != nullptr ? candidates->size() : balls.centres.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i % kChunk == 0) poll_stop();
+    const std::int32_t ball = candidates != nullptr ? (*candidates)[i] : static_cast<std::int32_t>(i);
+    const Vec3 c = balls.centres[ball];
+    const double radius = balls.radii[ball], enough = radius - least;
+    if (!(enough > 0)) continue;
+    if (!box.meets({c, c}, enough)) continue;
+    const double distance = hull.distance(c, enough);
+    if (!(distance < enough)) continue;
+    found.push_back({ball, radius - distance});
+    if (first) break;
+  }
+  return found;
 }
 
 }  // namespace rlacd

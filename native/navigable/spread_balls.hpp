@@ -20,7 +20,6 @@ namespace rlacd {
 struct Balls {
   std::vector<Vec3> centres;
   std::vector<double> radii;
-  double pitch = 0;  // of the grid
 };
 
 struct BallSources {
@@ -35,5 +34,16 @@ constexpr double kBallSpacing = 0.45;
 
 Balls spread_balls(const Surface& surface, const NavigableField& field, const BallSources& sources, double pitch,
                    int threads);
+
+struct Intrusion {
+  std::int32_t ball;
+  double depth;  // radius minus the signed distance of the centre from the hull
+};
+
+// The balls among `candidates` (all if null) that the hull penetrates deeper than `least`, in the given order. Depths
+// are exact. With `first`, at most one. Most balls are ruled out by one facet plane, often by the one that ruled out
+// the ball before; the rest are decided exactly.
+std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
+                                  const std::vector<std::int32_t>* candidates, double least, bool first);
 
 }  // namespace rlacd

@@ -66,7 +66,7 @@ def test_points_in_a_ball(seed: int, count: int, radius: float) -> None:
     points = random.uniform(size=(count, 3)).round(random.integers(1, 4))  # some in one place
     centres = random.uniform(-0.2, 1.2, (20, 3))
     radii = np.full(20, radius) * random.uniform(size=20)
-    counts, found = _native.PointTree(points).within(centres, radii)
+    counts, found = _native.points_within(points, centres, radii)
     expected = cKDTree(points).query_ball_point(centres, radii, return_sorted=True)
     assert counts.tolist() == [len(own) for own in expected]
     assert found.tolist() == [int(i) for own in expected for i in own]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rlacd._native import PointTree, components, poll_stop
+from rlacd._native import components, points_within, poll_stop
 from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.topology import BoolArray, Edges, IntArray, first_of_doubled, has_marked, marked, nondegenerate
 
@@ -65,7 +65,7 @@ def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, to
     represented by its first vertex.
     """
     ends = np.unique(free)
-    counts, near = PointTree(vertices[ends]).within(vertices[ends], np.full(len(ends), tolerance))
+    counts, near = points_within(vertices[ends], vertices[ends], np.full(len(ends), tolerance))
     if len(near) == len(ends):  # each is near itself only
         return faces
     _, label = components(len(ends), np.repeat(np.arange(len(ends)), counts), near.astype(np.int64))
@@ -120,7 +120,7 @@ def _on_edges(vertices: FloatArray, corners: IntArray, free: IntArray, tolerance
     span = vertices[b] - vertices[a]
     length = np.linalg.norm(span, axis=1)
     middle = (vertices[a] + vertices[b]) / 2
-    count, near = PointTree(vertices[free]).within(middle, length / 2 + tolerance, MOST_NEAR)
+    count, near = points_within(vertices[free], middle, length / 2 + tolerance, MOST_NEAR)
     if len(near) > MOST_NEAR or len(near) == 0:
         return none[0], none[1]
     poll_stop()

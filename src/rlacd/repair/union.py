@@ -49,14 +49,15 @@ def one_body(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatArray, In
     alone; it takes twenty times as long.
     """
     found = _native.closed_bodies(vertices, faces)
-    if found is None or len(found[1]) > 1:
+    if found is None:
         return None
-    _, (volume,), (area,), _, has_no_pinch, least_height, least_fold = found
+    _, (volume, *others), (area, *_), _, has_no_pinch, least_height, least_fold = found
+    if others or not has_no_pinch:
+        return None
     if abs(volume) <= 2 * FLAT * area or least_height * min(least_fold, 1.0) <= _FLAT_MESH:
         return None
     outward = faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
-    separate = (vertices, outward) if has_no_pinch else _native.separate_fans(vertices, outward)
-    return _native.along_a_curve(*separate), volume < 0
+    return _native.along_a_curve(vertices, outward), volume < 0
 
 
 def as_manifold(solid: Shape) -> Manifold:

@@ -277,9 +277,9 @@ class Component(Part):
 
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
-        vertices, faces, volume, tree = self.filling.clipped(hull.vertices, hull.faces)
+        vertices, faces, volume = self.filling.clipped(hull.vertices, hull.faces)
         part = Part(vertices, faces, volume, hull)
-        part.tree = tree
+        part.tree = _native.TreeCache()
         return part
 
     def pieces(self) -> list[Component]:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rlacd._native import PointTree
 from rlacd.errors import import_extra
 from rlacd.io.write import write_file
 from rlacd.io.write.palette import linear_from_srgb
@@ -152,15 +151,12 @@ def picture_bytes(
 def apart(balls: Balls) -> Balls:
     """Choose balls that do not overlap, smallest first; all of them together would look like one cloud."""
     order = np.argsort(balls.radii, kind="stable")
-    tree = PointTree(balls.centres)
     hidden = np.zeros(len(balls), dtype=bool)
     shown: list[int] = []
     for i in order:
         if not hidden[i]:
             shown.append(int(i))
-            _, near = tree.within(balls.centres[i : i + 1], balls.radii[i : i + 1] + balls.radii.max())
-            away = np.linalg.norm(balls.centres[near] - balls.centres[i], axis=1)
-            hidden[near[away < balls.radii[near] + balls.radii[i]]] = True
+            hidden |= np.linalg.norm(balls.centres - balls.centres[i], axis=1) < balls.radii + balls.radii[i]
     return Balls(balls.centres[shown], balls.radii[shown])
 
 

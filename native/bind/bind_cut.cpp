@@ -1,0 +1,113 @@
+// Python bindings of candidate planes, of the plane sweep, of plane cuts, and of reuniting the pieces they leave.
+#include "bind/released.hpp"
+#include "cut/concave_edges.hpp"
+#include "cut/least_excess.hpp"
+#include "cut/pieces.hpp"
+#include "cut/reunite.hpp"
+#include "cut/sweep.hpp"
+#include "distance/filling.hpp"
+
+namespace rlacd {
+
+double scalar(Tag<PlaneScore>);
+
+namespace {
+
+using OffsetsIn = ArrayIn<double, nb::ndim<2>>;
+
+std::vector<double> to_offsets(const OffsetsIn& array, const std::vector<Vec3>& directions) {
+  require(array.shape(0) == directions.size(), "one row of offsets a direction");
+  return copied<double>(array);
+}
+
+using Columns =
+    std::tuple<std::vector<Vec3>, std::vector<Triangle>, double, std::vector<Vec3>, std::vector<Triangle>, double>;
+
+std::optional<Columns> columns(std::optional<Piece> piece) {
+  if (!piece) return std::nullopt;
+  return Columns(std::move(piece->mesh.vertices), std::move(piece->mesh.faces), piece->volume,
+                 std::move(piece->hull.vertices), std::move(piece->hull.faces), piece->hull_volume);
+}
+
+auto columns(std::array<std::optional<Piece>, 2> sides) {
+  return std::pair(columns(std::move(sides[0])), columns(std::move(sides[1])));
+}
+
+}  // namespace
+
+void bind_cut(nb::module_& m) {
+  m.def(
+      "candidate_planes", released([](const Mesh& mesh, const Mesh& hull, int per_axis, std::size_t edges) {
+        std::vector<CandidatePlane> planes;
+        if (per_axis > 0) planes = equidistant_planes(mesh, hull, per_axis);
+        for (const CandidatePlane& plane : concave_planes(mesh, hull, edges)) planes.push_back(plane);
+        std::vector<Vec3> normals;
+        std::vector<double> offsets;
+        for (const auto& [normal, offset] : planes) normals.push_back(normal), offsets.push_back(offset);
+        return std::pair(std::move(normals), std::move(offsets));
+      }),
+      "vertices"_a, "faces"_a, "hull_vertices"_a, "hull_faces"_a, "per_axis"_a, "edges"_a,
+      "Unit normals [K, 3] and offsets [K] of planes: `per_axis` along each coordinate axis and principal axis, which "
+      "divide the hull's extent into equal slabs, and at most three for each of the concave edges chosen.");
+  m.def(
+      "sweep",
+      released([](const Mesh& mesh, const std::vector<Vec3>& directions, const OffsetsIn& offsets, int threads) {
+        return sweep(mesh, directions, to_offsets(offsets, directions), threads);
+      }),
+      "vertices"_a, "faces"_a, "directions"_a, "offsets"_a, "threads"_a = 0,
+      "Scores of the planes n.x = d for unit directions n [K, 3] and ascending offsets d [K, M]: float64 [K * M, "
+      "10].\n\n"
+      "Columns: hull volume below, above; solid volume below, above; section area, perimeter; thickness below, above; "
+      "largest extent below, above. The mesh must be closed and outward oriented.");
+  m.def("find_least_excess",
+        released([](const Mesh& mesh, const std::vector<Vec3>& directions, const OffsetsIn& offsets, double exponent,
+                    double tie, double least_solid, const std::vector<double>& slivers, int threads) {
+          return static_cast<std::int64_t>(find_least_excess(mesh, directions, to_offsets(offsets, directions),
+                                                             {exponent, tie, least_solid, slivers}, threads));
+        }),
+        "vertices"_a, "faces"_a, "directions"_a, "offsets"_a, "exponent"_a, "tie"_a, "least_solid"_a, "slivers"_a,
+        "threads"_a = 0,
+        "The first of the planes n.x = d, for unit directions n [K, 3] and ascending offsets d [K, M], whose sides' "
+        "excesses (volume of the hull less that of the solid) have the least norm; -1 where no plane is valid.\n\n"
+        "A plane is valid where both sides hold more than `least_solid` and are thicker than a share of their largest "
+        "extent: the first of `slivers` by which there are valid planes. Costs, the norm's power `exponent` where that "
+        "is finite, that differ by no more than `tie` are equal. The mesh must be closed and outward oriented.");
+  m.def("cut", released([](const Mesh& mesh, double x, double y, double z, double offset, double least) {
+          return columns(cut(mesh, {x, y, z}, offset, least));
+        }),
+        "vertices"_a, "faces"_a, "x"_a, "y"_a, "z"_a, "offset"_a, "least"_a,
+        "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and "
+        "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
+  m.def("halve",
+        released([](const Mesh& mesh, const HullCorners& corners, const std::vector<const HullCorners*>& around,
+                    const std::vector<double>& volumes, double share, double least) {
+          require(around.size() == volumes.size(), "one volume a hull");
+          std::vector<HullAround> hulls;
+          for (std::size_t i = 0; i < around.size(); ++i) hulls.push_back({&around[i]->all, volumes[i]});
+          return columns(halve(mesh, corners.all, hulls, share, least));
+        }),
+        "vertices"_a, "faces"_a, "corners"_a, "around"_a, "volumes"_a, "share"_a, "least"_a,
+        "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
+        "other of the two hulls around whose volumes it would add the least to; None twice if there are no two.");
+  m.def(
+      "connected_pieces", released([](const Mesh& mesh, double least) {
+        std::optional<std::vector<Columns>> all;
+        if (std::optional<std::vector<Piece>> found = connected_pieces(mesh, least)) {
+          all.emplace();
+          for (Piece& piece : *found) all->push_back(*columns(std::optional(std::move(piece))));
+        }
+        return all;
+      }),
+      "vertices"_a, "faces"_a, "least"_a,
+      "The pieces of a closed mesh that edges connect, with their cavities, as `cut` returns its sides, without those "
+      "of no more than the least volume; None if all is one piece.");
+  m.def("reunite", released([](const std::vector<Mesh>& solids, double least) {
+          std::optional<Mesh> united = reunited(solids);
+          return columns(united ? piece_of(std::move(*united), least) : std::nullopt);
+        }),
+        "vertices"_a, "faces"_a, "least"_a,
+        "Solids with disjoint interiors that touch face to face as one, as `cut` returns its sides; None if rounding "
+        "leaves it open.");
+}
+
+}  // namespace rlacd
