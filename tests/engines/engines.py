@@ -86,7 +86,7 @@ class Engine:
         name, *arguments = self.program
         if name.endswith(".mjs"):
             if shutil.which("node") is None or not (FOLDER / "node_modules" / self.package).is_dir():
-                pytest.skip(f"{self.package} is not installed (make build/engines)")
+                pytest.skip(f"Node or {self.package} is not installed (make build/engines)")
             return ["node", str(HERE / name), *arguments]
         return [python_with(self.package), str(HERE / name), *arguments]
 
