@@ -88,7 +88,7 @@ test-all: lint
 
 nightly: test-all sanitize soak
 
-# Physics engines, from the registries, to hold hulls and files against: 12 GB, most of it PyTorch for Genesis.
+# Physics engines, from the registries, to hold hulls and files against: 12 GB, half of it PyTorch for Genesis.
 engines: $(VENV)/test-extras build/engines/installed
 	$(BIN)/pytest -m nightly tests/engines
 	build/engines/bin/python -m pytest -p no:cacheprovider tests/engines/test_in_code.py

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pytest
@@ -20,13 +20,13 @@ HEAD = "| engine | file | preset | corners kept | thinnest, mm | corners lost, v
 def row(name: str, meshes: Path, folder: Path) -> str:
     engine = ENGINES[name]
     title, answers = ask(engine, {**to_fall(engine, meshes), "probes": (probes(), [])}, folder)
-    tried = answers.pop("probes")
+    tried, stack = answers.pop("probes"), answers.pop("stack")
     kept = [_kept(tried, index) for index in range(len(tried.given))]
     corners = max((count for count, one in zip(BALLS, kept, strict=False) if one), default=0)
     thin = min((each for each, one in zip(SLABS, kept[len(BALLS) :], strict=True) if one), default=0)
     cells = [f"{name}: {title}", f"`.{engine.ending}`" if engine.ending else "points", f"`{engine.preset}`"]
     cells += [f"{corners:,}" if "vertices" in tried.hulls[0] else "–", f"{thin:g}" if thin else "–", _changed(answers)]
-    return f"| {' | '.join([*cells, *_rest(answers)])} |"
+    return f"| {' | '.join([*cells, *_rest(answers.values(), stack)])} |"
 
 
 def _kept(body: Body, index: int) -> bool:
@@ -54,15 +54,14 @@ def _changed(answers: dict[str, Body]) -> str:
     return f"{lost} of {sum(len(hull.vertices) for hull, _ in pairs):,}, {100 * share:.2g} %"
 
 
-def _rest(answers: dict[str, Body]) -> Sequence[str]:
-    if not answers["table"].falls:
+def _rest(bodies: Iterable[Body], stack: Body) -> Sequence[str]:
+    if not stack.falls:
         return "–", "–"
-    drops = [(body, body.falls[0]) for body in answers.values() if body.falls]
-    said = [(max(abs(lowest(body, ends[0])) for body, ends in drops), max(speed(ends) for _, ends in drops))]
-    for stack in answers["table"].falls[1:]:
-        off = max(abs(end["pose"][2] - index * TABLE_HEIGHT) for index, end in enumerate(stack))
-        said.append((off, speed(stack)))
-    return [*(f"{1000 * far:.1f} mm, {1000 * fast:.1f} mm/s" for far, fast in said), "–"][:2]
+    drops = [(body, body.falls[0]) for body in bodies if body.falls]
+    down = max(abs(lowest(body, ends[0])) for body, ends in drops), max(speed(ends) for _, ends in drops)
+    (ends,) = stack.falls
+    off = max(abs(end["pose"][2] - index * TABLE_HEIGHT) for index, end in enumerate(ends)), speed(ends)
+    return [f"{1000 * far:.1f} mm, {1000 * fast:.1f} mm/s" for far, fast in (down, off)]
 
 
 def main(meshes: Path, wanted: Sequence[str]) -> None:

@@ -50,7 +50,8 @@ def state(place: Any, turn: Any, velocity: Any, spin: Any) -> dict[str, Any]:
     return {"pose": [*map(float, place), *map(float, turn)], "velocity": [*map(float, velocity), *map(float, spin)]}
 
 
-def volume(points: Any, faces: Any) -> float:
-    """The volume of a closed surface of triangles."""
-    corners = np.asarray(points, dtype=float)[np.asarray(faces)]
-    return abs(float(np.linalg.det(corners - corners[0, 0]).sum())) / 6
+def kept(points: Any, faces: Any, mass: float) -> dict[str, Any]:
+    """What an engine has of a hull, a closed surface of triangles: how many corners and what volume."""
+    corners = np.asarray(points, dtype=float)[np.asarray(faces).reshape(-1, 3)]
+    volume = abs(float(np.linalg.det(corners - corners[0, 0]).sum())) / 6
+    return {"vertices": len(points), "volume": volume, "mass": mass}

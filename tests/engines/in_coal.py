@@ -5,7 +5,7 @@ from pathlib import Path
 import coal
 import numpy as np
 import pinocchio
-from harness import run, volume
+from harness import kept, run
 
 
 def take(file):
@@ -17,11 +17,9 @@ def take(file):
         assert isinstance(shape.geometry, coal.BVHModelOBBRSS)  # as it is read
         shape.geometry.buildConvexRepresentation(False)
         convex = shape.geometry.convex
-        points = np.array(convex.points())
-        faces = [
-            [triangle[k] for k in range(3)] for triangle in (convex.polygons(i) for i in range(convex.num_polygons))
-        ]
-        said.append({"vertices": convex.num_points, "volume": volume(points, faces), "mass": model.inertias[1].mass})
+        triangles = map(convex.polygons, range(convex.num_polygons))
+        faces = [[triangle[k] for k in range(3)] for triangle in triangles]
+        said.append(kept(np.array(convex.points()), faces, model.inertias[1].mass))
     return said
 
 

@@ -2,23 +2,18 @@
 
 import itertools
 
-from harness import STEP, run, state, volume
-from pydrake.geometry import Convex, HalfSpace
-from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
+import pydrake.all as drake
+from harness import STEP, kept, run, state
 
 
 def world(file, starts):
-    builder = DiagramBuilder()
-    plant, scene = AddMultibodyPlantSceneGraph(builder, STEP)
-    friction = CoulombFriction(0.8, 0.8)
-    plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", friction)
+    builder = drake.DiagramBuilder()
+    plant, scene = drake.AddMultibodyPlantSceneGraph(builder, STEP)
+    friction = drake.CoulombFriction(0.8, 0.8)
+    plant.RegisterCollisionGeometry(plant.world_body(), drake.RigidTransform(), drake.HalfSpace(), "floor", friction)
     bodies = []
     for _ in starts:
-        parser = Parser(plant)
+        parser = drake.Parser(plant)
         parser.SetAutoRenaming(True)
         (instance,) = parser.AddModels(file)
         bodies.append(plant.get_body(plant.GetBodyIndices(instance)[0]))
@@ -32,10 +27,9 @@ def take(file):
     said = []
     for geometry in plant.GetCollisionGeometriesForBody(body):
         shape, hull = inspector.GetShape(geometry), inspector.GetConvexHull(geometry)
-        assert isinstance(shape, Convex)
+        assert isinstance(shape, drake.Convex)
         points = [hull.vertex(index) for index in range(hull.num_vertices())]
-        kept = {"vertices": len(points), "volume": volume(points, triangles(hull.face_data()))}
-        said.append({"mass": body.default_mass(), **kept})
+        said.append(kept(points, triangles(hull.face_data()), body.default_mass()))
     return said
 
 
@@ -51,10 +45,10 @@ def triangles(polygons):
 
 def fall(file, starts, steps):
     diagram, plant, _, bodies = world(file, starts)
-    simulator = Simulator(diagram)
+    simulator = drake.Simulator(diagram)
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     for body, start in zip(bodies, starts, strict=True):
-        plant.SetFreeBodyPose(context, body, RigidTransform(start))
+        plant.SetFreeBodyPose(context, body, drake.RigidTransform(start))
     simulator.AdvanceTo(steps * STEP)
     said = []
     for body in bodies:

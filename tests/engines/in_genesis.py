@@ -1,7 +1,7 @@
 """Genesis, on the processor: URDF."""
 
 import genesis
-from harness import GRAVITY, STEP, run, state, volume
+from harness import GRAVITY, STEP, kept, run, state
 
 genesis.init(backend=genesis.cpu, logging_level="error")
 
@@ -9,28 +9,19 @@ genesis.init(backend=genesis.cpu, logging_level="error")
 def world(file, starts):
     scene = genesis.Scene(sim_options=genesis.options.SimOptions(dt=STEP, gravity=(0, 0, GRAVITY)), show_viewer=False)
     scene.add_entity(genesis.morphs.Plane())
-    bodies = [scene.add_entity(genesis.morphs.URDF(file=file, pos=start)) for start in starts]
-    scene.build()
-    return scene, bodies
+    return scene, [scene.add_entity(genesis.morphs.URDF(file=file, pos=start)) for start in starts]
 
 
 def take(file):
+    """Before the scene is built, which compiles for minutes."""
     _, (body,) = world(file, [[0, 0, 1]])
-    said = []
-    for geom in body.geoms:
-        assert geom.is_convex
-        said.append(
-            {
-                "vertices": len(geom.init_verts),
-                "volume": volume(geom.init_verts, geom.init_faces),
-                "mass": body.get_mass(),
-            }
-        )
-    return said
+    assert all(geom.is_convex for geom in body.geoms)
+    return [kept(geom.init_verts, geom.init_faces, body.base_link.desc.mass) for geom in body.geoms]
 
 
 def fall(file, starts, steps):
     scene, bodies = world(file, starts)
+    scene.build()
     for _ in range(steps):
         scene.step()
     said = []

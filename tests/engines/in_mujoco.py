@@ -5,7 +5,7 @@ import sys
 
 import mujoco
 import numpy as np
-from harness import STEP, run, state, volume
+from harness import STEP, kept, run, state
 
 OTHER = sys.argv[3] if len(sys.argv) > 3 else ""
 
@@ -41,8 +41,7 @@ def take(file):
         there = mujoco_warp.put_model(model) if OTHER else model
         arrays = [getattr(there, name) for name in ("mesh_graph", "mesh_graphadr", "mesh_vert", "mesh_vertadr")]
         hulls = [hull(mesh, *(each.numpy() if OTHER else each for each in arrays)) for mesh in meshes]
-    mass = model.body_mass[1]
-    return [{"vertices": count, "volume": volume(points, faces), "mass": mass} for count, points, faces in hulls]
+    return [{**kept(points, faces, model.body_mass[1]), "vertices": count} for count, points, faces in hulls]
 
 
 def convex(shape):

@@ -1,9 +1,8 @@
 """Newton: USD, solved by MuJoCo Warp on the processor."""
 
 import newton
-import numpy as np
 import warp
-from harness import STEP, run, state, volume
+from harness import STEP, kept, run, state
 
 warp.config.quiet = True
 warp.set_device("cpu")
@@ -22,14 +21,7 @@ def take(file):
         if flags & newton.ShapeFlags.COLLIDE_SHAPES:
             assert kind == newton.GeoType.CONVEX_MESH, kind
             mesh = builder.shape_source[index]
-            triangles = np.asarray(mesh.indices).reshape(-1, 3)
-            said.append(
-                {
-                    "vertices": len(mesh.vertices),
-                    "volume": volume(mesh.vertices, triangles),
-                    "mass": builder.body_mass[0],
-                }
-            )
+            said.append(kept(mesh.vertices, mesh.indices, builder.body_mass[0]))
     return said
 
 
@@ -48,10 +40,8 @@ def fall(file, starts, steps):
         now.clear_forces()
         solver.step(now, then, control, None, STEP)
         now, then = then, now
-    return [
-        state(pose[:3], pose[3:], speed[:3], speed[3:])
-        for pose, speed in zip(now.body_q.numpy(), now.body_qd.numpy(), strict=True)
-    ]
+    moving = zip(now.body_q.numpy(), now.body_qd.numpy(), strict=True)
+    return [state(pose[:3], pose[3:], speed[:3], speed[3:]) for pose, speed in moving]
 
 
 run("Newton", "newton", take, fall)

@@ -1,7 +1,7 @@
 """SAPIEN, whose physics is PhysX: URDF."""
 
 import sapien
-from harness import STEP, run, state, volume
+from harness import STEP, kept, run, state
 
 
 def scene():
@@ -26,11 +26,7 @@ def bodies_of(file, here, starts):
 def take(file):
     (body,) = bodies_of(file, scene(), [[0, 0, 0]])
     component = body.find_component_by_type(sapien.physx.PhysxRigidDynamicComponent)
-    shapes = component.collision_shapes
-    return [
-        {"vertices": len(shape.vertices), "volume": volume(shape.vertices, shape.triangles), "mass": component.mass}
-        for shape in shapes
-    ]
+    return [kept(shape.vertices, shape.triangles, component.mass) for shape in component.collision_shapes]
 
 
 def fall(file, starts, steps):

@@ -36,10 +36,11 @@ class Fallen(NamedTuple):
     speed: float
 
 
-def moments(result: Decomposition) -> tuple[Any, Any]:
-    """The centre and inertia of a body as heavy as it should be."""
+def moments(result: Decomposition) -> tuple[Any, Any, list[float]]:
+    """The centre and inertia of a body as heavy as it should be; the inertia also as its diagonal and xy, xz, yz."""
     mass = result.report["mass"]
-    return np.array(mass["centre_abs"]), MASS / mass["volume_abs"] * np.array(mass["inertia_abs"])
+    inertia = MASS / mass["volume_abs"] * np.array(mass["inertia_abs"])
+    return np.array(mass["centre_abs"]), inertia, [*np.diag(inertia), *inertia[np.triu_indices(3, 1)]]
 
 
 def in_mujoco(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fallen:
@@ -49,9 +50,8 @@ def in_mujoco(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fal
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 1])
-    centre, inertia = moments(weighed)
-    off = [inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-    full = {"mass": MASS, "ipos": centre, "fullinertia": [*np.diag(inertia), *off], "explicitinertial": True}
+    centre, _, six = moments(weighed)
+    full = {"mass": MASS, "ipos": centre, "fullinertia": six, "explicitinertial": True}
     body = spec.worldbody.add_body(name="table", pos=[0, 0, DROP], **full)
     body.add_freejoint()
     add_hulls(spec, body, mesh, **options)
@@ -67,39 +67,28 @@ def in_mujoco(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fal
 
 def in_drake(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fallen:
     pytest.importorskip("pydrake", reason="drake is not installed")
-    from pydrake.geometry import HalfSpace
-    from pydrake.math import RigidTransform
-    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
-    from pydrake.multibody.tree import SpatialInertia
-    from pydrake.systems.analysis import Simulator
-    from pydrake.systems.framework import DiagramBuilder
+    import pydrake.all as drake
 
     from rlacd.engines.drake import add_hulls
 
-    builder = DiagramBuilder()
-    plant, scene = AddMultibodyPlantSceneGraph(builder, STEP)
-    rubber = CoulombFriction(0.9, 0.9)
-    plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", rubber)
-    centre, inertia = moments(weighed)
-    off = [inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-    body = plant.AddRigidBody("table", SpatialInertia.MakeFromCentralInertia(MASS, centre, drake_inertia(inertia, off)))
+    builder = drake.DiagramBuilder()
+    plant, scene = drake.AddMultibodyPlantSceneGraph(builder, STEP)
+    rubber = drake.CoulombFriction(0.9, 0.9)
+    plant.RegisterCollisionGeometry(plant.world_body(), drake.RigidTransform(), drake.HalfSpace(), "floor", rubber)
+    centre, _, six = moments(weighed)
+    inertia = drake.SpatialInertia.MakeFromCentralInertia(MASS, centre, drake.RotationalInertia(*six))
+    body = plant.AddRigidBody("table", inertia)
     add_hulls(plant, body, mesh, settings=rubber, **options)
     plant.Finalize()
     diagram = builder.Build()
-    simulator = Simulator(diagram)
+    simulator = drake.Simulator(diagram)
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    plant.SetFreeBodyPose(context, body, RigidTransform([0, 0, DROP]))
+    plant.SetFreeBodyPose(context, body, drake.RigidTransform([0, 0, DROP]))
     simulator.AdvanceTo(SECONDS)
     hulls = [scene.model_inspector().GetConvexHull(each) for each in plant.GetCollisionGeometriesForBody(body)]
     height = plant.EvalBodyPoseInWorld(context, body).translation()[2]
     speed = np.abs(plant.GetVelocities(context)).max()
     return Fallen(body.default_mass(), [hull.num_vertices() for hull in hulls], height, speed)
-
-
-def drake_inertia(inertia: Any, off: Any) -> Any:
-    from pydrake.multibody.tree import RotationalInertia
-
-    return RotationalInertia(*np.diag(inertia), *off)
 
 
 def in_newton(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fallen:
@@ -111,7 +100,7 @@ def in_newton(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fal
     warp.set_device("cpu")
     builder = newton.ModelBuilder()
     builder.add_ground_plane()
-    centre, inertia = moments(weighed)
+    centre, inertia, _ = moments(weighed)
     place = warp.transform((0, 0, DROP), warp.quat_identity())
     body = builder.add_body(xform=place, mass=MASS, com=centre, inertia=warp.mat33(inertia))
     add_hulls(builder, body, mesh, **options)
@@ -160,7 +149,6 @@ def genesis_takes(mesh: trimesh.Trimesh, folder: Path) -> list[Any]:
     from genesis.utils.mesh import convex_decompose
 
     genesis.init(backend=genesis.cpu, logging_level="error")
-
     return [hull.vertices for hull in convex_decompose(mesh, CoacdOptions())]
 
 

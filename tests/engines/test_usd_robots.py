@@ -1,4 +1,4 @@
-"""Five robots as USD stages: rewritten, opened by OpenUSD, loaded by Newton with their masses, dropped until they rest.
+"""Five robots as USD stages: rewritten, opened by OpenUSD, loaded by Newton with their inertia, dropped to rest.
 
 The stages are made from URDF by a converter, which has an OpenUSD of its own and so an environment of its own.
 """
@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import rlacd
@@ -82,9 +83,10 @@ def test_openusd_finds_nothing_that_it_did_not_find_before(
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_newton_takes_convex_hulls_and_the_same_masses_and_the_robot_rests(answers: dict[str, Any], robot: str) -> None:
+def test_newton_takes_convex_hulls_the_same_inertia_and_the_robot_rests(answers: dict[str, Any], robot: str) -> None:
     before, after = answers[robot]["before"], answers[robot]["after"]
     assert after["convex"] >= before["convex"] > 0
     assert after["shapes"] - after["convex"] == before["shapes"] - before["convex"]
     assert after["masses"] == pytest.approx(before["masses"], rel=1e-4)
+    assert np.array(after["inertia"]) == pytest.approx(np.array(before["inertia"]), rel=1e-4)
     assert after["speed"] < AT_REST
