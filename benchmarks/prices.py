@@ -15,7 +15,7 @@ from benchmarks.cli import Meshes
 from benchmarks.runner import find_meshes
 from benchmarks.tables import Table
 from rlacd.cli.exit_codes import exit_codes
-from rlacd.criteria.concavity import Concavity, ConcavityScreen
+from rlacd.criteria.concavity import Concavity, DistanceScreen
 from rlacd.policies import Greedy
 from rlacd.run import work
 from rlacd.search import recut
@@ -31,9 +31,9 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
     "cutting": (Component, "cut", lambda part, plane: (part.size,), work.cutting),
     "judging": (Concavity, "is_met", lambda goal, part: (len(part.faces), len(part.hull.faces)), work.judging),
     "joining": (Hull, "around", lambda *hulls: (sum(len(hull.vertices) for hull in hulls),), work.joining),
-    "testing": (ConcavityScreen, "feasibility", lambda screen, solid, hull: (len(hull.vertices),), work.testing),
+    "testing": (DistanceScreen, "feasibility", lambda screen, solid, hull: (len(hull.vertices),), work.testing),
     "screening": (
-        ConcavityScreen,
+        DistanceScreen,
         "feasibilities",
         lambda screen, solid, hulls, pairs, threads: (
             sum(len(hulls[i]) for i in pairs.ravel().tolist()),

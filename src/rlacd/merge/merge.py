@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -97,8 +97,7 @@ def merge_lifted(
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
     run : Run
     """
-    pairs = _Lifted(rehearsal, run, proxy, few=0, confirmed=confirmed)
-    return _Merging(parts, pairs, run).united(len(parts))
+    return _Merging(parts, _Bridged(rehearsal, run, proxy, few=0, confirmed=confirmed), run).united(len(parts))
 
 
 class _Verdict(NamedTuple):
@@ -119,29 +118,88 @@ class _Verdict(NamedTuple):
     for_good: bool = False
 
 
-class _Pairing(Protocol):
-    """A way to find pairs of parts that may be united, and to unite them."""
+@dataclass(frozen=True)
+class _Adjoining:
+    """Pairs within the criterion's reach, judged by their glued union."""
 
-    @property
-    def criterion(self) -> Criterion:
-        """Every union meets it."""
+    criterion: Criterion
+    run: Run
 
     def pairs(
         self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
     ) -> tuple[list[_Pair], list[tuple[int, int]]]:
         """Pairs of a new part and another in the boxes that may be united, with costs; and pairs that never can be.
 
-        Incomplete if the run's work runs out.
+        Incomplete if the run's work runs out. Here pairs that the volume bound allows.
         """
+        screen = self.criterion.screen
+        pairs = boxes.pairs(new, screen.reach)
+        vertices, volumes, filled = alive.sums(pairs)
+        if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
+            return [], []
+        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
+        kept = ~screen.excludes(volumes, hulls)
+        return _priced(pairs[kept], (hulls - filled)[kept]), []
 
     def unite(self, first: Part, second: Part) -> _Verdict:
         """Unite two parts if that meets the criterion."""
+        union, price = Part.glued(first, second), price_of_uniting(first, second)
+        if union.size and self.criterion.is_met(union):  # without faces: it could not be clipped
+            return _Verdict(union, price)
+        return _Verdict(None, price, self.criterion.is_hereditary)
+
+
+@dataclass(frozen=True)
+class _Bridged(_Adjoining):
+    """All pairs (see `FEW_TO_PAIR`), judged by the solid clipped to their joint hull.
+
+    Unions on a proxy are then `confirmed` on the solid that it stands for.
+    """
+
+    solid: Component
+    few: int = FEW_TO_PAIR
+    confirmed: Callable[[Hull], Part | None] | None = None
+
+    def pairs(
+        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
+    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
+        """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
+        screen, run = self.criterion.screen, self.run
+        reach = np.inf if len(boxes) <= self.few else screen.reach
+        pairs = boxes.pairs(new, reach, across=True)
+        found: list[_Pair] = []
+        never: list[tuple[int, int]] = []
+        for begin in range(0, len(pairs), PAIRS_AT_ONCE):
+            some = pairs[begin : begin + PAIRS_AT_ONCE]
+            vertices, _, filled = alive.sums(some)
+            if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
+                break
+            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
+            may = verdicts == Feasibility.MAYBE
+            found += _priced(some[may], (volumes - filled)[may])
+            never += map(tuple, some[verdicts == Feasibility.NEVER].tolist())
+        return found, never
+
+    def unite(self, first: Part, second: Part) -> _Verdict:
+        """Test the joint hull more thoroughly, and clip the solid to it."""
+        hull = Hull.around(first.hull, second.hull)
+        price = work.testing(len(hull.vertices))
+        if self.criterion.screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
+            return _Verdict(None, price)
+        union: Part | None = _clipped(first, second, hull, self.criterion, self.solid)
+        if union is not None and self.confirmed is not None:
+            union = self.confirmed(hull)
+        return _Verdict(union, price + price_of_uniting(first, second, is_clipped=True))
+
+
+def _priced(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
+    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
 
 
 class _Merging:
     """Parts that are being united."""
 
-    def __init__(self, parts: Sequence[Part], pairing: _Pairing, run: Run) -> None:
+    def __init__(self, parts: Sequence[Part], pairing: _Adjoining, run: Run) -> None:
         self._alive = NumberedParts(parts, pairing.criterion.screen)
         self._pairing = pairing
         self._run = run
@@ -213,90 +271,6 @@ class _Merging:
 
 
 @dataclass(frozen=True)
-class _Adjoining:
-    """Pairs within the criterion's reach, judged by their glued union."""
-
-    criterion: Criterion
-    run: Run
-
-    def pairs(
-        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
-    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs that the volume bound allows."""
-        screen = self.criterion.screen
-        pairs = boxes.pairs(new, screen.reach)
-        vertices, volumes, filled = alive.sums(pairs)
-        if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
-            return [], []
-        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
-        kept = ~screen.excludes(volumes, hulls)
-        return _priced(pairs[kept], (hulls - filled)[kept]), []
-
-    def unite(self, first: Part, second: Part) -> _Verdict:
-        """Glue the two parts."""
-        union, price = Part.glued(first, second), price_of_gluing(first, second)
-        if union.size and self.criterion.is_met(union):  # without faces: it could not be clipped
-            return _Verdict(union, price)
-        return _Verdict(None, price, self.criterion.is_hereditary)
-
-
-@dataclass(frozen=True)
-class _Bridged:
-    """All pairs (see `FEW_TO_PAIR`), judged by the solid clipped to their joint hull."""
-
-    criterion: Criterion
-    run: Run
-    solid: Component
-    few: int = FEW_TO_PAIR
-
-    def pairs(
-        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
-    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
-        screen, run = self.criterion.screen, self.run
-        reach = np.inf if len(boxes) <= self.few else screen.reach
-        pairs = boxes.pairs(new, reach, across=True)
-        found: list[_Pair] = []
-        never: list[tuple[int, int]] = []
-        for begin in range(0, len(pairs), PAIRS_AT_ONCE):
-            some = pairs[begin : begin + PAIRS_AT_ONCE]
-            vertices, _, filled = alive.sums(some)
-            if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
-                break
-            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
-            may = verdicts == Feasibility.MAYBE
-            found += _priced(some[may], (volumes - filled)[may])
-            never += map(tuple, some[verdicts == Feasibility.NEVER].tolist())
-        return found, never
-
-    def unite(self, first: Part, second: Part) -> _Verdict:
-        """Test the joint hull more thoroughly, and clip the solid to it."""
-        hull = Hull.around(first.hull, second.hull)
-        price = work.testing(len(hull.vertices))
-        if self.criterion.screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
-            return _Verdict(None, price)
-        return _Verdict(self._united(first, second, hull), price + price_of_clipping(first, second))
-
-    def _united(self, first: Part, second: Part, hull: Hull) -> Part | None:
-        return _clipped(first, second, hull, self.criterion, self.solid)
-
-
-def _priced(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
-    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
-
-
-@dataclass(frozen=True)
-class _Lifted(_Bridged):
-    """Pairs within reach, judged the same way on a proxy; unions are then confirmed on the solid it stands for."""
-
-    confirmed: Callable[[Hull], Part | None] = lambda hull: None
-
-    def _united(self, first: Part, second: Part, hull: Hull) -> Part | None:
-        rehearsed = super()._united(first, second, hull)
-        return None if rehearsed is None else self.confirmed(hull)
-
-
-@dataclass(frozen=True)
 class Uniter:
     """Unites parts of a solid, two at a time, glued or across what lies between them.
 
@@ -341,26 +315,20 @@ class Uniter:
         hull = Hull.around(first.hull, second.hull)
         screen = self.criterion.screen
         if is_alone(first) and is_alone(second):  # otherwise they may overlap
-            if not self.account.pay(price_of_gluing(first, second)):
+            if not self.account.pay(price_of_uniting(first, second)):
                 return None
             union = Part.glued(first, second, hull)
             if not screen.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
                 return union
-        if not screen.looks_inside or not self.account.pay(price_of_clipping(first, second)):
+        if not screen.looks_inside or not self.account.pay(price_of_uniting(first, second, is_clipped=True)):
             return None
         return _clipped(first, second, hull, self.criterion, self.solid)
 
 
-def price_of_gluing(first: Part, second: Part) -> float:
-    """The work of gluing two parts and judging the union."""
+def price_of_uniting(first: Part, second: Part, is_clipped: bool = False) -> float:
+    """The work of gluing two parts, or clipping the solid to their joint hull, and of judging the union."""
     faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
-    return work.gluing(faces) + work.judging(faces, hull_faces)
-
-
-def price_of_clipping(first: Part, second: Part) -> float:
-    """The work of clipping the solid to the joint hull of two parts, and judging the result."""
-    faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
-    return work.filling(faces, hull_faces) + work.judging(faces, hull_faces)
+    return (work.filling(faces, hull_faces) if is_clipped else work.gluing(faces)) + work.judging(faces, hull_faces)
 
 
 def is_alone(part: Part) -> bool:
@@ -455,7 +423,7 @@ def _pop_least(
             continue
         if pair.measured:
             return pair
-        if not account.pay(price_of_gluing(alive[pair.first], alive[pair.second])):
+        if not account.pay(price_of_uniting(alive[pair.first], alive[pair.second])):
             return None
         error = criterion.error(unite(alive[pair.first], alive[pair.second]))
         heapq.heappush(queue, _BoundedPair(max(error, pair.error), pair.first, pair.second, True))
