@@ -18,7 +18,7 @@ from rlacd.cli.exit_codes import exit_codes
 from rlacd.criteria.concavity import Concavity, DistanceScreen
 from rlacd.policies import Greedy
 from rlacd.run import work
-from rlacd.search import recut
+from rlacd.search import operators
 from rlacd.solid.component import ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
@@ -48,7 +48,7 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
         lambda part, solid, a, b, hull: (a.size + b.size, len(hull.faces)),
         work.filling,
     ),
-    "reuniting": (recut, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),
+    "reuniting": (operators, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),
 }
 """By the name of its price: where the kernel is, and the sizes of a call."""
 

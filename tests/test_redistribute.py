@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.criteria.criterion import Criterion
-from rlacd.search.recut import Exchange
-from rlacd.search.redistribute import redistribute
+from rlacd.search.operators import Exchange, redistribute
 from rlacd.solid.component import Component, Part
 from tests.shapes import bent_bar, box, own_volume, stacks, together
 

@@ -14,11 +14,12 @@ from scipy.spatial import ConvexHull, QhullError
 
 from rlacd import _native
 from rlacd.planes.candidates import Candidates, axis_and_principal
-from rlacd.planes.sweep import SLIVER, SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep
+from rlacd.planes.sweep import SLIVER, SLIVERS, Sweep, SweepCache, least_excess, sweep
 from rlacd.policies import SCORES
 from rlacd.policies.greedy import excess_norm, hull_sum
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.manifold import to_manifold
 
 
@@ -166,7 +167,7 @@ def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
     for sliver in SLIVERS:
         valid = scored.valid(sliver)
         if valid.any():
-            equal = cost[valid].min() + TIE * cost[valid].max()
+            equal = cost[valid].min() + ROUNDING * cost[valid].max()
             return scored.candidates.plane(int(np.argmax(valid & (cost <= equal))))
     return None
 

@@ -10,14 +10,11 @@ import numpy as np
 from rlacd import _native
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Part
+from rlacd.solid.component import Part, is_film
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import SLIVER_RADIUS, Hull
 from rlacd.solid.topology import BoolArray
-
-FILM = HALF_THICKNESS / 5
-"""Mean thickness below which a part is a film left by rounding: real sheets are ten times thicker."""
 
 SLIVER_LOSS = 2 * HALF_THICKNESS
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
@@ -72,11 +69,6 @@ def _misses(union: _native.HullUnion, sliver: Part, threads: int) -> bool:
     if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > SLIVER_LOSS).any():
         return True
     return union.under(sliver.vertices, sliver.faces, SLIVER_LOSS / 4, threads)[1] > SLIVER_LOSS
-
-
-def is_film(part: Part) -> bool:
-    """Whether the part's mean thickness, twice its volume over its area, is below `FILM`."""
-    return 2 * part.volume < FILM * _native.mesh_area(part.vertices, part.faces)
 
 
 def is_sliver(hull: Hull, radius: float = SLIVER_RADIUS) -> bool:

@@ -40,7 +40,7 @@ STEP = 0.7
 are noisy, and tell nothing about points far from them."""
 
 COARSEST = 12
-"""No proxy, or piece of one, has fewer triangles, if it had more before."""
+"""No proxy, or piece of one, has fewer triangles, those of a box, if it had more before."""
 
 LOST_OF_SOLID, LOST_OF_PIECES = 0.02, 0.1
 """A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Pieces

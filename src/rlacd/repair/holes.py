@@ -21,10 +21,9 @@ import numpy as np
 
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
-from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
+from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_points
 from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
-from rlacd.repair.soup import FLAPS, Soup
-from rlacd.repair.windings import is_tangle, trust_windings
+from rlacd.repair.soup import FLAPS, Soup, trust_windings
 from rlacd.repair.work import Work
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS

@@ -18,13 +18,12 @@ from rlacd import _native
 from rlacd._native import face_areas, poll_stop, signed_tetrahedra
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
-from rlacd.repair.distance import SurfaceQuery, probes
+from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes, may_have_holes
-from rlacd.repair.soup import MOST_PATCHES, Soup
+from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.repair.walls import are_unbuilt, build_slabs, build_walls, has_sheets, skins
-from rlacd.repair.windings import are_crowded, are_oriented, is_tangle, sort_out, take_as_they_are
+from rlacd.repair.walls import are_oriented, are_unbuilt, build_slabs, build_walls, has_sheets, skins, take_as_they_are
 from rlacd.repair.work import STEPS as NAMES
 from rlacd.repair.work import Piece, Wanted, Work, measure, query_of
 from rlacd.repair.wraps import (
@@ -51,6 +50,16 @@ CELLS_ACROSS = 1.5
 
 def _always(work: Work) -> bool:
     return True
+
+
+def _are_crowded(work: Work) -> bool:
+    """Whether more than two faces meet in an edge of bodies that are still to be built."""
+    return not work.parts and bool((work.soup.edges.valence > 2).any())
+
+
+def _sort_out(work: Work) -> None:
+    """Find the sides of crowded bodies by windings where angles fail."""
+    work.soup = trust_windings(work.soup, work.record.bodies)
 
 
 def _unite(work: Work) -> None:
@@ -95,7 +104,7 @@ def _keep_lost(work: Work) -> None:
 
 STEPS: tuple[tuple[Callable[[Work], bool], Callable[[Work], None]], ...] = (
     (are_oriented, take_as_they_are),
-    (are_crowded, sort_out),
+    (_are_crowded, _sort_out),
     (may_have_holes, close_holes),
     (are_unbuilt, build_walls),
     (is_crowd, wrap_sheets),

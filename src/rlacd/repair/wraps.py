@@ -6,7 +6,14 @@ import numpy as np
 from manifold3d import Manifold
 
 from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
+from rlacd.repair.distance import (
+    SurfaceQuery,
+    is_tangle,
+    once_in_each_place,
+    points_covering,
+    spread_points,
+    tangled_bodies,
+)
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.union import (
     area_of,
@@ -19,7 +26,6 @@ from rlacd.repair.union import (
 )
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.repair.walls import skins
-from rlacd.repair.windings import is_tangle, tangled_bodies
 from rlacd.repair.work import Piece, Work, query_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import DENSE

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.hull import TOLERANCE
 
 Index = TypeVar("Index", bound=np.signedinteger)
 IntArray = NDArray[np.int64]
@@ -120,7 +121,7 @@ def is_balanced(faces: IntArray, edges: Edges) -> BoolArray:
     return np.asarray(2 * forward == edges.valence)
 
 
-NO_FILM = 1e-12
+NO_FILM = TOLERANCE**2
 """Films of less area than this are folds that rounding has closed."""
 
 
