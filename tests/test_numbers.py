@@ -30,7 +30,7 @@ from rlacd.planes.candidates import EDGES_PER_COMPONENT
 from rlacd.planes.sweep import SLIVER
 from rlacd.pool import ProcessLimits
 from rlacd.pool.on_ray import MACHINES
-from rlacd.repair import distance, holes, work, wraps
+from rlacd.repair import distance, holes, state, wraps
 from rlacd.search.neighbourhood import CLUSTER, LEAST_TRIALS
 from rlacd.search.search import BOUNDED_PATIENCE, LEAST_WORK, MOST_WORK, TIMES_FIRST_PASS
 from rlacd.solid.component import DENSE
@@ -71,7 +71,7 @@ LIMITS = {
         f"clusters of {WORDS[CLUSTER]}",
     ],
     "docs/repair.md": [
-        f"within {work._WELDS[0] * 1e5:g}·10⁻⁵ (else {work._WELDS[1] * 1e4:g}·10⁻⁴)",
+        f"within {state._WELDS[0] * 1e5:g}·10⁻⁵ (else {state._WELDS[1] * 1e4:g}·10⁻⁴)",
         f"{2 * HALF_THICKNESS * 1e3:g}·10⁻³ thick",
         f"over {wraps._CROWD} slabs, or over {wraps._CROSSINGS:,} pairs",
         f"radius is {100 * Options.gap:g} % of the longest side",

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rlacd._native import components, poll_stop, signed_tetrahedra
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
+from rlacd.repair.state import Piece, State
 from rlacd.repair.union import one_body, slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.repair.work import Piece, Record, Work
 from rlacd.solid.arrays import FloatArray, angles, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
@@ -25,41 +25,41 @@ from rlacd.solid.solid import Shape
 from rlacd.solid.topology import BoolArray, IntArray, Sides, is_balanced, marked, nondegenerate
 
 
-def are_oriented(work: Work) -> bool:
+def are_oriented(state: State) -> bool:
     """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""
-    soup = work.soup
+    soup = state.soup
     if (soup.edges.valence != 2).any() or not is_balanced(soup.faces, soup.edges).all():
         return False
     volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
     return bool((np.abs(volume) > 2 * FLAT * np.bincount(soup.body, soup.area)).all())
 
 
-def take_as_they_are(work: Work) -> None:
+def take_as_they_are(state: State) -> None:
     """Take closed, oriented bodies without sorting all sides."""
-    soup = work.soup
+    soup = state.soup
     inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces)) < 0
     faces = np.where(inward[soup.body, None], soup.faces[:, ::-1], soup.faces)
-    work.record.note(np.flatnonzero(inward), "reoriented")
+    state.note(np.flatnonzero(inward), "reoriented")
     solids = [to_manifold(v, f) for v, f in split_labels(soup.vertices, faces, soup.body)]
-    work.parts = [Piece(solid, body) for body, solid in enumerate(solids)]
+    state.parts = [Piece(solid, body) for body, solid in enumerate(solids)]
 
 
-def are_unbuilt(work: Work) -> bool:
+def are_unbuilt(state: State) -> bool:
     """Whether any faces are still to be built."""
-    return not work.parts and len(work.soup.faces) > 0
+    return not state.parts and len(state.soup.faces) > 0
 
 
-def build_walls(work: Work) -> None:
+def build_walls(state: State) -> None:
     """Build what bounds something solid; the rest are sheets."""
-    walls, sheets = walls_and_sheets(work.soup, work.record, ())
-    work.parts = skins(walls)
+    walls, sheets = walls_and_sheets(state, ())
+    state.parts = skins(walls)
     # Where faces of one body cross each other, they may be joined into a wrong skin: then all of them are sheets.
-    is_skin = work.record.has("outer skin")
-    wrong = [part.body for part in work.parts if is_skin[part.body] and _leads_away(part.shape, work.surface)]
+    is_skin = state.has("outer skin")
+    wrong = [part.body for part in state.parts if is_skin[part.body] and _leads_away(part.shape, state.surface)]
     if wrong:
-        walls, sheets = walls_and_sheets(work.soup, work.record, wrong)
-        work.parts = skins(walls)
-    work.sheets = sheets.in_patches()
+        walls, sheets = walls_and_sheets(state, wrong)
+        state.parts = skins(walls)
+    state.sheets = sheets.in_patches()
 
 
 def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
@@ -69,19 +69,19 @@ def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
     return bool((surface.distance(points) > DEFAULT_GAP).any())
 
 
-def has_sheets(work: Work) -> bool:
+def has_sheets(state: State) -> bool:
     """Whether sheets are still to be built."""
-    return len(work.sheets.faces) > 0
+    return len(state.sheets.faces) > 0
 
 
-def build_slabs(work: Work) -> None:
+def build_slabs(state: State) -> None:
     """Give sheets thickness."""
-    work.parts += [part._replace(is_slab=True) for part in skins(work.sheets)]
+    state.parts += [part._replace(is_slab=True) for part in skins(state.sheets)]
 
 
-def walls_and_sheets(soup: Soup, record: Record, as_sheets: Sequence[int]) -> tuple[Soup, Soup]:
+def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup]:
     """The faces that bound something solid, and those that become slabs."""
-    sides = soup.sides
+    soup, sides = state.soup, state.soup.sides
     front, back = sides.label[0::2], sides.label[1::2]
     none = FLAT * sides.area
     sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
@@ -94,12 +94,12 @@ def walls_and_sheets(soup: Soup, record: Record, as_sheets: Sequence[int]) -> tu
     sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
     wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
 
-    record.note(soup.body[solid[back] & wall], "reoriented")
-    record.note(soup.body[~wall & ~sheet], "outer skin")
-    record.note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
-    record.note(soup.body[sheet], "slab")
+    state.note(soup.body[solid[back] & wall], "reoriented")
+    state.note(soup.body[~wall & ~sheet], "outer skin")
+    state.note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
+    state.note(soup.body[sheet], "slab")
     poll_stop()
-    mixed = np.bincount(soup.body[sheet], minlength=record.bodies) > 0
+    mixed = np.bincount(soup.body[sheet], minlength=state.bodies) > 0
     return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
 
 

@@ -13,14 +13,7 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import drop_slivers, grow_cover
 from rlacd.policies import Greedy
 from rlacd.run import Run
-from rlacd.search.neighbourhood import (
-    FEW_PARTS,
-    PATIENCE,
-    Neighbourhood,
-    SearchContext,
-    SearchOutcome,
-    cost,
-)
+from rlacd.search.neighbourhood import FEW_PARTS, PATIENCE, Neighbourhood, SearchContext, SearchOutcome, cost
 from rlacd.solid.component import Part
 
 BEST_SECONDS = 5.0
