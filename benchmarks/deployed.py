@@ -15,7 +15,7 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError
-from rlacd.finish.limit import limit_part
+from rlacd.finish.finish import limit_part
 from rlacd.io.read.load import load_mesh
 from rlacd.options.names import WEIGHTS_ENDING
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, axis_and_principal

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.finish.limit import limit_part
+from rlacd.finish.finish import limit_part
 from rlacd.options.presets import HullLimits
 from rlacd.solid.component import Part
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, Hull, limit_hull

@@ -227,9 +227,9 @@ class _Caps:
 
 
 def may_have_holes(state: State) -> bool:
-    """Whether bodies that are still to be built have free edges, and may be closed."""
+    """Whether bodies have free edges, and may be closed."""
     free = int((state.soup.edges.valence == 1).sum())
-    return not state.parts and 0 < free <= MOST_FREE_EDGES and state.wanted.open_bodies != "thin"
+    return 0 < free <= MOST_FREE_EDGES and state.wanted.open_bodies != "thin"
 
 
 def close_holes(state: State) -> None:

@@ -25,7 +25,7 @@ from rlacd.repair.state import STEPS as NAMES
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.repair.walls import are_oriented, are_unbuilt, build_slabs, build_walls, has_sheets, skins, take_as_they_are
+from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.wraps import (
     fill_rooms,
     fill_slits,
@@ -53,8 +53,8 @@ def _always(state: State) -> bool:
 
 
 def _are_crowded(state: State) -> bool:
-    """Whether more than two faces meet in an edge of bodies that are still to be built."""
-    return not state.parts and bool((state.soup.edges.valence > 2).any())
+    """Whether more than two faces meet in an edge."""
+    return bool((state.soup.edges.valence > 2).any())
 
 
 def _sort_out(state: State) -> None:
@@ -103,10 +103,9 @@ def _keep_lost(state: State) -> None:
 
 
 STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
-    (are_oriented, take_as_they_are),
     (_are_crowded, _sort_out),
     (may_have_holes, close_holes),
-    (are_unbuilt, build_walls),
+    (_always, build_walls),
     (is_crowd, wrap_sheets),
     (has_sheets, build_slabs),
     (_always, _unite),

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd._native import components, poll_stop, signed_tetrahedra
+from rlacd._native import components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.state import Piece, State
@@ -22,31 +22,7 @@ from rlacd.solid.arrays import FloatArray, angles, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from rlacd.solid.topology import BoolArray, IntArray, Sides, is_balanced, marked, nondegenerate
-
-
-def are_oriented(state: State) -> bool:
-    """Whether every edge joins two faces that run along it in opposite directions, and no body is flat."""
-    soup = state.soup
-    if (soup.edges.valence != 2).any() or not is_balanced(soup.faces, soup.edges).all():
-        return False
-    volume = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces))
-    return bool((np.abs(volume) > 2 * FLAT * np.bincount(soup.body, soup.area)).all())
-
-
-def take_as_they_are(state: State) -> None:
-    """Take closed, oriented bodies without sorting all sides."""
-    soup = state.soup
-    inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces)) < 0
-    faces = np.where(inward[soup.body, None], soup.faces[:, ::-1], soup.faces)
-    state.note(np.flatnonzero(inward), "reoriented")
-    solids = [to_manifold(v, f) for v, f in split_labels(soup.vertices, faces, soup.body)]
-    state.parts = [Piece(solid, body) for body, solid in enumerate(solids)]
-
-
-def are_unbuilt(state: State) -> bool:
-    """Whether any faces are still to be built."""
-    return not state.parts and len(state.soup.faces) > 0
+from rlacd.solid.topology import BoolArray, IntArray, Sides, marked, nondegenerate
 
 
 def build_walls(state: State) -> None:
