@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import compress
 
 import numpy as np
 
@@ -40,19 +39,17 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     thin = run.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
     place = {id(part): i for i, part in enumerate(parts)}
     slivers = [place[id(part)] for part, is_thin in zip(suspects, thin, strict=True) if is_thin]
-    boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
-    concerned = np.zeros(len(parts), dtype=bool)
-    for own in slivers:
-        concerned |= _near(boxes, boxes[own])
-    union = hull_union([part.hull for part in compress(parts, concerned)], run.threads)
-    number = np.cumsum(concerned, dtype=np.int32) - 1
+    if not slivers:
+        return parts
+    boxes = np.array([part.box for part in parts])
+    union = hull_union([part.hull for part in parts], run.threads)
     kept = np.ones(len(parts), dtype=bool)
     stood_in: dict[int, BoolArray] = {}  # what there was in place of each that was dropped
 
     def is_missed(own: int) -> bool:
         others = stood_in[own] = kept & _near(boxes, boxes[own])
         some = np.flatnonzero(others)
-        return len(some) == 0 or _misses(union.only(number[some].tolist()), parts[own], run.threads)
+        return len(some) == 0 or _misses(union.only(some.tolist()), parts[own], run.threads)
 
     smallest_first = sorted(slivers, key=lambda i: parts[i].hull.volume)
     for own in smallest_first:

@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rlacd._native import components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import one_body, slab_of_faces, split_labels, to_arrays, volume_of
+from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.arrays import FloatArray, angles, dots
 from rlacd.solid.frame import HALF_THICKNESS
@@ -92,10 +91,6 @@ def skins(soup: Soup) -> list[Piece]:
     # The two side components of a flat closed body mirror each other: build the fronts.
     flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
     keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
-    if keep.sum() == 1 and not has_sheet.any() and (soup.edges.valence == 2).all():
-        taken = one_body(*_wound_like(soup, keep))
-        if taken is not None and not taken[1]:
-            return [Piece(taken[0], int(soup.body[0]))]
     vertices, faces, label = _untwisted(soup, keep, flat)
     shapes = split_labels(vertices, faces, label)
     return [
@@ -141,20 +136,6 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
     front = soup.sides.label[0::2]
     thin = keep[front] & (soup.sides.sheet | flat[front])
     return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
-
-
-def _wound_like(soup: Soup, keep: BoolArray) -> tuple[FloatArray, NDArray[np.int32]]:
-    """The faces of a closed soup, each showing the side that is kept; vertices in the order in which faces use them."""
-    corners = soup.faces.ravel()
-    first = np.full(len(soup.vertices), len(corners))
-    first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)
-    used = np.argsort(first, kind="stable")[: int((first < len(corners)).sum())]
-    number = np.empty(len(soup.vertices), dtype=np.int32)
-    number[used] = np.arange(len(used))
-    faces = number[soup.faces]
-    back = keep[soup.sides.label[1::2]]
-    faces[back] = faces[back, ::-1]
-    return soup.vertices[used], faces
 
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
