@@ -22,7 +22,7 @@ import numpy as np
 from rlacd._native import components, least_bent, long_normals, poll_stop
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
 from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import BoolArray, IntArray, both_sides, marked, nondegenerate
+from rlacd.solid.topology import BoolArray, IntArray, marked, nondegenerate
 
 _NEXT = np.array([1, 2, 0])
 
@@ -112,9 +112,6 @@ def _sides(soup: Soup, mate: IntArray) -> IntArray:
     forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
     # Mates wound alike run along their edge in opposite directions; then fronts continue fronts.
     turned = forward[mated] == forward[mate[mated]]
-    if not turned.any():  # fronts join fronts, and backs backs
-        _, patch = components(len(soup.faces), mated // 3, mate[mated] // 3)
-        return both_sides(patch)
     front, other = 2 * (mated // 3), 2 * (mate[mated] // 3)
     return components(
         2 * len(soup.faces), np.concatenate([front, front + 1]), np.concatenate([other + turned, other + 1 - turned])
