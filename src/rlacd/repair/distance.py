@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -90,15 +89,6 @@ def spread_points(vertices: FloatArray, faces: IntArray, spacing: float) -> tupl
     """
     points, face = _native.spread_points(vertices, faces, spacing)
     return points, face.astype(np.int64)
-
-
-def once_in_each_place(ask: Callable[[FloatArray], BoolArray], points: FloatArray) -> BoolArray:
-    """Return ``[N]`` what a function answers for points, many of which are in the same place: it is asked once."""
-    first = _native.first_in_place(points)
-    asked = np.flatnonzero(first == np.arange(len(points)))
-    answers = np.zeros(len(points), dtype=bool)
-    answers[asked] = ask(points[asked])
-    return answers[first]
 
 
 def affordable(spacing: float, area: float) -> float:

@@ -9,17 +9,14 @@ from rlacd._native import poll_stop
 from rlacd.repair.distance import (
     SurfaceQuery,
     is_tangle,
-    once_in_each_place,
     points_covering,
     spread_points,
     tangled_bodies,
 )
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
-from rlacd.repair.state import Piece, State, query_of
-from rlacd.repair.union import area_of, as_manifold, size_of, slab_of_faces, tunnels_in, unite, volume_of
+from rlacd.repair.state import Piece, State
+from rlacd.repair.union import area_of, as_manifold, slab_of_faces, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
-from rlacd.repair.walls import skins
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
@@ -35,9 +32,6 @@ _SLIT_VOLUME = 0.01
 _DEEP, _BESIDE, _BETWEEN_CAPS, _BARED = 1.5, 1 / 16, 1 / 4, 0.004
 # Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
 _TUNNELS = 25
-# Where a filled room has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
-# the corpus with filled rooms, those that meet this have 0.73 of the hulls without filling, the others 1.04.
-_TRIANGLES = 0.05
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
 # are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
 _CROWD, _CROSSINGS = 300, 1000
@@ -102,7 +96,6 @@ def rebuild_tangles(state: State) -> None:
         solid = slab_of_faces(own.vertices, own.faces) if is_few else _wrapped(state, own)
         state.note(own.body, "slab" if is_few else "wrapped")
         state.parts.append(Piece(solid, body))
-    state.sheets = state.sheets.only(~state.is_tangled[state.sheets.body])
     state.solid = unite([part.shape for part in state.parts], keep_cavities=state.wanted.keep_cavities)
     bodies = "1 body crosses" if len(tangled) == 1 else f"{len(tangled)} bodies cross"
     state.warnings.append(
@@ -124,60 +117,28 @@ def _walls(state: State) -> tuple[Soup, Soup]:
 def fill_rooms(state: State) -> None:
     """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins."""
     reach = state.reach
-    in_sheets, in_shells = (_rooms_near(state, walls) for walls in _walls(state))
-    in_shells = in_shells[reach.volumes(in_shells) >= _SLIT_VOLUME * state.volume]
-    cells = reach.rooms_outside(np.union1d(in_sheets, in_shells), state.query())
+    (in_sheets, body), (in_shells, _) = (_rooms_near(state, walls) for walls in _walls(state))
+    large = np.unique(in_shells)
+    large = large[reach.volumes(large) >= _SLIT_VOLUME * state.volume]
+    cells = reach.rooms_outside(np.setdiff1d(np.union1d(in_sheets, large), 0), state.query())
     if len(cells) == 0:
         return
-    rooms = np.unique(reach.room.ravel()[cells])
     wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
-    left, walled = _sheets_but_walls(state, rooms, wrap)
-    parts = state.parts
-    # More parts than can be united overlap in what was made of them.
-    if len(left.faces) < len(state.sheets.faces) or len(parts) > MOST_UNITED:
-        parts = [part for part in parts if not part.is_slab]
-        parts += [part._replace(is_slab=True) for part in skins(left)]
-        filled = unite([*(part.shape for part in parts), wrap])
-    else:
-        filled = unite([as_manifold(state.solid), wrap])
-    triangles = size_of(filled) / size_of(state.solid)
-    if volume_of(filled) <= state.volume or area_of(filled) * triangles**_TRIANGLES >= area_of(state.solid):
+    filled = unite([as_manifold(state.solid), wrap])
+    if volume_of(filled) <= state.volume or area_of(filled) >= area_of(state.solid):
         return
-    wrapped = np.concatenate([walled, np.flatnonzero(state.by_room)])
+    wrapped = np.unique(body[np.isin(in_sheets, reach.room.ravel()[cells])])
     state.note(wrapped, "wrapped")
     state.solid = filled
-    state.parts = [*parts, Piece(wrap, int(wrapped.min(initial=state.bodies - 1)))]
+    state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
 
 
-def _rooms_near(state: State, walls: Soup) -> IntArray:
-    """The rooms that faces may be walls of."""
+def _rooms_near(state: State, walls: Soup) -> tuple[IntArray, IntArray]:
+    """The rooms that points of faces may be walls of, 0 for none, and the body of each point."""
     if not state.reach.room.any() or not _is_large(state, walls):
-        return np.empty(0, dtype=np.int64)
-    near = np.unique(state.reach.rooms_near(points_covering(walls.vertices, walls.faces, DEFAULT_GAP)[0]))
-    return near[near > 0]
-
-
-def _sheets_but_walls(state: State, rooms: IntArray, wrap: Manifold) -> tuple[Soup, IntArray]:
-    """The sheets that the wrap of some rooms does not replace, and the bodies with walls of the rooms.
-
-    It replaces those that are only walls, unless it leaves some of their body's outside, as noise does.
-    """
-    sheets = state.sheets
-    points, on = spread_points(sheets.vertices, sheets.faces, DEFAULT_GAP)
-    is_elsewhere = once_in_each_place(lambda some: ~np.isin(state.reach.rooms_near(some), rooms), points)
-    is_wall = np.bincount(on, is_elsewhere, len(sheets.faces)) == 0
-    bodies = np.unique(sheets.body[is_wall])
-    points, on = points[is_wall[on]], on[is_wall[on]]
-    wrapped = query_of(wrap, state.surface.threads)
-
-    def is_left_out(points: FloatArray) -> BoolArray:
-        away = wrapped.distance(points) > HALF_THICKNESS
-        away[away] = ~wrapped.inside(points[away])
-        return away
-
-    left_out = on[once_in_each_place(is_left_out, points)]
-    is_wall &= ~np.isin(sheets.body, sheets.body[left_out])
-    return sheets.only(~is_wall), bodies
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
+    return state.reach.rooms_near(points).astype(np.int64), walls.body[on]
 
 
 def may_have_slits(state: State) -> bool:
@@ -215,7 +176,8 @@ def fill_slits(state: State) -> None:
 
 def _may_fill(state: State) -> bool:
     """Whether what nothing can reach may become solid."""
-    return state.wanted.open_bodies != "thin" and not state.wanted.keep_cavities and state.volume != 0
+    fills = state.wanted.open_bodies != "thin" and not state.wanted.keep_cavities
+    return fills and state.volume != 0 and len(state.parts) <= MOST_UNITED  # more of them overlap each other
 
 
 def _is_large(state: State, walls: Soup) -> bool:
