@@ -49,9 +49,6 @@ class Criterion(Protocol):
         """Whether a pass also tries to divide each part among those around it."""
         return False
 
-    is_hereditary: ClassVar[bool] = False
-    """Whether no union that contains a part that fails the criterion can meet it."""
-
     @property
     def screen(self) -> Screen:
         """Cheap tests that reject unions which cannot meet the criterion."""

@@ -95,8 +95,6 @@ class Navigable(Criterion):
 
     eliminates: ClassVar[bool] = True
     """Hulls are tested quickly against balls."""
-    is_hereditary: ClassVar[bool] = True
-    """A larger hull touches every ball that a smaller one inside it touches."""
 
     @cached_property
     def _intrusions(self) -> Intrusions:

@@ -100,24 +100,6 @@ def merge_lifted(
     return _Merging(parts, _Bridged(rehearsal, run, proxy, few=0, confirmed=confirmed), run).united(len(parts))
 
 
-class _Verdict(NamedTuple):
-    """On a pair of parts.
-
-    Attributes
-    ----------
-    union : Part or None
-        None if it does not meet the criterion.
-    price : float
-        The work of finding out.
-    for_good : bool
-        No larger union can meet the criterion either.
-    """
-
-    union: Part | None
-    price: float
-    for_good: bool = False
-
-
 @dataclass(frozen=True)
 class _Adjoining:
     """Pairs within the criterion's reach, judged by their glued union."""
@@ -125,28 +107,25 @@ class _Adjoining:
     criterion: Criterion
     run: Run
 
-    def pairs(
-        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
-    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs of a new part and another in the boxes that may be united, with costs; and pairs that never can be.
+    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
+        """Pairs of a new part and another that may be united: here those that the volume bound allows.
 
-        Incomplete if the run's work runs out. Here pairs that the volume bound allows.
+        Incomplete if the run's work runs out.
         """
         screen = self.criterion.screen
-        pairs = boxes.pairs(new, screen.reach)
+        pairs = alive.boxes.pairs(new, screen.reach)
         vertices, volumes, filled = alive.sums(pairs)
         if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
-            return [], []
+            return []
         hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
         kept = ~screen.excludes(volumes, hulls)
-        return _priced(pairs[kept], (hulls - filled)[kept]), []
+        return _priced(pairs[kept], (hulls - filled)[kept])
 
-    def unite(self, first: Part, second: Part) -> _Verdict:
-        """Unite two parts if that meets the criterion."""
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, float]:
+        """Unite two parts if that meets the criterion; with the work of finding out."""
         union, price = Part.glued(first, second), price_of_uniting(first, second)
-        if union.size and self.criterion.is_met(union):  # without faces: it could not be clipped
-            return _Verdict(union, price)
-        return _Verdict(None, price, self.criterion.is_hereditary)
+        is_met = union.size > 0 and self.criterion.is_met(union)  # without faces: it could not be clipped
+        return union if is_met else None, price
 
 
 @dataclass(frozen=True)
@@ -160,15 +139,12 @@ class _Bridged(_Adjoining):
     few: int = FEW_TO_PAIR
     confirmed: Callable[[Hull], Part | None] | None = None
 
-    def pairs(
-        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
-    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
+    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
         """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
         screen, run = self.criterion.screen, self.run
-        reach = np.inf if len(boxes) <= self.few else screen.reach
-        pairs = boxes.pairs(new, reach, across=True)
+        reach = np.inf if len(alive.parts) <= self.few else screen.reach
+        pairs = alive.boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
-        never: list[tuple[int, int]] = []
         for begin in range(0, len(pairs), PAIRS_AT_ONCE):
             some = pairs[begin : begin + PAIRS_AT_ONCE]
             vertices, _, filled = alive.sums(some)
@@ -177,19 +153,18 @@ class _Bridged(_Adjoining):
             volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
             may = verdicts == Feasibility.MAYBE
             found += _priced(some[may], (volumes - filled)[may])
-            never += map(tuple, some[verdicts == Feasibility.NEVER].tolist())
-        return found, never
+        return found
 
-    def unite(self, first: Part, second: Part) -> _Verdict:
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, float]:
         """Test the joint hull more thoroughly, and clip the solid to it."""
         hull = Hull.around(first.hull, second.hull)
         price = work.testing(len(hull.vertices))
         if self.criterion.screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
-            return _Verdict(None, price)
+            return None, price
         union: Part | None = _clipped(first, second, hull, self.criterion, self.solid)
         if union is not None and self.confirmed is not None:
             union = self.confirmed(hull)
-        return _Verdict(union, price + price_of_uniting(first, second, is_clipped=True))
+        return union, price + price_of_uniting(first, second, is_clipped=True)
 
 
 def _priced(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
@@ -204,30 +179,27 @@ class _Merging:
         self._pairing = pairing
         self._run = run
         self._origin = list(range(len(parts)))  # the number of the first piece
-        self._refused: list[set[int]] = [set() for _ in parts]  # parts that a part can never be united with
         self._queue: list[_Pair] = []
         self._next: list[_Pair] = []  # the cheapest, in their order
-        self._begun: dict[_Pair, Begun[_Verdict]] = {}  # more than needed if an earlier one takes their parts away
+        self._begun: dict[_Pair, Begun[tuple[Part | None, float]]] = {}  # more than are needed
 
     def united(self, new: int) -> list[Part]:
         """Unite pairs of which at least one is among the first `new` parts or made from them."""
         run, alive = self._run, self._alive.parts
         count = len(alive)
         try:
-            self._find(range(new), self._alive.boxes)
+            self._find(range(new))
             while run.step(count - len(alive), None, len(alive)):
                 self._begin()
                 if not self._next:
                     break
                 pair = self._next.pop(0)
-                union, price, for_good = run.result(self._begun.pop(pair))
+                union, price = run.result(self._begun.pop(pair))
                 # Pay in the order of the pairs: how many are begun, which depends on the threads, must not matter.
                 if not run.work.pay(price):
                     break
                 if union is not None:
                     self._replace(pair, union)
-                elif for_good:
-                    self._refuse(pair.first, pair.second)
         except Stopped:  # raised between two unions
             run.note_stop()
         finally:
@@ -249,25 +221,14 @@ class _Merging:
         self._alive.remove(pair[1:])
         newest = self._alive.add(union)
         self._origin.append(min(self._origin[pair.first], self._origin[pair.second]))
-        never_with = (self._refused[pair.first] | self._refused[pair.second]) & self._alive.parts.keys()
-        self._refused.append(never_with)
-        for i in never_with:
-            self._refused[i].add(newest)
         for waiting in self._next:
             heapq.heappush(self._queue, waiting)
         self._next = []
-        self._find([newest], self._alive.boxes.without([*never_with]))
+        self._find([newest])
 
-    def _find(self, new: Sequence[int], boxes: Boxes) -> None:
-        found, never = self._pairing.pairs(self._alive, boxes, new)
-        for pair in found:
+    def _find(self, new: Sequence[int]) -> None:
+        for pair in self._pairing.pairs(self._alive, new):
             heapq.heappush(self._queue, pair)
-        for first, second in never:
-            self._refuse(first, second)
-
-    def _refuse(self, first: int, second: int) -> None:
-        self._refused[first].add(second)
-        self._refused[second].add(first)
 
 
 @dataclass(frozen=True)
