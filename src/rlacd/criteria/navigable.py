@@ -144,7 +144,10 @@ class Navigable(Criterion):
         """
         scale = solid.frame.scale
         radius, tolerance = space.in_frame(scale)
-        warnings = _warnings(solid)
+        warnings = list[str]()
+        if opened := sum(body.step in _OPEN for body in solid.bodies):
+            bodies = f"{opened} open bod{'y' if opened == 1 else 'ies'}"
+            warnings.append(f"the space is measured from the closed surface that repair made of {bodies}")
         surface = _native.Surface(solid.vertices, solid.faces)
         planes = _planes_in_frame(space.closed_planes, solid.frame)
         seeds = None
@@ -340,11 +343,3 @@ def _check_seeds(
                 f"seed {i} at {seed.tolist()} is nearer than the radius, {radius / scale:.4g}, to a closed plane or "
                 "beyond it; put it where a ball has room."
             )
-
-
-def _warnings(solid: Solid) -> list[str]:
-    opened = sum(body.step in _OPEN for body in solid.bodies)
-    if opened == 0:
-        return []
-    bodies = f"{opened} open bod{'y' if opened == 1 else 'ies'}"
-    return [f"the space is measured from the closed surface that repair made of {bodies}"]

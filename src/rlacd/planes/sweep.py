@@ -96,7 +96,7 @@ class SweepCache:
 
     def candidates(self, component: Component) -> Candidates:
         """Get the planes of a component."""
-        return self._once(self._candidates, component, self._found)
+        return self._once(self._candidates, component, lambda one: all_planes(one, self._per_axis, self._concave_edges))
 
     def of(self, component: Component, threads: int = 1) -> Sweep:
         """Get the sweep of a component."""
@@ -112,11 +112,6 @@ class SweepCache:
             with self._lock:  # another thread may have done the same, with the same result
                 known[component] = made
         return made
-
-    def _found(self, component: Component) -> Candidates:
-        if self._concave_edges == 0:
-            return axis_and_principal(component, self._per_axis)
-        return all_planes(component, self._per_axis, self._concave_edges)
 
 
 SLIVERS = (SLIVER, SLIVER / 100)

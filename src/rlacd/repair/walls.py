@@ -21,7 +21,7 @@ from rlacd.solid.arrays import FloatArray, angles, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from rlacd.solid.topology import BoolArray, IntArray, Sides, marked, nondegenerate
+from rlacd.solid.topology import BoolArray, IntArray, marked, nondegenerate
 
 
 def build_walls(state: State) -> None:
@@ -131,40 +131,21 @@ def _solid(soup: Soup, mesh: tuple[FloatArray, IntArray], side: int, is_thin: bo
     return solid
 
 
-def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
-    """Build side components, sheets and flat ones with thickness."""
-    front = soup.sides.label[0::2]
-    thin = keep[front] & (soup.sides.sheet | flat[front])
-    return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
-
-
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
 _LONGEST_MITER = 2.0
 
 
-def skin(
-    vertices: FloatArray, faces: IntArray, sides: Sides, keep: BoolArray, thin: BoolArray, half_thickness: float
-) -> tuple[FloatArray, IntArray, IntArray]:
-    """Build the surfaces of chosen side components.
-
-    Parameters
-    ----------
-    vertices, faces
-        The soup, ``[V, 3]`` and ``[F, 3]``.
-    sides
-        Its sides.
-    keep
-        ``[C]``, the side components to build.
-    thin
-        ``[F]``, the faces without an inside; their sides are moved outward.
-    half_thickness
-        Distance, in the unit of the vertices.
+def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+    """Build the surfaces of chosen side components ``[C]``; sheets and flat ones get thickness: sides move outward.
 
     Returns
     -------
     tuple
         New vertices ``[N, 3]``, faces ``[M, 3]`` and the side component ``[M]`` of each new face.
     """
+    vertices, faces, sides = soup.vertices, soup.faces, soup.sides
+    front = sides.label[0::2]
+    thin = keep[front] & (sides.sheet | flat[front])
     kept = np.flatnonzero(keep[sides.label])  # sides
     used = keep[sides.label[sides.facing[:, 0]]]
     wedges, facing = sides.wedges[used], sides.facing[used]
@@ -186,7 +167,7 @@ def skin(
     positions = vertices[base]
     poll_stop()
     if thin.any():
-        positions += half_thickness * _fan_offsets(vertices, faces[face], back, thin[face], fan, number)
+        positions += HALF_THICKNESS * _fan_offsets(vertices, faces[face], back, thin[face], fan, number)
     triangles = fan.reshape(-1, 3).copy()
     triangles[back] = triangles[back][:, ::-1]
     if not is_rim.any():

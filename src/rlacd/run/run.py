@@ -135,7 +135,7 @@ class Run:
         self._whole.__enter__()
         self._pool = ThreadPoolExecutor(self.threads, initializer=use_stop, initargs=(self.stop,))
         self._before = use_stop(self.stop)
-        self.stop.begin(self._look)
+        self.stop.begin(self.may_continue)
         self.stop.arm(self._timeout - self.elapsed)
         return self
 
@@ -363,9 +363,6 @@ class Run:
     def _stop_by(self, reason: StoppedBy) -> None:
         self.stopped_by, self.stopped_in, self._stopped_at = reason, self._stage, self.elapsed
         self.stop.trip()
-
-    def _look(self) -> None:
-        self.may_continue()
 
 
 def available_cpus() -> int:
