@@ -158,7 +158,9 @@ class _Caps:
         ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
         columns = (own, self._cap_area / body_area, of_all / body_area, depth, reached, smooth, ring, is_tube)
         holes = [_Hole(*row) for row in zip(loops, *(column.tolist() for column in columns), strict=True)]
-        _find_ends(holes)
+        count = Counter(hole.body for hole in holes)
+        for hole in holes:
+            hole.is_end = hole.is_tube and count[hole.body] == 1  # a pipe has two
         _find_wounds(holes)
         for hole in holes:
             hole.is_wound &= hole.depth <= self._gap or not self._is_plugged(hole)
@@ -248,13 +250,6 @@ def close_holes(state: State) -> None:
     state.holes = caps.described(useful)
     if useful.any():
         state.soup = closed
-
-
-def _find_ends(holes: list[_Hole]) -> None:
-    """Mark the ends of bars: the only hole of a body; a pipe has two."""
-    count = Counter(hole.body for hole in holes)
-    for hole in holes:
-        hole.is_end = hole.is_tube and count[hole.body] == 1
 
 
 def _find_wounds(holes: list[_Hole]) -> None:
