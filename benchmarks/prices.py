@@ -16,10 +16,10 @@ from benchmarks.cli import PATH
 from benchmarks.runner import find_meshes
 from benchmarks.tables import Table
 from rlacd.cli.exit_codes import exit_codes
-from rlacd.criteria.concavity import Concavity, ConcavityScreen
+from rlacd.criteria.concavity import Concavity, DistanceScreen
 from rlacd.policies import Greedy
 from rlacd.run import work
-from rlacd.search import recut
+from rlacd.search import operators
 from rlacd.solid.component import ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
@@ -30,9 +30,9 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
     "cutting": (Component, "cut", lambda part, plane: (part.size,), work.cutting),
     "judging": (Concavity, "is_met", lambda goal, part: (len(part.faces), len(part.hull.faces)), work.judging),
     "joining": (Hull, "around", lambda *hulls: (sum(len(hull.vertices) for hull in hulls),), work.joining),
-    "testing": (ConcavityScreen, "feasibility", lambda screen, solid, hull: (len(hull.vertices),), work.testing),
+    "testing": (DistanceScreen, "feasibility", lambda screen, solid, hull: (len(hull.vertices),), work.testing),
     "screening": (
-        ConcavityScreen,
+        DistanceScreen,
         "feasibilities",
         lambda screen, solid, hulls, pairs, threads: (
             sum(len(hulls[i]) for i in pairs.ravel().tolist()),
@@ -47,7 +47,7 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
         lambda part, solid, parts, hull: (sum(one.size for one in parts), len(hull.faces)),
         work.filling,
     ),
-    "reuniting": (recut, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),
+    "reuniting": (operators, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),
 }
 """By the name of its price: where the kernel is, and the sizes of a call."""
 

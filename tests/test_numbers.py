@@ -26,11 +26,11 @@ from rlacd.io.robots import spans
 from rlacd.io.write.model import LENGTHS, MASSES
 from rlacd.merge import grow
 from rlacd.options import Options
+from rlacd.planes.candidates import EDGES_PER_COMPONENT
 from rlacd.planes.sweep import SLIVER
-from rlacd.policies.greedy import EDGES_PER_COMPONENT
 from rlacd.pool import ProcessLimits
 from rlacd.pool.on_ray import MACHINES
-from rlacd.repair import holes, windings, work, wraps
+from rlacd.repair import distance, holes, state, wraps
 from rlacd.search.neighbourhood import CLUSTER, LEAST_TRIALS
 from rlacd.search.search import BOUNDED_PATIENCE, LEAST_WORK, MOST_WORK, TIMES_FIRST_PASS
 from rlacd.solid.component import DENSE
@@ -71,13 +71,13 @@ LIMITS = {
         f"clusters of {WORDS[CLUSTER]}",
     ],
     "docs/repair.md": [
-        f"within {work._WELDS[0] * 1e5:g}·10⁻⁵ (else {work._WELDS[1] * 1e4:g}·10⁻⁴)",
+        f"within {state._WELDS[0] * 1e5:g}·10⁻⁵ (else {state._WELDS[1] * 1e4:g}·10⁻⁴)",
         f"{2 * HALF_THICKNESS * 1e3:g}·10⁻³ thick",
         f"over {wraps._CROWD} slabs, or over {wraps._CROSSINGS:,} pairs",
         f"radius is {100 * Options.gap:g} % of the longest side",
         f"({100 * holes.HOLE_SHARE:g} % of its area, up to {holes.HOLE:g} away)",
         f"may have {100 * holes._END:g} % of its area",
-        f"in more than {100 * windings.TANGLED:g} % of the surface",
+        f"in more than {100 * distance.TANGLED:g} % of the surface",
     ],
     "docs/batch.md": [
         f"`--memory` ({ProcessLimits().memory // GB} GB)",

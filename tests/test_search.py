@@ -23,14 +23,12 @@ from rlacd.cut import CutTree
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
 from rlacd.planes.sweep import SweepCache
-from rlacd.policies import make_policy
+from rlacd.policies import Greedy, make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
-from rlacd.search.context import SearchContext, by_score
-from rlacd.search.neighbourhood import LAG, LEAST_TRIALS, Neighbourhood, cost
+from rlacd.search.neighbourhood import LAG, LEAST_TRIALS, Neighbourhood, SearchContext, cost
+from rlacd.search.operators import Exchange, recut, redistribute
 from rlacd.search.part_graph import PartGraph
-from rlacd.search.recut import Exchange, recut
-from rlacd.search.redistribute import redistribute
 from rlacd.search.search import BOUNDED_PATIENCE, search
 from rlacd.solid.component import Component, Part, Plane, reunite, touch
 from tests.hulls import assert_same_hulls
@@ -112,7 +110,7 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
     with Run(1) as run:
         parts = first_pass(root, run)
         state = Neighbourhood(
-            SearchContext(root, CRITERION, rankings=[by_score("hull-sum")], near_sweeps=SweepCache(12, 0)), parts, run
+            SearchContext(root, CRITERION, scores=["hull-sum"], near_sweeps=SweepCache(12, 0)), parts, run
         )
         for steps in range(3, 15, 3):
             state.improve(steps)
@@ -185,12 +183,12 @@ def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     pieces: list[Component] = [bar]
     for offset in (-1.0, 0.2, 1.1):
         pieces = [side for piece in pieces for side in piece.cut(Plane((1, 0, 0), offset)) if side is not None]
-    exchange = recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Run(1))
+    exchange = recut(pieces, [], Greedy("hull-sum", sweeps=SweepCache(12, 0)), CRITERION, Run(1))
     assert exchange is not None
     assert exchange.gain == 3
     assert exchange.into[0].volume == pytest.approx(3)
     # With no time left, nothing is found.
-    assert recut(pieces, [], by_score("hull-sum")(SweepCache(12, 0)), CRITERION, Run(1, -1.0)) is None
+    assert recut(pieces, [], Greedy("hull-sum", sweeps=SweepCache(12, 0)), CRITERION, Run(1, -1.0)) is None
 
 
 def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Criterion) -> None:

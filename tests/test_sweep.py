@@ -15,12 +15,13 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.decompose_mesh import decompose
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
-from rlacd.planes.sweep import SLIVER, SLIVERS, TIE, Sweep, SweepCache, least_excess, sweep
+from rlacd.planes.sweep import SLIVER, SLIVERS, Sweep, SweepCache, least_excess, sweep
 from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import excess_norm, hull_sum
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.manifold import to_manifold
 from tests.shapes import box
 
@@ -170,7 +171,7 @@ def cheapest(scored: Sweep, cost: FloatArray) -> Plane | None:
     for sliver in SLIVERS:
         valid = scored.valid(sliver)
         if valid.any():
-            equal = cost[valid].min() + TIE * cost[valid].max()
+            equal = cost[valid].min() + ROUNDING * cost[valid].max()
             return scored.candidates.plane(int(np.argmax(valid & (cost <= equal))))
     return None
 

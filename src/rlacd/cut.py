@@ -12,12 +12,10 @@ from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
 from rlacd.run import Run, work
-from rlacd.solid.component import Component, Plane
+from rlacd.solid.component import Component, Plane, is_film
+from rlacd.solid.frame import HALF_THICKNESS
 
-FILM = 2e-4
-"""Mean thickness (twice the volume over the area) below which a piece may be a shaving; sheets are 10 times thicker."""
-
-SHAVING = 1e-3
+SHAVING = HALF_THICKNESS
 """No point of a shaving is farther than this from the solid across the cut."""
 
 MANY_COMPONENTS = 1000
@@ -26,9 +24,6 @@ and another into tens (research/learning.md). So a second one is tried, ..."""
 
 FAR_FEWER = 1 / 2
 """... and abandoned at this share of the components, or of the work done for them."""
-
-AGAIN = 4
-"""The second policy is tried again each time there are this many times as many components."""
 
 
 class CutCache:
@@ -118,7 +113,7 @@ class CutTree:
         left : list of Component
             Components that do not: no plane cuts them, the run ended, or there would be more than `most`.
         """
-        run, many = self._run, MANY_COMPONENTS
+        run, many = self._run, float(MANY_COMPONENTS)
         begin = run.work.done
         done: list[Component] = []
         left: list[Component] = []
@@ -139,7 +134,7 @@ class CutTree:
                 if unmet and count > many:
                     if (parts := self._by_second(criterion, FAR_FEWER * count, FAR_FEWER * spent)) is not None:
                         return parts, []
-                    many = AGAIN * count
+                    many = math.inf
                 new = [c for c in unmet if c not in self._children]
                 if not run.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
                     return done, left + unmet
@@ -196,11 +191,6 @@ def halves(film: Component) -> list[Component]:
     normal = (float(axis == 0), float(axis == 1), float(axis == 2))
     below, above = film.cut(Plane(normal, float(lower[axis] + upper[axis]) / 2), least=-math.inf)
     return [] if below is None or above is None else [below, above]
-
-
-def is_film(piece: Component) -> bool:
-    """Whether a piece is as thin as a shaving on average; what is inside out is too."""
-    return 2 * piece.volume <= FILM * _native.mesh_area(piece.vertices, piece.faces)
 
 
 def is_shaving(piece: Component, across: Component) -> bool:

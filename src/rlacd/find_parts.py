@@ -6,7 +6,6 @@ Each stage returns the best so far when the run stops, and none sends the data b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import NamedTuple
@@ -30,6 +29,10 @@ from rlacd.solid.cover import cover
 from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
+
+COARSER = 1.5
+"""The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
+only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
 
 FIRST_POWER = 8
 """Power of `COARSER` from which parts over a limit are cut where few hulls are left: 25 times the threshold."""
@@ -79,8 +82,8 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     solid.pieces.clear()
     decomposer = _Decomposer.of(model, goal, options, run)
     parts, goal, found = decomposer.decompose(goal)
-    if not decomposer.keeps_limit(parts):
-        parts = decomposer.at_most(parts, goal)
+    if options.max_hulls is not None and not decomposer.keeps(options.max_hulls, parts):
+        parts = decomposer.at_most(options.max_hulls, parts, goal)
     elif options.hull_limits.allow(*BOX) and not options.hull_limits.allow(*FEWEST):
         try:
             with run.stage("limit"), run.limited(MOST_CUTTING + MOST_PER_FACE * root.size, cuts="cut"):
@@ -141,25 +144,36 @@ class _Decomposer:
             scaled = goal if factor == 1.0 else goal.scaled(factor)
             return self.model.lift(parts, scaled, policy, self.run, merge=self.options.merge), goal, found
 
-    def keeps_limit(self, parts: list[Part]) -> bool:
-        """Whether there are at most `max_hulls` parts."""
-        most = self.options.max_hulls
+    def keeps(self, most: int, parts: list[Part]) -> bool:
+        """Whether there are at most so many parts."""
         with self.run.shielded():
-            return most is None or len(parts) <= most or len(drop_slivers(parts, self.run)) <= most
+            return len(parts) <= most or len(drop_slivers(parts, self.run)) <= most
 
-    def at_most(self, free: list[Part], goal: Criterion) -> list[Part]:
-        """The best decomposition into at most `max_hulls` parts, among those under coarser goals."""
+    def at_most(self, most: int, free: list[Part], goal: Criterion) -> list[Part]:
+        """The decomposition into at most so many parts whose largest error is least, among those under coarser goals.
 
-        def unite(first: Part, second: Part) -> Part:
-            clipped = self.model.proxy and self.model.solid.inside(Hull.around(first.hull, second.hull))
-            return clipped if clipped and clipped.size else Part.glued(first, second)
+        `free` is that without a limit, which has more. The solid as one part remains where there is no time.
+        """
+        run, whole, limited = self.run, self.model.solid, LimitedCriterion(goal, self.options.hull_limits)
+        best, least = list[Part]([whole]), math.inf
+        factor, begin = 1.0, run.work.done
+        try:
+            least = limited.error(whole)
+            while True:
+                parts = free if factor == 1.0 else self.decompose(goal, factor)[0]
+                for state, error in united_in_turn(parts, self._united, limited, Work(MOST_CUTTING), run):
+                    if len(state) <= most and error < least:
+                        best, least = state, error
+                if len(parts) <= 1 or run.stopped_by is not None:
+                    return best
+                factor *= COARSER if run.work.done - begin < MOST_CUTTING else COARSER**4
+        except Stopped:
+            run.note_stop()
+        return best
 
-        def decompose(factor: float) -> list[Part]:
-            return free if factor == 1.0 else self.decompose(goal, factor)[0]
-
-        most, limited = self.options.max_hulls, LimitedCriterion(goal, self.options.hull_limits)
-        assert most is not None
-        return best_within(most, self.model.solid, decompose, unite, limited, self.run)
+    def _united(self, first: Part, second: Part) -> Part:
+        clipped = self.model.proxy and self.model.solid.inside(Hull.around(first.hull, second.hull))
+        return clipped if clipped and clipped.size else Part.glued(first, second)
 
     def cut_to_limits(self, parts: list[Part], goal: Criterion) -> list[Part]:
         """Cut parts that limits too low for the criterion make break it, the worst first, while hulls are left."""
@@ -241,49 +255,3 @@ def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
 def _scale(criterion: Criterion) -> float | None:
     """How far a hull may reach beyond its part, if the criterion bounds that: an input of networks."""
     return criterion.overhang if math.isfinite(criterion.overhang) else None
-
-
-COARSER = 1.5
-"""The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
-only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
-
-
-def best_within(
-    most: int,
-    whole: Part,
-    decompose: Callable[[float], Sequence[Part]],
-    unite: Callable[[Part, Part], Part],
-    criterion: Criterion,
-    run: Run,
-) -> list[Part]:
-    """Find the decomposition into at most `most` parts whose largest error is least.
-
-    Parameters
-    ----------
-    most : int
-        Fewer than the decomposition without a limit has.
-    whole : Part
-        The solid as one part: what remains where there is no time.
-    decompose : callable
-        Decomposes the solid under a criterion whose threshold is larger by a factor; 1 gives what it has without a
-        limit.
-    unite : callable
-        Returns the union of two parts.
-    criterion : Criterion
-        Measures the errors.
-    """
-    best, least = [whole], math.inf
-    factor, begin = 1.0, run.work.done
-    try:
-        least = criterion.error(whole)
-        while True:
-            parts = decompose(factor)
-            for state, error in united_in_turn(parts, unite, criterion, Work(MOST_CUTTING), run):
-                if len(state) <= most and error < least:
-                    best, least = state, error
-            if len(parts) <= 1 or run.stopped_by is not None:
-                return best
-            factor *= COARSER if run.work.done - begin < MOST_CUTTING else COARSER**4
-    except Stopped:
-        run.note_stop()
-    return best

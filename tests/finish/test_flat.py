@@ -11,7 +11,7 @@ from manifold3d import Manifold
 
 import rlacd
 from rlacd.criteria import Concavity
-from rlacd.finish.limit import resting_sides, take_in
+from rlacd.finish.finish import resting_sides, take_in
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part

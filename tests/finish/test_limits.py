@@ -17,7 +17,7 @@ import rlacd
 from fuzz.geometry import Polytope, why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.finish.limit import limit_part
+from rlacd.finish.finish import limit_part
 from rlacd.merge.merge import united_in_turn
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run, Work

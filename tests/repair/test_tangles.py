@@ -15,9 +15,8 @@ import rlacd
 import rlacd.cut_and_merge
 from fuzz.geometry import Polytope, distance_to_union, winding_number
 from rlacd.io.read.load import load_mesh
-from rlacd.repair.distance import SurfaceQuery
+from rlacd.repair.distance import SurfaceQuery, is_tangle
 from rlacd.repair.repair import repair
-from rlacd.repair.windings import is_tangle
 from rlacd.solid.solid import Solid
 
 Mesh = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]

@@ -61,21 +61,34 @@ class ConcavityValue:
 
 @dataclass(frozen=True)
 class DistanceScreen(Screen):
-    """Necessary conditions for a distance of at most `threshold`.
+    """Necessary conditions for a distance or concavity of at most `threshold`.
 
     The reach is twice the threshold: if parts are farther apart, the middle of the joint hull is too far from both.
+
+    Attributes
+    ----------
+    threshold : float
+    weight : float
+        Of ``R_v``, which the volumes give; 0 for a distance.
     """
 
     threshold: float
+    weight: float
 
-    @property
-    def looks_inside(self) -> bool:
-        """Yes."""
-        return True
+    looks_inside: ClassVar[bool] = True
 
     def filled(self, part: Part) -> float:
         """The part's volume: the rest of the hull is the volume between the two surfaces."""
         return part.volume
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """``0.3 R_v``, a lower bound of the concavity."""
+        return self.weight * volume_radius(volume, hull_volume)
+
+    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
+        """Whether ``0.3 R_v`` alone exceeds the threshold."""
+        ball = 4 / 3 * math.pi * (self.threshold / self.weight) ** 3 if self.weight else math.inf
+        return np.asarray(hull_volume - volume > ball)
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """Test the solid's corners and points of the hull."""
@@ -90,20 +103,6 @@ class DistanceScreen(Screen):
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether the solid's surface reaches deeper into the hull than the threshold."""
         return filling.comes_deeper(hull.vertices, hull.faces, self.threshold)
-
-
-@dataclass(frozen=True)
-class ConcavityScreen(DistanceScreen):
-    """The same for a concavity, which the volumes bound from below."""
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """``0.3 R_v``, a lower bound of the concavity."""
-        return VOLUME_WEIGHT * volume_radius(volume, hull_volume)
-
-    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
-        """Whether ``0.3 R_v`` alone exceeds the threshold."""
-        ball = 4 / 3 * math.pi * (self.threshold / VOLUME_WEIGHT) ** 3
-        return np.asarray(hull_volume - volume > ball)
 
 
 @dataclass(frozen=True)
@@ -137,6 +136,10 @@ class Distance(Criterion):
     unit: float = 1.0
 
     name: ClassVar[str] = "distance"
+    weight: ClassVar[float] = 0.0
+    """Of ``R_v``."""
+    eliminates: ClassVar[bool] = True
+    """A third more time saves a tenth of the parts, and the parts around a hole need not be 8, 16 or 32."""
 
     def __post_init__(self) -> None:
         if not self.threshold > 0:
@@ -148,14 +151,9 @@ class Distance(Criterion):
         return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
     @property
-    def eliminates(self) -> bool:
-        """Yes: a third more time saves a tenth of the parts, and the parts around a hole need not be 8, 16 or 32."""
-        return True
-
-    @property
     def screen(self) -> DistanceScreen:
-        """Tests of the solid's corners."""
-        return DistanceScreen(2 * self.threshold, self.threshold)
+        """Tests of the solid's corners, and of volumes if they count."""
+        return DistanceScreen(2 * self.threshold, self.threshold, self.weight)
 
     def scaled(self, factor: float) -> Distance:
         """The same criterion with ``factor`` times the threshold."""
@@ -210,7 +208,7 @@ class Distance(Criterion):
 
     def _volumes(self, part: Part) -> tuple[float, float]:
         """Volumes of the part and its hull, as far as they matter: equal ones make ``R_v`` 0."""
-        return part.hull.volume, part.hull.volume
+        return part.volume if self.weight else part.hull.volume, part.hull.volume
 
 
 @dataclass(frozen=True)
@@ -218,16 +216,6 @@ class Concavity(Distance):
     """The criterion "CoACD concavity at most ``threshold``"."""
 
     name: ClassVar[str] = "concavity"
-
-    @property
-    def eliminates(self) -> bool:
-        """No: a pass is cuts and merging, as in CoACD."""
-        return False
-
-    @property
-    def screen(self) -> ConcavityScreen:
-        """Tests of volumes and of the solid's corners."""
-        return ConcavityScreen(2 * self.threshold, self.threshold)
-
-    def _volumes(self, part: Part) -> tuple[float, float]:
-        return part.volume, part.hull.volume
+    weight: ClassVar[float] = VOLUME_WEIGHT
+    eliminates: ClassVar[bool] = False
+    """A pass is cuts and merging, as in CoACD."""

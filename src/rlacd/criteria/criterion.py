@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -50,11 +50,6 @@ class Criterion(Protocol):
         return False
 
     @property
-    def is_hereditary(self) -> bool:
-        """Whether no union that contains a part that fails the criterion can meet it."""
-        return False
-
-    @property
     def screen(self) -> Screen:
         """Cheap tests that reject unions which cannot meet the criterion."""
         ...
@@ -93,46 +88,6 @@ class Criterion(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Joined(Criterion):
-    """A criterion with one more condition; all else is as it says.
-
-    Attributes
-    ----------
-    criterion : Criterion
-    """
-
-    criterion: Criterion
-
-    @property
-    def eliminates(self) -> bool:
-        """As the underlying criterion."""
-        return self.criterion.eliminates
-
-    @property
-    def screen(self) -> Screen:
-        """That of the underlying criterion: what it rejects fails here too."""
-        return self.criterion.screen
-
-    def error(self, part: Part) -> float:
-        """That of the underlying criterion."""
-        return self.criterion.error(part)
-
-    @property
-    def overhang(self) -> float:
-        """That of the underlying criterion."""
-        return self.criterion.overhang
-
-    @property
-    def obstacles(self) -> Balls | None:
-        """Those of the underlying criterion."""
-        return self.criterion.obstacles
-
-    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
-        """That of the underlying criterion."""
-        return self.criterion.summary(errors)
-
-
 class Feasibility(IntEnum):
     """Whether a solid clipped to a hull may meet a criterion (see native/distance/filling.hpp)."""
 
@@ -157,10 +112,8 @@ class Screen:
 
     reach: float
 
-    @property
-    def looks_inside(self) -> bool:
-        """Whether the criterion judges what fills a hull, not the hull alone."""
-        return False
+    looks_inside: ClassVar[bool] = False
+    """Whether the criterion judges what fills a hull, not the hull alone."""
 
     def filled(self, part: Part) -> float:
         """Volume that a joint hull may fill for free on account of this part; the cheapest pairs are merged first."""

@@ -11,18 +11,17 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria.concavity import Concavity, Distance
-from rlacd.criteria.criterion import Criterion, Joined
+from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
 from rlacd.criteria.navigable import Intrusions, Navigable
 from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING
-from rlacd.solid.hull import keeps, limit_hull
+from rlacd.solid.hull import NO_LIMITS, keeps, limit_hull
 from rlacd.solid.passages import passage_balls
-from rlacd.solid.primitive import Balls
+from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.solid import Solid
 
 STARTS_FOR_ALL = 5000
@@ -32,50 +31,15 @@ PLAY = 1.01
 """Passages that are narrower than so many times a ball need not let it through: hulls around them cannot be exact."""
 
 
-@dataclass(frozen=True)
-class KeptOpen(Joined):
-    """A criterion whose hulls also stay out of balls, each a share of the largest that fits where it is.
-
-    Attributes
-    ----------
-    criterion : Criterion
-    free : Balls
-        The largest that fit in the passages of the solid.
-    radii : float64 [B]
-        How large they have to stay.
-    """
-
-    free: Balls
-    radii: FloatArray
-
-    @classmethod
-    def around(cls, criterion: Criterion, options: Options, solid: Solid, run: Run) -> KeptOpen:
-        """Find the passages of a solid that hulls which meet a criterion could narrow too much."""
-        scale = solid.frame.scale
-        share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
-        most = min((ball + criterion.overhang) / (1 - share), 2.0)
-        with run.stage("space"):
-            surface = _native.Surface(*solid.mesh, run.threads)
-            free = passage_balls(solid.mesh, surface, (least_kept(options, scale), most), STARTS_FOR_ALL, run.threads)
-        return cls(criterion, free, np.minimum(share * free.radii + ball, free.radii))
-
-    @cached_property
-    def _intrusions(self) -> Intrusions:
-        return Intrusions(Balls(self.free.centres, self.radii))
-
-    def is_met(self, part: Part) -> bool:
-        """Whether the hull stays out of the balls, and the criterion is met."""
-        return not self._intrusions.any_beyond(part, ROUNDING) and self.criterion.is_met(part)
-
-    def scaled(self, factor: float) -> KeptOpen:
-        """Coarser: hulls may take more of each ball, by the same factor."""
-        radii = np.maximum(self.free.radii - factor * (self.free.radii - self.radii), 0.0)
-        return replace(self, criterion=self.criterion.scaled(factor), radii=radii)
-
-    def settled(self, parts: Sequence[Part]) -> KeptOpen:
-        """Balls become as small as the hulls of parts that cannot be cut leave them; the report measures those."""
-        radii = np.maximum(self._intrusions.radii_left(parts), 0.0)
-        return replace(self, criterion=self.criterion.settled(parts), radii=radii)
+def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) -> tuple[Balls, Balls]:
+    """The largest balls in passages that hulls could narrow too much, and how large they have to stay."""
+    scale = solid.frame.scale
+    share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
+    most = min((ball + criterion.overhang) / (1 - share), 2.0)
+    with run.stage("space"):
+        surface = _native.Surface(*solid.mesh, run.threads)
+        free = passage_balls(solid.mesh, surface, (least_kept(options, scale), most), STARTS_FOR_ALL, run.threads)
+    return free, Balls(free.centres, np.minimum(share * free.radii + ball, free.radii))
 
 
 def least_kept(options: Options, scale: float) -> float:
@@ -102,43 +66,82 @@ BOX = (8, 12)
 
 
 @dataclass(frozen=True)
-class LimitedCriterion(Joined):
-    """A criterion that must hold for the limited hull too.
+class LimitedCriterion(Criterion):
+    """A criterion that the limited hull of a part has to meet too, and whose hulls keep passages open.
 
     Attributes
     ----------
     criterion : Criterion
+        All else is as it says.
     limits : HullLimits
+    free, kept : Balls
+        The largest that fit in the passages of the solid, and how large they have to stay.
     """
 
-    limits: HullLimits
+    criterion: Criterion
+    limits: HullLimits = NO_LIMITS
+    free: Balls = NO_BALLS
+    kept: Balls = NO_BALLS
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
         """The criterion that the options name, with their passages, within their limits if cutting can meet those."""
         criterion = CRITERIA[options.criterion_name].prepare(options, solid, run)
+        limits = options.hull_limits if options.hull_limits.allow(*FEWEST) else NO_LIMITS
         if run is not None and (options.keep_open is not None or options.keep_open_abs is not None):
-            criterion = KeptOpen.around(criterion, options, solid, run)
-        limits = options.hull_limits
-        return cls(criterion, limits) if any(limits) and limits.allow(*FEWEST) else criterion
+            return cls(criterion, limits, *_passages(criterion, options, solid, run))
+        return cls(criterion, limits) if any(limits) else criterion
+
+    @property
+    def eliminates(self) -> bool:
+        """As the underlying criterion."""
+        return self.criterion.eliminates
+
+    @property
+    def screen(self) -> Screen:
+        """That of the underlying criterion: what it rejects fails here too."""
+        return self.criterion.screen
+
+    @property
+    def overhang(self) -> float:
+        """That of the underlying criterion."""
+        return self.criterion.overhang
+
+    @property
+    def obstacles(self) -> Balls | None:
+        """Those of the underlying criterion."""
+        return self.criterion.obstacles
+
+    def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
+        """That of the underlying criterion."""
+        return self.criterion.summary(errors)
+
+    @cached_property
+    def _intrusions(self) -> Intrusions:
+        return Intrusions(self.kept)
 
     def is_met(self, part: Part) -> bool:
-        """Decide for the exact hull first, then for the limited one."""
-        return self.criterion.is_met(part) and (
-            keeps(part.hull, self.limits) or self.criterion.is_met(self._limited(part))
-        )
+        """Decide for the exact hull first, then for the limited one: it stays out of the balls, and is tight."""
+        return self._is_met(part) and (keeps(part.hull, self.limits) or self._is_met(self._limited(part)))
+
+    def _is_met(self, part: Part) -> bool:
+        narrows = len(self.kept) > 0 and self._intrusions.any_beyond(part, ROUNDING)
+        return not narrows and self.criterion.is_met(part)
 
     def error(self, part: Part) -> float:
         """Measure the part against its limited hull."""
         return self.criterion.error(self._limited(part))
 
     def settled(self, parts: Sequence[Part]) -> LimitedCriterion:
-        """Settle the underlying criterion with the limited hulls."""
-        return LimitedCriterion(self.criterion.settled([self._limited(part) for part in parts]), self.limits)
+        """Settle it with the limited hulls; balls become as small as parts that cannot be cut leave them."""
+        limited = [self._limited(part) for part in parts]
+        kept = Balls(self.free.centres, np.maximum(self._intrusions.radii_left(limited), 0.0))
+        return replace(self, criterion=self.criterion.settled(limited), kept=kept)
 
     def scaled(self, factor: float) -> LimitedCriterion:
-        """Get the same limits with a larger threshold."""
-        return LimitedCriterion(self.criterion.scaled(factor), self.limits)
+        """Coarser: hulls may also take more of each ball, by the same factor."""
+        radii = np.maximum(self.free.radii - factor * (self.free.radii - self.kept.radii), 0.0)
+        return replace(self, criterion=self.criterion.scaled(factor), kept=Balls(self.free.centres, radii))
 
     def _limited(self, part: Part) -> Part:
         return part if keeps(part.hull, self.limits) else part.with_hull(limit_hull(part.hull, self.limits))

@@ -20,6 +20,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -35,7 +36,7 @@ from rlacd.solid.arrays import FloatArray, IntArray, dots, heights
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.primitive import Balls
+from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.solid import Solid
 
 MOST_CELLS = 256
@@ -92,6 +93,9 @@ class Navigable(Criterion):
     hull: Hull | None = None
     allowance: float = 0.0
 
+    eliminates: ClassVar[bool] = True
+    """Hulls are tested quickly against balls."""
+
     @cached_property
     def _intrusions(self) -> Intrusions:
         return Intrusions(self.balls)
@@ -106,7 +110,7 @@ class Navigable(Criterion):
         assert isinstance(space, NavigableSpace)
         if run is None:
             warning = "There was no time to find the navigable space, so there are no balls."
-            return cls(*space.in_frame(solid.frame.scale), Balls(np.empty((0, 3)), np.empty(0)), (warning,))
+            return cls(*space.in_frame(solid.frame.scale), NO_BALLS, (warning,))
         with run.stage("space"):
             return cls.of(space, solid, run.threads)
 
@@ -140,7 +144,10 @@ class Navigable(Criterion):
         """
         scale = solid.frame.scale
         radius, tolerance = space.in_frame(scale)
-        warnings = _warnings(solid)
+        warnings = list[str]()
+        if opened := sum(body.step in _OPEN for body in solid.bodies):
+            bodies = f"{opened} open bod{'y' if opened == 1 else 'ies'}"
+            warnings.append(f"the space is measured from the closed surface that repair made of {bodies}")
         surface = _native.Surface(solid.vertices, solid.faces)
         planes = _planes_in_frame(space.closed_planes, solid.frame)
         seeds = None
@@ -148,7 +155,7 @@ class Navigable(Criterion):
             seeds = solid.frame.to_frame(space.seeds)
             _check_seeds(seeds, space.seeds, surface, planes, radius, scale)
         hull = Hull.of(solid.vertices)
-        balls = Balls(np.empty((0, 3)), np.empty(0))
+        balls = NO_BALLS
         if radius >= 2:
             warnings.append("the radius is larger than the object, so no ball can get in: one hull is enough")
         elif hull is not None:
@@ -167,19 +174,9 @@ class Navigable(Criterion):
         return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
 
     @property
-    def eliminates(self) -> bool:
-        """Yes: hulls are tested quickly against balls."""
-        return True
-
-    @property
     def screen(self) -> Screen:
         """Reaches twice the sum of radius and tolerance: a ball can pass through a wider gap between two parts."""
         return Screen(2 * (self.radius + self.tolerance))
-
-    @property
-    def is_hereditary(self) -> bool:
-        """Yes: a larger hull touches every ball that a smaller one inside it touches."""
-        return True
 
     @property
     def obstacles(self) -> Balls:
@@ -346,11 +343,3 @@ def _check_seeds(
                 f"seed {i} at {seed.tolist()} is nearer than the radius, {radius / scale:.4g}, to a closed plane or "
                 "beyond it; put it where a ball has room."
             )
-
-
-def _warnings(solid: Solid) -> list[str]:
-    opened = sum(body.step in _OPEN for body in solid.bodies)
-    if opened == 0:
-        return []
-    bodies = f"{opened} open bod{'y' if opened == 1 else 'ies'}"
-    return [f"the space is measured from the closed surface that repair made of {bodies}"]

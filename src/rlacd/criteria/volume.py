@@ -30,11 +30,6 @@ REACH = 0.2
 """Parts farther apart than this (the longest side is 2) are not united: their joint hull would bridge the gap."""
 
 
-def share_of(added: float, base: float) -> float:
-    """What a hull adds, as a share of the base volume."""
-    return max(0.0, added) / base if base > 0 else (0.0 if added <= 0 else math.inf)
-
-
 @dataclass(frozen=True)
 class VolumeScreen(Screen):
     """Tests of volumes alone."""
@@ -85,7 +80,9 @@ class AddedVolume(Criterion):
 
     def share(self, volume: float, hull_volume: float) -> float:
         """The error of a part with these volumes."""
-        return share_of(hull_volume - volume, max(volume if self.whole is None else self.whole, self.least))
+        base = max(volume if self.whole is None else self.whole, self.least)
+        added = max(hull_volume - volume, 0.0)
+        return added / base if base > 0 else math.inf if added else 0.0
 
     @property
     def screen(self) -> VolumeScreen:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -97,79 +97,109 @@ def merge_lifted(
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
     run : Run
     """
-    pairs = _Lifted(rehearsal, run, proxy, few=0, confirmed=confirmed)
-    return _Merging(parts, pairs, run).united(len(parts))
+    return _Merging(parts, _Bridged(rehearsal, run, proxy, few=0, confirmed=confirmed), run).united(len(parts))
 
 
-class _Verdict(NamedTuple):
-    """On a pair of parts.
+@dataclass(frozen=True)
+class _Adjoining:
+    """Pairs within the criterion's reach, judged by their glued union."""
 
-    Attributes
-    ----------
-    union : Part or None
-        None if it does not meet the criterion.
-    price : float
-        The work of finding out.
-    for_good : bool
-        No larger union can meet the criterion either.
-    """
+    criterion: Criterion
+    run: Run
 
-    union: Part | None
-    price: float
-    for_good: bool = False
-
-
-class _Pairing(Protocol):
-    """A way to find pairs of parts that may be united, and to unite them."""
-
-    @property
-    def criterion(self) -> Criterion:
-        """Every union meets it."""
-
-    def pairs(
-        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
-    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs of a new part and another in the boxes that may be united, with costs; and pairs that never can be.
+    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
+        """Pairs of a new part and another that may be united: here those that the volume bound allows.
 
         Incomplete if the run's work runs out.
         """
+        screen = self.criterion.screen
+        pairs = alive.boxes.pairs(new, screen.reach)
+        vertices, volumes, filled = alive.sums(pairs)
+        if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
+            return []
+        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
+        kept = ~screen.excludes(volumes, hulls)
+        return _priced(pairs[kept], (hulls - filled)[kept])
 
-    def unite(self, first: Part, second: Part) -> _Verdict:
-        """Unite two parts if that meets the criterion."""
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, float]:
+        """Unite two parts if that meets the criterion; with the work of finding out."""
+        union, price = Part.glued(first, second), price_of_uniting(first, second)
+        is_met = union.size > 0 and self.criterion.is_met(union)  # without faces: it could not be clipped
+        return union if is_met else None, price
+
+
+@dataclass(frozen=True)
+class _Bridged(_Adjoining):
+    """All pairs (see `FEW_TO_PAIR`), judged by the solid clipped to their joint hull.
+
+    Unions on a proxy are then `confirmed` on the solid that it stands for.
+    """
+
+    solid: Component
+    few: int = FEW_TO_PAIR
+    confirmed: Callable[[Hull], Part | None] | None = None
+
+    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
+        """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
+        screen, run = self.criterion.screen, self.run
+        reach = np.inf if len(alive.parts) <= self.few else screen.reach
+        pairs = alive.boxes.pairs(new, reach, across=True)
+        found: list[_Pair] = []
+        for begin in range(0, len(pairs), PAIRS_AT_ONCE):
+            some = pairs[begin : begin + PAIRS_AT_ONCE]
+            vertices, _, filled = alive.sums(some)
+            if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
+                break
+            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
+            may = verdicts == Feasibility.MAYBE
+            found += _priced(some[may], (volumes - filled)[may])
+        return found
+
+    def unite(self, first: Part, second: Part) -> tuple[Part | None, float]:
+        """Test the joint hull more thoroughly, and clip the solid to it."""
+        hull = Hull.around(first.hull, second.hull)
+        price = work.testing(len(hull.vertices))
+        if self.criterion.screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
+            return None, price
+        union: Part | None = _clipped(first, second, hull, self.criterion, self.solid)
+        if union is not None and self.confirmed is not None:
+            union = self.confirmed(hull)
+        return union, price + price_of_uniting(first, second, is_clipped=True)
+
+
+def _priced(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
+    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
 
 
 class _Merging:
     """Parts that are being united."""
 
-    def __init__(self, parts: Sequence[Part], pairing: _Pairing, run: Run) -> None:
+    def __init__(self, parts: Sequence[Part], pairing: _Adjoining, run: Run) -> None:
         self._alive = NumberedParts(parts, pairing.criterion.screen)
         self._pairing = pairing
         self._run = run
         self._origin = list(range(len(parts)))  # the number of the first piece
-        self._refused: list[set[int]] = [set() for _ in parts]  # parts that a part can never be united with
         self._queue: list[_Pair] = []
         self._next: list[_Pair] = []  # the cheapest, in their order
-        self._begun: dict[_Pair, Begun[_Verdict]] = {}  # more than needed if an earlier one takes their parts away
+        self._begun: dict[_Pair, Begun[tuple[Part | None, float]]] = {}  # more than are needed
 
     def united(self, new: int) -> list[Part]:
         """Unite pairs of which at least one is among the first `new` parts or made from them."""
         run, alive = self._run, self._alive.parts
         count = len(alive)
         try:
-            self._find(range(new), self._alive.boxes)
+            self._find(range(new))
             while run.step(count - len(alive), None, len(alive)):
                 self._begin()
                 if not self._next:
                     break
                 pair = self._next.pop(0)
-                union, price, for_good = run.result(self._begun.pop(pair))
+                union, price = run.result(self._begun.pop(pair))
                 # Pay in the order of the pairs: how many are begun, which depends on the threads, must not matter.
                 if not run.work.pay(price):
                     break
                 if union is not None:
                     self._replace(pair, union)
-                elif for_good:
-                    self._refuse(pair.first, pair.second)
         except Stopped:  # raised between two unions
             run.note_stop()
         finally:
@@ -191,109 +221,14 @@ class _Merging:
         self._alive.remove(pair[1:])
         newest = self._alive.add(union)
         self._origin.append(min(self._origin[pair.first], self._origin[pair.second]))
-        never_with = (self._refused[pair.first] | self._refused[pair.second]) & self._alive.parts.keys()
-        self._refused.append(never_with)
-        for i in never_with:
-            self._refused[i].add(newest)
         for waiting in self._next:
             heapq.heappush(self._queue, waiting)
         self._next = []
-        self._find([newest], self._alive.boxes.without([*never_with]))
+        self._find([newest])
 
-    def _find(self, new: Sequence[int], boxes: Boxes) -> None:
-        found, never = self._pairing.pairs(self._alive, boxes, new)
-        for pair in found:
+    def _find(self, new: Sequence[int]) -> None:
+        for pair in self._pairing.pairs(self._alive, new):
             heapq.heappush(self._queue, pair)
-        for first, second in never:
-            self._refuse(first, second)
-
-    def _refuse(self, first: int, second: int) -> None:
-        self._refused[first].add(second)
-        self._refused[second].add(first)
-
-
-@dataclass(frozen=True)
-class _Adjoining:
-    """Pairs within the criterion's reach, judged by their glued union."""
-
-    criterion: Criterion
-    run: Run
-
-    def pairs(
-        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
-    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs that the volume bound allows."""
-        screen = self.criterion.screen
-        pairs = boxes.pairs(new, screen.reach)
-        vertices, volumes, filled = alive.sums(pairs)
-        if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
-            return [], []
-        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
-        kept = ~screen.excludes(volumes, hulls)
-        return _priced(pairs[kept], (hulls - filled)[kept]), []
-
-    def unite(self, first: Part, second: Part) -> _Verdict:
-        """Glue the two parts."""
-        union, price = Part.glued(first, second), price_of_gluing(first, second)
-        if union.size and self.criterion.is_met(union):  # without faces: it could not be clipped
-            return _Verdict(union, price)
-        return _Verdict(None, price, self.criterion.is_hereditary)
-
-
-@dataclass(frozen=True)
-class _Bridged:
-    """All pairs (see `FEW_TO_PAIR`), judged by the solid clipped to their joint hull."""
-
-    criterion: Criterion
-    run: Run
-    solid: Component
-    few: int = FEW_TO_PAIR
-
-    def pairs(
-        self, alive: NumberedParts, boxes: Boxes, new: Sequence[int]
-    ) -> tuple[list[_Pair], list[tuple[int, int]]]:
-        """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
-        screen, run = self.criterion.screen, self.run
-        reach = np.inf if len(boxes) <= self.few else screen.reach
-        pairs = boxes.pairs(new, reach, across=True)
-        found: list[_Pair] = []
-        never: list[tuple[int, int]] = []
-        for begin in range(0, len(pairs), PAIRS_AT_ONCE):
-            some = pairs[begin : begin + PAIRS_AT_ONCE]
-            vertices, _, filled = alive.sums(some)
-            if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
-                break
-            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
-            may = verdicts == Feasibility.MAYBE
-            found += _priced(some[may], (volumes - filled)[may])
-            never += map(tuple, some[verdicts == Feasibility.NEVER].tolist())
-        return found, never
-
-    def unite(self, first: Part, second: Part) -> _Verdict:
-        """Test the joint hull more thoroughly, and clip the solid to it."""
-        hull = Hull.around(first.hull, second.hull)
-        price = work.testing(len(hull.vertices))
-        if self.criterion.screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
-            return _Verdict(None, price)
-        return _Verdict(self._united(first, second, hull), price + price_of_clipping(first, second))
-
-    def _united(self, first: Part, second: Part, hull: Hull) -> Part | None:
-        return _clipped(first, second, hull, self.criterion, self.solid)
-
-
-def _priced(pairs: IntArray, costs: FloatArray) -> list[_Pair]:
-    return list(map(_Pair, costs.tolist(), *pairs.T.tolist()))
-
-
-@dataclass(frozen=True)
-class _Lifted(_Bridged):
-    """Pairs within reach, judged the same way on a proxy; unions are then confirmed on the solid it stands for."""
-
-    confirmed: Callable[[Hull], Part | None] = lambda hull: None
-
-    def _united(self, first: Part, second: Part, hull: Hull) -> Part | None:
-        rehearsed = super()._united(first, second, hull)
-        return None if rehearsed is None else self.confirmed(hull)
 
 
 @dataclass(frozen=True)
@@ -341,26 +276,20 @@ class Uniter:
         hull = Hull.around(first.hull, second.hull)
         screen = self.criterion.screen
         if is_alone(first) and is_alone(second):  # otherwise they may overlap
-            if not self.account.pay(price_of_gluing(first, second)):
+            if not self.account.pay(price_of_uniting(first, second)):
                 return None
             union = Part.glued(first, second, hull)
             if not screen.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
                 return union
-        if not screen.looks_inside or not self.account.pay(price_of_clipping(first, second)):
+        if not screen.looks_inside or not self.account.pay(price_of_uniting(first, second, is_clipped=True)):
             return None
         return _clipped(first, second, hull, self.criterion, self.solid)
 
 
-def price_of_gluing(first: Part, second: Part) -> float:
-    """The work of gluing two parts and judging the union."""
+def price_of_uniting(first: Part, second: Part, is_clipped: bool = False) -> float:
+    """The work of gluing two parts, or clipping the solid to their joint hull, and of judging the union."""
     faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
-    return work.gluing(faces) + work.judging(faces, hull_faces)
-
-
-def price_of_clipping(first: Part, second: Part) -> float:
-    """The work of clipping the solid to the joint hull of two parts, and judging the result."""
-    faces, hull_faces = first.size + second.size, len(first.hull.faces) + len(second.hull.faces)
-    return work.filling(faces, hull_faces) + work.judging(faces, hull_faces)
+    return (work.filling(faces, hull_faces) if is_clipped else work.gluing(faces)) + work.judging(faces, hull_faces)
 
 
 def is_alone(part: Part) -> bool:
@@ -455,7 +384,7 @@ def _pop_least(
             continue
         if pair.measured:
             return pair
-        if not account.pay(price_of_gluing(alive[pair.first], alive[pair.second])):
+        if not account.pay(price_of_uniting(alive[pair.first], alive[pair.second])):
             return None
         error = criterion.error(unite(alive[pair.first], alive[pair.second]))
         heapq.heappush(queue, _BoundedPair(max(error, pair.error), pair.first, pair.second, True))

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import compress
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Part
+from rlacd.solid.component import Part, is_film
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import SLIVER_RADIUS, Hull
 from rlacd.solid.topology import BoolArray
-
-FILM = HALF_THICKNESS / 5
-"""Mean thickness below which a part is a film left by rounding: real sheets are ten times thicker."""
 
 SLIVER_LOSS = 2 * HALF_THICKNESS
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
@@ -43,19 +39,17 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     thin = run.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
     place = {id(part): i for i, part in enumerate(parts)}
     slivers = [place[id(part)] for part, is_thin in zip(suspects, thin, strict=True) if is_thin]
-    boxes = np.array([part.box for part in parts]).reshape(-1, 2, 3)
-    concerned = np.zeros(len(parts), dtype=bool)
-    for own in slivers:
-        concerned |= _near(boxes, boxes[own])
-    union = hull_union([part.hull for part in compress(parts, concerned)], run.threads)
-    number = np.cumsum(concerned, dtype=np.int32) - 1
+    if not slivers:
+        return parts
+    boxes = np.array([part.box for part in parts])
+    union = hull_union([part.hull for part in parts], run.threads)
     kept = np.ones(len(parts), dtype=bool)
     stood_in: dict[int, BoolArray] = {}  # what there was in place of each that was dropped
 
     def is_missed(own: int) -> bool:
         others = stood_in[own] = kept & _near(boxes, boxes[own])
         some = np.flatnonzero(others)
-        return len(some) == 0 or _misses(union.only(number[some].tolist()), parts[own], run.threads)
+        return len(some) == 0 or _misses(union.only(some.tolist()), parts[own], run.threads)
 
     smallest_first = sorted(slivers, key=lambda i: parts[i].hull.volume)
     for own in smallest_first:
@@ -72,11 +66,6 @@ def _misses(union: _native.HullUnion, sliver: Part, threads: int) -> bool:
     if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > SLIVER_LOSS).any():
         return True
     return union.under(sliver.vertices, sliver.faces, SLIVER_LOSS / 4, threads)[1] > SLIVER_LOSS
-
-
-def is_film(part: Part) -> bool:
-    """Whether the part's mean thickness, twice its volume over its area, is below `FILM`."""
-    return 2 * part.volume < FILM * _native.mesh_area(part.vertices, part.faces)
 
 
 def is_sliver(hull: Hull, radius: float = SLIVER_RADIUS) -> bool:

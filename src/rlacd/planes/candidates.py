@@ -20,6 +20,9 @@ from rlacd.solid.component import Component, Plane
 OFFSETS_PER_AXIS = 25
 """25 planes along each of 6 axes make the paper's 150."""
 
+EDGES_PER_COMPONENT = 4
+"""Maximum number of concave edges whose planes are tried."""
+
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
@@ -63,7 +66,7 @@ def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -
     return Candidates(np.ascontiguousarray(directions[::per_axis]), offsets.reshape(-1, per_axis))
 
 
-def concave_edge_planes(component: Component, count: int = 4) -> Candidates:
+def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) -> Candidates:
     """Candidates of one component: three planes for each of `count` concave edges, without near-duplicates.
 
     Edges are deep, sharp ones of long creases first, and spread out. The first has the greatest depth x angle x length:

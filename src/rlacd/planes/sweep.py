@@ -15,9 +15,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rlacd import _native
-from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, all_planes, axis_and_principal
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS, Candidates, all_planes, axis_and_principal
 from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import SLIVER_RADIUS
 
 Made = TypeVar("Made")
@@ -86,7 +87,7 @@ class SweepCache:
         Number of concave edges whose planes are added.
     """
 
-    def __init__(self, per_axis: int = OFFSETS_PER_AXIS, concave_edges: int = 4) -> None:
+    def __init__(self, per_axis: int = OFFSETS_PER_AXIS, concave_edges: int = EDGES_PER_COMPONENT) -> None:
         self._per_axis = per_axis
         self._concave_edges = concave_edges
         self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
@@ -95,7 +96,7 @@ class SweepCache:
 
     def candidates(self, component: Component) -> Candidates:
         """Get the planes of a component."""
-        return self._once(self._candidates, component, self._found)
+        return self._once(self._candidates, component, lambda one: all_planes(one, self._per_axis, self._concave_edges))
 
     def of(self, component: Component, threads: int = 1) -> Sweep:
         """Get the sweep of a component."""
@@ -112,17 +113,9 @@ class SweepCache:
                 known[component] = made
         return made
 
-    def _found(self, component: Component) -> Candidates:
-        if self._concave_edges == 0:
-            return axis_and_principal(component, self._per_axis)
-        return all_planes(component, self._per_axis, self._concave_edges)
-
 
 SLIVERS = (SLIVER, SLIVER / 100)
 """Thresholds for slivers, strictest first: planes that leave slivers are used only if there is no other."""
-
-TIE = 1e-9
-"""Costs that differ by less than this share of the largest count as equal."""
 
 
 def least_excess(component: Component, candidates: Candidates, exponent: float, threads: int = 1) -> Plane | None:
@@ -146,7 +139,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
         candidates.directions,
         candidates.offsets,
         exponent,
-        TIE * (most if math.isinf(exponent) else most**exponent),
+        ROUNDING * (most if math.isinf(exponent) else most**exponent),
         LEAST_SIDE,
         SLIVERS,
         threads,

@@ -3,8 +3,9 @@
 from importlib.resources import as_file, files
 
 from rlacd.options.names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
+from rlacd.planes.candidates import EDGES_PER_COMPONENT
 from rlacd.planes.sweep import SweepCache
-from rlacd.policies.greedy import EDGES_PER_COMPONENT, SCORES, Greedy, NavACD, RandomShortlist
+from rlacd.policies.greedy import SCORES, Greedy, NavACD, RandomShortlist
 from rlacd.policies.learned import Learned
 from rlacd.policies.network import deployed
 from rlacd.policies.policy import CheckedPolicy, Policy

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.planes.candidates import Candidates, axis_and_principal, concave_edge_planes
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, axis_and_principal, concave_edge_planes
 from rlacd.planes.sweep import Sweep, SweepCache, least_excess, valid_planes
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
@@ -51,17 +51,15 @@ class Greedy:
         Provides the planes, to share them with other policies; `concave_edges` is then ignored.
     """
 
-    def __init__(self, score: str = "excess-norm", concave_edges: int = 4, sweeps: SweepCache | None = None) -> None:
+    def __init__(
+        self, score: str = "excess-norm", concave_edges: int = EDGES_PER_COMPONENT, sweeps: SweepCache | None = None
+    ) -> None:
         self._exponent = SCORES[score]
         self._sweep_cache = sweeps or SweepCache(concave_edges=concave_edges)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
         return least_excess(component, self._sweep_cache.candidates(component), self._exponent, threads)
-
-
-EDGES_PER_COMPONENT = 4
-"""Maximum number of concave edges whose planes are tried."""
 
 
 class NavACD:

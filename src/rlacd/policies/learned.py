@@ -12,11 +12,10 @@ from importlib.resources import as_file, files
 
 import numpy as np
 
-from rlacd.planes.sweep import SLIVERS, Sweep, SweepCache
+from rlacd.planes.sweep import SLIVERS, SweepCache
 from rlacd.policies.greedy import Greedy, excess_norm, hull_sum
 from rlacd.policies.network import Network, load_network
 from rlacd.policies.plane_features import FEATURES, plane_features
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
 KIND = "learned"
@@ -64,22 +63,17 @@ class Learned:
         if math.cbrt(excess) < SIMPLE * (self._scale or TYPICAL_LENGTH):
             return self._greedy.choose(component, threads)
         scored = self._sweeps.of(component, threads)
-        valid = next((v for sliver in SLIVERS if (v := scored.valid(sliver)).any()), None)
+        valid = next(filter(np.any, map(scored.valid, SLIVERS)), None)
         if valid is None:
             return None
         costs = [np.where(valid, score(scored), np.inf) for score in (hull_sum, excess_norm)]
         orders = [np.argsort(cost, kind="stable")[: min(PROMISING, int(valid.sum()))] for cost in costs]
         planes = np.array(list(dict.fromkeys(np.concatenate(orders).tolist())))  # that of least hull sum comes first
-        features = features_of(component, scored, self._scale)[planes].astype(np.float32)
-        predicted = np.mean([network(features)[:, 0] for network in self._networks], axis=0)
+        volumes = component.hull.volume, component.volume
+        features = plane_features(scored, valid, *volumes, np.ptp(component.box, axis=0), self._scale)[planes]
+        predicted = np.mean([network(features.astype(np.float32))[:, 0] for network in self._networks], axis=0)
         best = int(predicted.argmin())
         return scored.candidates.plane(int(planes[best if predicted[best] < predicted[0] - LEAST_GAIN else 0]))
-
-
-def features_of(component: Component, scored: Sweep, scale: float | None) -> FloatArray:
-    """Features [N, F] of all planes of a component's sweep."""
-    valid = next((v for sliver in SLIVERS if (v := scored.valid(sliver)).any()), scored.valid())
-    return plane_features(scored, valid, component.hull.volume, component.volume, np.ptp(component.box, axis=0), scale)
 
 
 @lru_cache(maxsize=1)

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from rlacd.errors import WeightsError
 from rlacd.io.read.open_file import read_file
+from rlacd.planes.candidates import EDGES_PER_COMPONENT
 from rlacd.planes.sweep import paper_planes, valid_planes
-from rlacd.policies.greedy import EDGES_PER_COMPONENT, least_hulls
+from rlacd.policies.greedy import least_hulls
 from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component, Plane

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.planes.sweep import Sweep, paper_planes, sweep, valid_planes
-from rlacd.policies.greedy import excess_norm
+from rlacd.policies.greedy import EXPONENT, excess_norm
 from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray
 from rlacd.solid.component import NEGLIGIBLE_VOLUME as TINY
 from rlacd.solid.component import Component
@@ -42,7 +42,7 @@ def plane_features(
     longest, excess = float(box.max()), max(hull - volume, TINY)
     below, above = np.maximum(s.hull_below - s.solid_below, 0), np.maximum(s.hull_above - s.solid_above, 0)
     small, large = np.minimum(below, above), np.maximum(below, above)
-    cost = excess_norm(s) / excess**1.3
+    cost = excess_norm(s) / excess**EXPONENT
     saved = (s.hull_below + s.hull_above - volume) / excess
     lowest = cost[valid].min() if valid.any() else 0.0
     area, round_ = s.section_area / longest**2, 4 * np.pi * s.section_area / np.maximum(s.section_perimeter, TINY) ** 2

@@ -40,7 +40,7 @@ STEP = 0.7
 are noisy, and tell nothing about points far from them."""
 
 COARSEST = 12
-"""No proxy, or piece of one, has fewer triangles, if it had more before."""
+"""No proxy, or piece of one, has fewer triangles, those of a box, if it had more before."""
 
 LOST_OF_SOLID, LOST_OF_PIECES = 0.02, 0.1
 """A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Pieces
@@ -143,12 +143,14 @@ def _smallest(
     best: _Copy | None = None
     copy = mesh
     while (count := math.floor((STEP if len(copy[1]) <= largest else WORTHWHILE) * len(copy[1]))) >= COARSEST:
-        copy = _reduced(copy, count, threads)
+        simplifier = _native.Simplifier(*copy)
+        simplifier.reduce(count, threads)
+        copy = simplifier.mesh()
         if len(copy[1]) <= largest:
             if not _is_alike(copy, volume, lost):
                 break
             distances = _native.Surface(*copy).distance(looked_at, 1)
-            if not _is_near(distances, threshold):
+            if np.quantile(distances, OFTEN) > NEAR * threshold or distances.max() > ANYWHERE * threshold:
                 break
             best = _Copy(copy, distances)
         if len(copy[1]) > count:  # hardly any edge can be collapsed any more
@@ -164,15 +166,5 @@ def _samples(mesh: Mesh, samples: int) -> IntArray:
     return np.concatenate([firsts, others]).astype(np.int32)
 
 
-def _reduced(mesh: Mesh, count: int, threads: int) -> Mesh:
-    simplifier = _native.Simplifier(*mesh)
-    simplifier.reduce(count, threads)
-    return simplifier.mesh()
-
-
 def _is_alike(copy: Mesh, volume: float, lost: float) -> bool:
     return bool(abs(_native.mesh_volume(*copy) - volume) <= lost * volume)
-
-
-def _is_near(distances: FloatArray, threshold: float) -> bool:
-    return bool(np.quantile(distances, OFTEN) <= NEAR * threshold and distances.max() <= ANYWHERE * threshold)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rlacd._native import components, points_within, poll_stop
 from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import BoolArray, Edges, IntArray, first_of_doubled, has_marked, marked, nondegenerate
+from rlacd.solid.topology import Edges, IntArray, first_of_doubled, nondegenerate
 
 MOST_FREE_EDGES = 500_000
 """A soup with more free edges is not a scan with holes: tracing loops is the one step that walks edge by edge."""
@@ -35,26 +35,14 @@ def close_cracks(
         poll_stop()
         if not 0 < len(free) <= MOST_FREE_EDGES:
             break
-        # Only faces with free vertices change. All faces at their corners are needed, for the valence of their edges.
-        changing = has_marked(marked(free, len(vertices)), faces)
-        inner = marked(faces[changing], len(vertices))
-        near = has_marked(inner, faces)
-        welded = weld_free_vertices(vertices, faces[near], free, tolerance)
-        split, parent, is_piece = split_at_free_vertices(vertices, welded, inner, tolerance)
+        welded = weld_free_vertices(vertices, faces, free, tolerance)
+        split, parent = split_at_free_vertices(vertices, welded, tolerance)
         poll_stop()
         keep = nondegenerate(split)
         keep[keep] = first_of_doubled(split[keep], len(vertices))
-        left = free_edges(split[keep], Edges.of(split[keep], len(vertices)), inner)
-        if len(left) < len(free) and (keep.any() or not near.all()):
-            whole = keep & ~is_piece
-            changed, at = faces.copy(), np.flatnonzero(near)
-            kept = np.logical_not(near)
-            changed[at[parent[whole]]] = split[whole]
-            kept[at[parent[whole]]] = True
-            pieces = keep & is_piece
-            faces = np.concatenate([changed[kept], split[pieces]])
-            origin = np.concatenate([origin[kept], origin[at[parent[pieces]]]])
-            free = left
+        left = free_edges(split[keep], Edges.of(split[keep], len(vertices)))
+        if len(left) < len(free) and keep.any():
+            faces, origin, free = split[keep], origin[parent[keep]], left
     return faces, origin
 
 
@@ -75,16 +63,13 @@ def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, to
     return target[faces]
 
 
-def split_at_free_vertices(
-    vertices: FloatArray, faces: IntArray, inner: BoolArray, tolerance: float
-) -> tuple[IntArray, IntArray, BoolArray]:
+def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) -> tuple[IntArray, IntArray]:
     """Insert free vertices into the free edges they lie on (T-junctions).
 
-    Returns the faces ``[G, 3]``, split ones replaced by several; ``[G]`` the old face each comes from; and ``[G]``
-    whether it is a piece of it. Edges without an end among the `inner` vertices ``[V]`` are not looked at.
+    Returns the faces ``[G, 3]``, split ones replaced by several, and ``[G]`` the old face each comes from.
     """
     edges = Edges.of(faces, len(vertices))
-    is_free = (edges.valence == 1) & inner[edges.vertices].any(axis=1)
+    is_free = edges.valence == 1
     halfedge = np.flatnonzero(is_free[edges.of_halfedge])
     # One edge per face and round, so that the pieces of a face do not depend on each other.
     _, first = np.unique(halfedge // 3, return_index=True)
@@ -92,7 +77,7 @@ def split_at_free_vertices(
     a, b, c = (faces[face, (corner + i) % 3] for i in range(3))
     edge, vertex = _on_edges(vertices, np.stack([a, b, c], axis=1), np.unique(edges.vertices[is_free]), tolerance)
     if len(edge) == 0:
-        return faces, np.arange(len(faces)), np.zeros(len(faces), dtype=bool)
+        return faces, np.arange(len(faces))
     split = np.unique(edge)
     # The corners along each split edge: a, the inserted vertices, b; every consecutive pair forms a face with c.
     chain_edge = np.concatenate([split, edge, split])
@@ -102,9 +87,8 @@ def split_at_free_vertices(
     pieces = np.stack([chain_vertex[pair], chain_vertex[pair + 1], c[chain_edge[pair]]], axis=1)
     whole = np.delete(np.arange(len(faces)), face[split])
     new = np.concatenate([faces[whole], pieces])
-    origin = np.concatenate([whole, face[chain_edge[pair]]])
     good = nondegenerate(new)
-    return new[good], origin[good], (np.arange(len(new)) >= len(whole))[good]
+    return new[good], np.concatenate([whole, face[chain_edge[pair]]])[good]
 
 
 def _on_edges(vertices: FloatArray, corners: IntArray, free: IntArray, tolerance: float) -> tuple[IntArray, IntArray]:
@@ -135,14 +119,7 @@ def _on_edges(vertices: FloatArray, corners: IntArray, free: IntArray, tolerance
     return edge[on], vertex[on]
 
 
-def free_edges(faces: IntArray, edges: Edges, inner: BoolArray | None = None) -> IntArray:
-    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them.
-
-    If `inner` vertices ``[V]`` are given, only edges with an end among them.
-    """
-    is_free = edges.valence == 1
-    if inner is not None:
-        is_free &= inner[edges.vertices].any(axis=1)
-    halfedge = np.flatnonzero(is_free[edges.of_halfedge])
-    face, corner = halfedge // 3, halfedge % 3
+def free_edges(faces: IntArray, edges: Edges) -> IntArray:
+    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them."""
+    face, corner = np.divmod(np.flatnonzero((edges.valence == 1)[edges.of_halfedge]), 3)
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)

@@ -1,16 +1,19 @@
-"""Where points lie relative to a triangle soup, and sample points on a soup for such queries."""
+"""Where points lie relative to a triangle soup, sample points for such queries, and where a soup is inside out."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
 
 from rlacd import _native
 from rlacd._native import Surface, poll_stop
+from rlacd.repair.soup import face_normals
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import DENSE
+from rlacd.solid.distance import PLACES
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
 
 # Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
@@ -88,15 +91,6 @@ def spread_points(vertices: FloatArray, faces: IntArray, spacing: float) -> tupl
     return points, face.astype(np.int64)
 
 
-def once_in_each_place(ask: Callable[[FloatArray], BoolArray], points: FloatArray) -> BoolArray:
-    """Return ``[N]`` what a function answers for points, many of which are in the same place: it is asked once."""
-    first = _native.first_in_place(points)
-    asked = np.flatnonzero(first == np.arange(len(points)))
-    answers = np.zeros(len(points), dtype=bool)
-    answers[asked] = ask(points[asked])
-    return answers[first]
-
-
 def affordable(spacing: float, area: float) -> float:
     """Widen a spacing of points on an area so that there are no more than about `MOST_POINTS`."""
     return max(spacing, math.sqrt(area / MOST_POINTS))
@@ -112,3 +106,36 @@ def shared_faces(
     is_other = ~first_of_doubled(np.concatenate([others, mine]), len(places))[len(others) :]
     is_mine = ~first_of_doubled(np.concatenate([mine, others]), len(places))[len(mine) :]
     return is_other, is_mine
+
+
+BESIDE = HALF_THICKNESS / 5
+"""Distance from a face at which the winding number is evaluated."""
+
+TANGLED = 0.02
+"""Share of a surface that is inside out from which it is a tangle. Of 600 meshes that people have made, all have up to
+0.012 but for one with 0.042, which became 1,408 hulls; tangles found by fuzzing have 0.027 and more. Dense bodies are
+none: noise turns some of their triangles over, and their proxies average that. Both sides of a cut are closed along
+rims; where a solid is inside out, rims cross each other, and caps add as many faces as the cut has removed, so that
+none of the pieces becomes convex."""
+
+
+def is_tangle(solid: SurfaceQuery) -> bool:
+    """Whether a closed surface is inside out in too many places."""
+    return bool(_inside_out(solid, PLACES)[1].mean() > TANGLED)
+
+
+def tangled_bodies(solid: SurfaceQuery, vertices: FloatArray, faces: IntArray, body: IntArray) -> IntArray:
+    """Return the bodies of which too much is inside out, given the faces that the solid was built from."""
+    points, is_wrong = _inside_out(solid, DENSE)  # enough to tell in which bodies
+    at = body[SurfaceQuery(vertices, faces, solid.threads).closest(points)[1]]
+    count = len(np.bincount(body))
+    is_tangled = np.bincount(at, is_wrong, count) > TANGLED * np.bincount(at, minlength=count)
+    return np.flatnonzero(is_tangled & (np.bincount(body) <= DENSE))
+
+
+def _inside_out(solid: SurfaceQuery, count: int) -> tuple[FloatArray, BoolArray]:
+    """Points ``[N, 3]`` spread evenly over a closed surface, and whether it is inside out there."""
+    points, on = _native.sample_surface(solid.vertices, solid.faces.astype(np.int32), count, 0)
+    step = BESIDE * face_normals(solid.vertices, solid.faces[on].astype(np.int64))
+    beside = (solid.winding(points + way * step, is_closed=True) for way in (1, -1))
+    return points, np.minimum(*beside) < 0

@@ -21,11 +21,10 @@ import numpy as np
 
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
-from rlacd.repair.distance import SurfaceQuery, affordable, spread_points
+from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_points
 from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
-from rlacd.repair.soup import FLAPS, Soup
-from rlacd.repair.windings import is_tangle, trust_windings
-from rlacd.repair.work import Work
+from rlacd.repair.soup import FLAPS, Soup, trust_windings
+from rlacd.repair.state import State
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.solid import Hole
@@ -102,10 +101,10 @@ class _Hole:
 class _Caps:
     """The holes of a soup, their caps, and points of these."""
 
-    def __init__(self, work: Work, rims: Rims) -> None:
-        soup, bodies = work.soup, work.record.bodies
-        self._work, self._soup, self._rims, self._bodies = work, soup, rims, bodies
-        self._gap, self._fill = work.wanted.gap, work.wanted.open_bodies == "solid"
+    def __init__(self, state: State, rims: Rims) -> None:
+        soup, bodies = state.soup, state.bodies
+        self._state, self._soup, self._rims, self._bodies = state, soup, rims, bodies
+        self._gap, self._fill = state.wanted.gap, state.wanted.open_bodies == "solid"
         self._faces, self._hole_of = caps_of(soup, rims)
         first_body = np.array([soup.body[beside[0]] for beside in rims.beside])
         lengths = [len(loop) for loop in rims.loops]
@@ -128,11 +127,11 @@ class _Caps:
         corners = self._soup.vertices[self._faces[self._on]]
         beyond = (np.linalg.norm(points[:, None] - corners, axis=2) > min(gap, HOLE)).all(axis=1)
         distance = np.zeros(len(points))
-        distance[beyond] = self._work.surface.distance(points[beyond])
+        distance[beyond] = self._state.surface.distance(points[beyond])
         is_reached = distance > gap
         # If cavities are kept, everything connected to them is open.
-        if is_reached.any() and not self._fill and not self._work.wanted.keep_cavities:
-            is_reached[is_reached] = self._work.reach.covers(points[is_reached])
+        if is_reached.any() and not self._fill and not self._state.wanted.keep_cavities:
+            is_reached[is_reached] = self._state.reach.covers(points[is_reached])
         return distance, is_reached
 
     @cached_property
@@ -159,7 +158,9 @@ class _Caps:
         ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
         columns = (own, self._cap_area / body_area, of_all / body_area, depth, reached, smooth, ring, is_tube)
         holes = [_Hole(*row) for row in zip(loops, *(column.tolist() for column in columns), strict=True)]
-        _find_ends(holes)
+        count = Counter(hole.body for hole in holes)
+        for hole in holes:
+            hole.is_end = hole.is_tube and count[hole.body] == 1  # a pipe has two
         _find_wounds(holes)
         for hole in holes:
             hole.is_wound &= hole.depth <= self._gap or not self._is_plugged(hole)
@@ -227,35 +228,28 @@ class _Caps:
         return [one.described(bool(chosen[one.body]), self._soup.vertices) for one in self.holes if said[one.body]]
 
 
-def may_have_holes(work: Work) -> bool:
-    """Whether bodies that are still to be built have free edges, and may be closed."""
-    free = int((work.soup.edges.valence == 1).sum())
-    return not work.parts and 0 < free <= MOST_FREE_EDGES and work.wanted.open_bodies != "thin"
+def may_have_holes(state: State) -> bool:
+    """Whether bodies have free edges, and may be closed."""
+    free = int((state.soup.edges.valence == 1).sum())
+    return 0 < free <= MOST_FREE_EDGES and state.wanted.open_bodies != "thin"
 
 
-def close_holes(work: Work) -> None:
+def close_holes(state: State) -> None:
     """Cap the bodies all of whose holes may be closed."""
-    rims = rims_of(work.soup)
+    rims = rims_of(state.soup)
     if not rims.loops:
         return
-    caps = _Caps(work, rims)
+    caps = _Caps(state, rims)
     chosen = caps.may_be_closed()
     closed, flap = caps.added(chosen)
     useful = caps.useful(chosen, closed, flap)
     if (useful != chosen).any():
         closed, _ = caps.added(useful)
-    work.record.note(caps.bodies_of(useful), "capped")
-    work.by_room |= useful & caps.by_room()
-    work.holes = caps.described(useful)
+    state.note(caps.bodies_of(useful), "capped")
+    state.by_room |= useful & caps.by_room()
+    state.holes = caps.described(useful)
     if useful.any():
-        work.soup = closed
-
-
-def _find_ends(holes: list[_Hole]) -> None:
-    """Mark the ends of bars: the only hole of a body; a pipe has two."""
-    count = Counter(hole.body for hole in holes)
-    for hole in holes:
-        hole.is_end = hole.is_tube and count[hole.body] == 1
+        state.soup = closed
 
 
 def _find_wounds(holes: list[_Hole]) -> None:

@@ -18,15 +18,14 @@ from rlacd import _native
 from rlacd._native import face_areas, poll_stop, signed_tetrahedra
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
-from rlacd.repair.distance import SurfaceQuery, probes
+from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes, may_have_holes
-from rlacd.repair.soup import MOST_PATCHES, Soup
+from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
+from rlacd.repair.state import STEPS as NAMES
+from rlacd.repair.state import Piece, State, Wanted, measure, query_of
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.repair.walls import are_unbuilt, build_slabs, build_walls, has_sheets, skins
-from rlacd.repair.windings import are_crowded, are_oriented, is_tangle, sort_out, take_as_they_are
-from rlacd.repair.work import STEPS as NAMES
-from rlacd.repair.work import Piece, Wanted, Work, measure, query_of
+from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.wraps import (
     fill_rooms,
     fill_slits,
@@ -49,55 +48,64 @@ CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
 
 
-def _always(work: Work) -> bool:
+def _always(state: State) -> bool:
     return True
 
 
-def _unite(work: Work) -> None:
+def _are_crowded(state: State) -> bool:
+    """Whether more than two faces meet in an edge."""
+    return bool((state.soup.edges.valence > 2).any())
+
+
+def _sort_out(state: State) -> None:
+    """Find the sides of crowded bodies by windings where angles fail."""
+    state.soup = trust_windings(state.soup, state.bodies)
+
+
+def _unite(state: State) -> None:
     """Unite all parts and fill their cavities."""
-    shapes = [part.shape for part in work.parts]
-    if not work.wanted.keep_cavities:
-        work.solid = unite(shapes)
+    shapes = [part.shape for part in state.parts]
+    if not state.wanted.keep_cavities:
+        state.solid = unite(shapes)
         return
-    soup = work.soup
-    inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), work.record.bodies) < 0
-    work.solid = unite_around_cavities(shapes, [bool(inward[part.body]) for part in work.parts])
+    soup = state.soup
+    inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), state.bodies) < 0
+    state.solid = unite_around_cavities(shapes, [bool(inward[part.body]) for part in state.parts])
 
 
-def _is_nothing(work: Work) -> bool:
-    return work.volume == 0
+def _is_nothing(state: State) -> bool:
+    return state.volume == 0
 
 
-def _take_hull(work: Work) -> None:
+def _take_hull(state: State) -> None:
     """Take the convex hull of all points."""
-    work.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
-    work.record.step[:] = NAMES.index("hull")
-    work.solid = hull_of_points(work.surface.vertices)
-    work.parts = [Piece(work.solid, 0)]
+    state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
+    state.step[:] = NAMES.index("hull")
+    state.solid = hull_of_points(state.surface.vertices)
+    state.parts = [Piece(state.solid, 0)]
 
 
-def _keep_lost(work: Work) -> None:
+def _keep_lost(state: State) -> None:
     """Add slabs of the faces that the solid leaves outside: a skin that crosses itself, or a wrap, loses some."""
-    faces = measure(work.record, work.surface, work.query())
-    body = work.record.body_of_input[faces]
-    soup = Soup(work.surface.vertices, work.surface.faces[faces], body).in_patches()
+    faces = measure(state)
+    body = state.body_of_input[faces]
+    soup = Soup(state.surface.vertices, state.surface.faces[faces], body).in_patches()
     if not 0 < bodies_of(soup.faces, soup.edges)[0] <= MOST_PATCHES:  # a plant's leaves would take too many cuts
         return
     slabs = skins(soup)
     try:
-        shapes = [work.solid, *(slab.shape for slab in slabs)]
-        work.solid = unite(shapes, keep_cavities=work.wanted.keep_cavities)
+        shapes = [state.solid, *(slab.shape for slab in slabs)]
+        state.solid = unite(shapes, keep_cavities=state.wanted.keep_cavities)
     except CrossingsError:  # they stay lost
         return
-    work.parts += slabs
-    work.record.lost[body] = HALF_THICKNESS
+    state.parts += slabs
+    state.lost[body] = HALF_THICKNESS
 
 
-STEPS: tuple[tuple[Callable[[Work], bool], Callable[[Work], None]], ...] = (
-    (are_oriented, take_as_they_are),
-    (are_crowded, sort_out),
+STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
+    (_are_crowded, _sort_out),
     (may_have_holes, close_holes),
-    (are_unbuilt, build_walls),
+    (_always, build_walls),
     (is_crowd, wrap_sheets),
     (has_sheets, build_slabs),
     (_always, _unite),
@@ -107,7 +115,7 @@ STEPS: tuple[tuple[Callable[[Work], bool], Callable[[Work], None]], ...] = (
 )
 """What is done, in this order, and when."""
 
-AT_LAST: tuple[tuple[Callable[[Work], bool], Callable[[Work], None]], ...] = (
+AT_LAST: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (_is_nothing, _take_hull),
     (_always, _keep_lost),
 )
@@ -181,22 +189,22 @@ def repair(
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), (*mesh.warnings, said))
     cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
-    work = Work(SurfaceQuery(vertices, faces, threads), frame, Wanted(open_bodies, gap, cells, keep_cavities))
-    _take_steps(work)
-    return work.result(mesh.warnings)
+    state = State(SurfaceQuery(vertices, faces, threads), frame, Wanted(open_bodies, gap, cells, keep_cavities))
+    _take_steps(state)
+    return state.result(mesh.warnings)
 
 
-def _take_steps(work: Work) -> None:
+def _take_steps(state: State) -> None:
     try:
         for is_needed, step in STEPS:
             poll_stop()
-            if is_needed(work):
-                step(work)
+            if is_needed(state):
+                step(state)
     except CrossingsError:
-        wrap_all(work)
+        wrap_all(state)
     for is_needed, step in AT_LAST:
-        if is_needed(work):
-            step(work)
+        if is_needed(state):
+            step(state)
 
 
 def _is_inside(vertices: FloatArray, faces: IntArray, film: BoolArray, threads: int | None) -> BoolArray:

@@ -22,7 +22,7 @@ import numpy as np
 from rlacd._native import components, least_bent, long_normals, poll_stop
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
 from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import BoolArray, IntArray, both_sides, has_marked, marked, nondegenerate
+from rlacd.solid.topology import BoolArray, IntArray, marked, nondegenerate
 
 _NEXT = np.array([1, 2, 0])
 
@@ -95,15 +95,12 @@ def _continued(
 
     Halfedges of faces that are wound the other way are to be swapped; normals ``[F, 3]`` are as long as areas.
     """
-    tail, head = soup.faces.ravel()[rim], soup.faces[rim // 3, _NEXT[rim % 3]]
-    on_rim = marked(np.concatenate([tail, head]), len(soup.vertices))
-    beside_rim = np.flatnonzero(has_marked(on_rim, soup.faces))  # only these faces count at vertices of the rim
-    corner, count = soup.faces[beside_rim].ravel(), len(soup.vertices)
-    sums = [np.bincount(corner, np.repeat(weighted[beside_rim, k], 3), count) for k in range(3)]
+    corners, following = soup.faces.ravel(), rim - rim % 3 + _NEXT[rim % 3]
+    tail, head = corners[rim], corners[following]
+    sums = [np.bincount(corners, np.repeat(weighted[:, k], 3), len(soup.vertices)) for k in range(3)]
     normal_of_vertex: FloatArray = np.stack(sums, axis=1)
-    fan = _fans(soup.faces, mate, beside_rim)
-    place = np.searchsorted(beside_rim, rim // 3)
-    tail_fan, head_fan = fan[place, rim % 3], fan[place, _NEXT[rim % 3]]
+    fan = _fans(soup.faces, mate)
+    tail_fan, head_fan = fan[rim], fan[following]
     tail, head = np.where(swap, head, tail), np.where(swap, tail, head)
     tail_fan, head_fan = np.where(swap, head_fan, tail_fan), np.where(swap, tail_fan, head_fan)
     return tail, _followers(soup.vertices, normal_of_vertex, tail, head, tail_fan, head_fan)
@@ -115,32 +112,21 @@ def _sides(soup: Soup, mate: IntArray) -> IntArray:
     forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
     # Mates wound alike run along their edge in opposite directions; then fronts continue fronts.
     turned = forward[mated] == forward[mate[mated]]
-    if not turned.any():  # fronts join fronts, and backs backs
-        _, patch = components(len(soup.faces), mated // 3, mate[mated] // 3)
-        return both_sides(patch)
     front, other = 2 * (mated // 3), 2 * (mate[mated] // 3)
     return components(
         2 * len(soup.faces), np.concatenate([front, front + 1]), np.concatenate([other + turned, other + 1 - turned])
     )[1]
 
 
-def _fans(faces: IntArray, mate: IntArray, some: IntArray) -> IntArray:
-    """Return ``[S, 3]`` the fan of each corner of some faces: the corners around a vertex that their mates connect.
-
-    The faces ``[S]`` ascend.
-    """
-    slot = np.full(len(faces), -1, dtype=np.int64)
-    slot[some] = 3 * np.arange(len(some))
-    here = (3 * some[:, None] + np.arange(3)).ravel()
-    here = here[(mate[here] >= 0) & (slot[mate[here] // 3] >= 0)]
+def _fans(faces: IntArray, mate: IntArray) -> IntArray:
+    """Return ``[3F]`` the fan of each corner: the corners around a vertex that the mates of faces connect."""
+    here = np.flatnonzero(mate >= 0)
     there = mate[here]
     here_next, there_next = (h - h % 3 + _NEXT[h % 3] for h in (here, there))
-    flat = faces.ravel()
-    same = flat[here] == flat[there]  # mates wound differently begin at the same vertex
+    corners = faces.ravel()
+    same = corners[here] == corners[there]  # mates wound differently begin at the same vertex
     begins, ends = np.where(same, there, there_next), np.where(same, there_next, there)
-    here, here_next, begins, ends = (slot[h // 3] + h % 3 for h in (here, here_next, begins, ends))
-    links = np.concatenate([here, here_next]), np.concatenate([begins, ends])
-    return components(3 * len(some), *links)[1].reshape(-1, 3)
+    return components(3 * len(faces), np.concatenate([here, here_next]), np.concatenate([begins, ends]))[1]
 
 
 def _mates(soup: Soup) -> IntArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from rlacd._native import components, face_areas, long_normals, poll_stop
 from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.hull import TOLERANCE
-from rlacd.solid.topology import NO_FILM, BoolArray, Edges, IntArray, Sides, has_marked, sides_of
+from rlacd.solid.topology import NO_FILM, BoolArray, Edges, IntArray, Sides, has_marked, is_balanced, marked, sides_of
 
 FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
@@ -105,6 +105,37 @@ class Soup:
             return self
         trusted = None if self.trusted is None else self.trusted[keep]
         return Soup(self.vertices, self.faces[keep], self.body[keep], trusted)
+
+
+def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> Soup:
+    """Trust the windings of closed bodies if the angles between their faces join the inside with the outside.
+
+    Where corners were rounded, slivers fold over, and noise turns faces that nearly lie in one plane: then angles
+    around an edge with four faces are wrong.
+
+    Parameters
+    ----------
+    soup
+    bodies
+        Number of bodies.
+    flap
+        Faces ``[F]`` that need no inside.
+    """
+    is_crowded = soup.edges.valence > 2
+    if not is_crowded.any():
+        return soup
+    crowded = marked(soup.body[soup.at_valence(is_crowded)], bodies)
+    uneven = marked(soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))], bodies)
+    if not (crowded & ~uneven).any():
+        return soup
+    share = soup.sheet_share(bodies, flap)
+    doubted = crowded & ~uneven & (share > FLAPS)
+    if not doubted.any():
+        return soup
+    before = False if soup.trusted is None else soup.trusted
+    trusting = replace(soup, known_edges=soup.edges, trusted=before | doubted[soup.body])
+    better = doubted & (trusting.sheet_share(bodies, flap) < share / 2)
+    return replace(soup, known_edges=soup.edges, trusted=before | better[soup.body]) if better.any() else soup
 
 
 def _layers(corners: FloatArray, patch: IntArray) -> float:

@@ -67,11 +67,12 @@ class Reach:
 
     def covers(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
-        cell = np.rint((points - self.origin) / self.pitch).astype(np.int64)
-        inside = ((cell >= 0) & (cell < self.reached.shape)).all(axis=1)
-        result = np.ones(len(points), dtype=bool)
-        result[inside] = self.reached[tuple(cell[inside].T)]
-        return result
+        return np.asarray(self.reached[tuple(self._cells(points).T)])
+
+    def _cells(self, points: FloatArray) -> IntArray:
+        """The cells ``[N, 3]`` of points, nearest ones for those off the grid."""
+        cells = np.rint((points - self.origin) / self.pitch).astype(np.int64)
+        return np.clip(cells, 0, np.array(self.room.shape) - 1)
 
     def rooms_outside(self, rooms: IntArray, solid: SurfaceQuery) -> IntArray:
         """Return the cells ``[N]`` of some rooms that lie outside a solid: of every fourth one along each axis."""
@@ -87,14 +88,12 @@ class Reach:
 
     def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
         """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
-        cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
         reached = self.reached.astype(self.room.dtype)
-        return np.asarray(nearest_labels(reached, cell, depth / self.pitch + ROUNDING) == 0)
+        return np.asarray(nearest_labels(reached, self._cells(points), depth / self.pitch + ROUNDING) == 0)
 
     def rooms_near(self, points: FloatArray) -> IntArray:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
-        cell = np.clip(np.rint((points - self.origin) / self.pitch).astype(np.int64), 0, np.array(self.room.shape) - 1)
-        return nearest_labels(self.room, cell, self.radius / self.pitch + 2 + ROUNDING)
+        return nearest_labels(self.room, self._cells(points), self.radius / self.pitch + 2 + ROUNDING)
 
     def around_cells(self, cells: IntArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
@@ -106,7 +105,7 @@ class Reach:
     def around_points(self, points: FloatArray) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells at and between some points."""
         mark = np.zeros(self.reached.shape, dtype=bool)
-        mark[tuple(np.rint((points - self.origin) / self.pitch).astype(np.int64).T)] = True
+        mark[tuple(self._cells(points).T)] = True
         return _grown(mark, self.radius / self.pitch) & ~self.reached
 
     def wrap(

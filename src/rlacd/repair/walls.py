@@ -10,37 +10,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rlacd._native import components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
-from rlacd.repair.union import one_body, slab_of_faces, split_labels, to_arrays, volume_of
+from rlacd.repair.state import Piece, State
+from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.repair.work import Piece, Record, Work
 from rlacd.solid.arrays import FloatArray, angles, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from rlacd.solid.topology import BoolArray, IntArray, Sides, marked, nondegenerate
+from rlacd.solid.topology import BoolArray, IntArray, marked, nondegenerate
 
 
-def are_unbuilt(work: Work) -> bool:
-    """Whether any faces are still to be built."""
-    return not work.parts and len(work.soup.faces) > 0
-
-
-def build_walls(work: Work) -> None:
+def build_walls(state: State) -> None:
     """Build what bounds something solid; the rest are sheets."""
-    walls, sheets = walls_and_sheets(work.soup, work.record, ())
-    work.parts = skins(walls)
+    walls, sheets = walls_and_sheets(state, ())
+    state.parts = skins(walls)
     # Where faces of one body cross each other, they may be joined into a wrong skin: then all of them are sheets.
-    is_skin = work.record.has("outer skin")
-    wrong = [part.body for part in work.parts if is_skin[part.body] and _leads_away(part.shape, work.surface)]
+    is_skin = state.has("outer skin")
+    wrong = [part.body for part in state.parts if is_skin[part.body] and _leads_away(part.shape, state.surface)]
     if wrong:
-        walls, sheets = walls_and_sheets(work.soup, work.record, wrong)
-        work.parts = skins(walls)
-    work.sheets = sheets.in_patches()
+        walls, sheets = walls_and_sheets(state, wrong)
+        state.parts = skins(walls)
+    state.sheets = sheets.in_patches()
 
 
 def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
@@ -50,19 +44,19 @@ def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
     return bool((surface.distance(points) > DEFAULT_GAP).any())
 
 
-def has_sheets(work: Work) -> bool:
+def has_sheets(state: State) -> bool:
     """Whether sheets are still to be built."""
-    return len(work.sheets.faces) > 0
+    return len(state.sheets.faces) > 0
 
 
-def build_slabs(work: Work) -> None:
+def build_slabs(state: State) -> None:
     """Give sheets thickness."""
-    work.parts += [part._replace(is_slab=True) for part in skins(work.sheets)]
+    state.parts += [part._replace(is_slab=True) for part in skins(state.sheets)]
 
 
-def walls_and_sheets(soup: Soup, record: Record, as_sheets: Sequence[int]) -> tuple[Soup, Soup]:
+def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup]:
     """The faces that bound something solid, and those that become slabs."""
-    sides = soup.sides
+    soup, sides = state.soup, state.soup.sides
     front, back = sides.label[0::2], sides.label[1::2]
     none = FLAT * sides.area
     sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
@@ -75,12 +69,12 @@ def walls_and_sheets(soup: Soup, record: Record, as_sheets: Sequence[int]) -> tu
     sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
     wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
 
-    record.note(soup.body[solid[back] & wall], "reoriented")
-    record.note(soup.body[~wall & ~sheet], "outer skin")
-    record.note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
-    record.note(soup.body[sheet], "slab")
+    state.note(soup.body[solid[back] & wall], "reoriented")
+    state.note(soup.body[~wall & ~sheet], "outer skin")
+    state.note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
+    state.note(soup.body[sheet], "slab")
     poll_stop()
-    mixed = np.bincount(soup.body[sheet], minlength=record.bodies) > 0
+    mixed = np.bincount(soup.body[sheet], minlength=state.bodies) > 0
     return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
 
 
@@ -97,10 +91,6 @@ def skins(soup: Soup) -> list[Piece]:
     # The two side components of a flat closed body mirror each other: build the fronts.
     flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
     keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
-    if keep.sum() == 1 and not has_sheet.any() and (soup.edges.valence == 2).all():
-        taken = one_body(*_wound_like(soup, keep))
-        if taken is not None and not taken[1]:
-            return [Piece(taken[0], int(soup.body[0]))]
     vertices, faces, label = _untwisted(soup, keep, flat)
     shapes = split_labels(vertices, faces, label)
     return [
@@ -141,54 +131,21 @@ def _solid(soup: Soup, mesh: tuple[FloatArray, IntArray], side: int, is_thin: bo
     return solid
 
 
-def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
-    """Build side components, sheets and flat ones with thickness."""
-    front = soup.sides.label[0::2]
-    thin = keep[front] & (soup.sides.sheet | flat[front])
-    return skin(soup.vertices, soup.faces, soup.sides, keep, thin, HALF_THICKNESS)
-
-
-def _wound_like(soup: Soup, keep: BoolArray) -> tuple[FloatArray, NDArray[np.int32]]:
-    """The faces of a closed soup, each showing the side that is kept; vertices in the order in which faces use them."""
-    corners = soup.faces.ravel()
-    first = np.full(len(soup.vertices), len(corners))
-    first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)
-    used = np.argsort(first, kind="stable")[: int((first < len(corners)).sum())]
-    number = np.empty(len(soup.vertices), dtype=np.int32)
-    number[used] = np.arange(len(used))
-    faces = number[soup.faces]
-    back = keep[soup.sides.label[1::2]]
-    faces[back] = faces[back, ::-1]
-    return soup.vertices[used], faces
-
-
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
 _LONGEST_MITER = 2.0
 
 
-def skin(
-    vertices: FloatArray, faces: IntArray, sides: Sides, keep: BoolArray, thin: BoolArray, half_thickness: float
-) -> tuple[FloatArray, IntArray, IntArray]:
-    """Build the surfaces of chosen side components.
-
-    Parameters
-    ----------
-    vertices, faces
-        The soup, ``[V, 3]`` and ``[F, 3]``.
-    sides
-        Its sides.
-    keep
-        ``[C]``, the side components to build.
-    thin
-        ``[F]``, the faces without an inside; their sides are moved outward.
-    half_thickness
-        Distance, in the unit of the vertices.
+def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+    """Build the surfaces of chosen side components ``[C]``; sheets and flat ones get thickness: sides move outward.
 
     Returns
     -------
     tuple
         New vertices ``[N, 3]``, faces ``[M, 3]`` and the side component ``[M]`` of each new face.
     """
+    vertices, faces, sides = soup.vertices, soup.faces, soup.sides
+    front = sides.label[0::2]
+    thin = keep[front] & (sides.sheet | flat[front])
     kept = np.flatnonzero(keep[sides.label])  # sides
     used = keep[sides.label[sides.facing[:, 0]]]
     wedges, facing = sides.wedges[used], sides.facing[used]
@@ -210,7 +167,7 @@ def skin(
     positions = vertices[base]
     poll_stop()
     if thin.any():
-        positions += half_thickness * _fan_offsets(vertices, faces[face], back, thin[face], fan, number)
+        positions += HALF_THICKNESS * _fan_offsets(vertices, faces[face], back, thin[face], fan, number)
     triangles = fan.reshape(-1, 3).copy()
     triangles[back] = triangles[back][:, ::-1]
     if not is_rim.any():

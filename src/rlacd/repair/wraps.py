@@ -6,22 +6,17 @@ import numpy as np
 from manifold3d import Manifold
 
 from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery, once_in_each_place, points_covering, spread_points
-from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
-from rlacd.repair.union import (
-    area_of,
-    as_manifold,
-    size_of,
-    slab_of_faces,
-    tunnels_in,
-    unite,
-    volume_of,
+from rlacd.repair.distance import (
+    SurfaceQuery,
+    is_tangle,
+    points_covering,
+    spread_points,
+    tangled_bodies,
 )
+from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
+from rlacd.repair.state import Piece, State
+from rlacd.repair.union import area_of, as_manifold, size_of, slab_of_faces, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
-from rlacd.repair.walls import skins
-from rlacd.repair.windings import is_tangle, tangled_bodies
-from rlacd.repair.work import Piece, Work, query_of
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
@@ -45,196 +40,165 @@ _TRIANGLES = 0.05
 _CROWD, _CROSSINGS = 300, 1000
 
 
-def is_crowd(work: Work) -> bool:
+def is_crowd(state: State) -> bool:
     """Whether there are too many sheets, such as leaves or feathers, to be united one by one."""
-    if len(work.sheets.faces) == 0:
+    if len(state.sheets.faces) == 0:
         return False
-    patch = work.sheets.sides.label[0::2]
-    return bool(work.record.has("slab").sum() > _CROWD) or _crossings(work.sheets, patch) > _CROSSINGS
+    patch = state.sheets.sides.label[0::2]
+    return bool(state.has("slab").sum() > _CROWD) or _crossings(state.sheets, patch) > _CROSSINGS
 
 
-def wrap_sheets(work: Work) -> None:
+def wrap_sheets(state: State) -> None:
     """Wrap all bodies with sheets as one."""
-    is_slab = work.record.has("slab")
-    soup = work.of_bodies(is_slab)
-    points, _ = points_covering(soup.vertices, soup.faces, work.reach.pitch / 2)
-    wrap = _wrap(work, work.reach.around_points(points), HALF_THICKNESS / 2)
+    is_slab = state.has("slab")
+    soup = state.of_bodies(is_slab)
+    points, _ = points_covering(soup.vertices, soup.faces, state.reach.pitch / 2)
+    wrap = _wrap(state, state.reach.around_points(points), HALF_THICKNESS / 2)
     if wrap.volume() <= 0:
         return
-    work.record.note(soup.body, "wrapped")
-    work.parts = [part for part in work.parts if not is_slab[part.body]]
-    work.parts.append(Piece(wrap, int(soup.body.min())))
-    work.sheets = no_faces(soup.vertices)
+    state.note(soup.body, "wrapped")
+    state.parts = [part for part in state.parts if not is_slab[part.body]]
+    state.parts.append(Piece(wrap, int(soup.body.min())))
+    state.sheets = no_faces(soup.vertices)
 
 
-def wrap_all(work: Work) -> None:
+def wrap_all(state: State) -> None:
     """Take what the ball cannot reach from outside all bodies to be solid."""
-    gap = work.wanted.gap
-    work.solid = _wrapped(work, work.soup)
-    work.record.note(work.soup.body, "wrapped")
-    work.parts = [Piece(work.solid, 0)]
-    work.warnings.append(
+    gap = state.wanted.gap
+    state.solid = _wrapped(state, state.soup)
+    state.note(state.soup.body, "wrapped")
+    state.parts = [Piece(state.solid, 0)]
+    state.warnings.append(
         "The surface crosses itself too often to be united exactly, so the solid is what a ball of radius "
         f"{gap:g} (longest side = 2) cannot reach from outside."
     )
 
 
-def is_inside_out(work: Work) -> bool:
+def is_inside_out(state: State) -> bool:
     """Whether some bodies cross too much of their own surface to be cut."""
-    return work.volume != 0 and np.bincount(work.soup.body).min() <= DENSE and is_tangle(work.query())
+    return state.volume != 0 and np.bincount(state.soup.body).min() <= DENSE and is_tangle(state.query())
 
 
-def rebuild_tangles(work: Work) -> None:
+def rebuild_tangles(state: State) -> None:
     """Build bodies that cross themselves from the place of their faces alone, whatever their windings.
 
     A few faces become a slab each. Where they are many, what the ball cannot reach from outside the body is solid.
     """
-    soup = work.soup
-    tangled = tangled_bodies(work.query(), soup.vertices, soup.faces, soup.body)
-    tangled = tangled[~work.record.has("slab")[tangled]].tolist()  # slabs are thin enough to be cut
+    soup = state.soup
+    tangled = tangled_bodies(state.query(), soup.vertices, soup.faces, soup.body)
+    tangled = tangled[~state.has("slab")[tangled]].tolist()  # slabs are thin enough to be cut
     if not tangled:
         return
-    work.is_tangled[tangled] = True
-    work.parts = [part for part in work.parts if not work.is_tangled[part.body]]
+    state.is_tangled[tangled] = True
+    state.parts = [part for part in state.parts if not state.is_tangled[part.body]]
     for body in tangled:
         poll_stop()
         own = soup.only(soup.body == body)
         count = len(own.faces)
         is_few = count <= _CROWD and _crossings(own, np.arange(count)) <= _CROSSINGS
-        solid = slab_of_faces(own.vertices, own.faces) if is_few else _wrapped(work, own)
-        work.record.note(own.body, "slab" if is_few else "wrapped")
-        work.parts.append(Piece(solid, body))
-    work.sheets = work.sheets.only(~work.is_tangled[work.sheets.body])
-    work.solid = unite([part.shape for part in work.parts], keep_cavities=work.wanted.keep_cavities)
+        solid = slab_of_faces(own.vertices, own.faces) if is_few else _wrapped(state, own)
+        state.note(own.body, "slab" if is_few else "wrapped")
+        state.parts.append(Piece(solid, body))
+    state.solid = unite([part.shape for part in state.parts], keep_cavities=state.wanted.keep_cavities)
     bodies = "1 body crosses" if len(tangled) == 1 else f"{len(tangled)} bodies cross"
-    work.warnings.append(
+    state.warnings.append(
         f"{bodies} too much of their own surface to be cut, so whatever the faces enclose is taken to be solid."
     )
 
 
-def may_have_rooms(work: Work) -> bool:
+def may_have_rooms(state: State) -> bool:
     """Whether faces that do not touch each other may enclose rooms that the ball cannot enter."""
-    return _may_fill(work) and any(_is_large(work, walls) for walls in _walls(work))
+    return _may_fill(state) and any(_is_large(state, walls) for walls in _walls(state))
 
 
-def _walls(work: Work) -> tuple[Soup, Soup]:
+def _walls(state: State) -> tuple[Soup, Soup]:
     """What may be walls of rooms: sheets and caps that nothing can reach; outer skins."""
-    sheets = (work.record.has("slab") | work.by_room) & ~work.is_tangled
-    return work.of_bodies(sheets), work.of_bodies(work.record.has("outer skin") & ~work.is_tangled)
+    sheets = (state.has("slab") | state.by_room) & ~state.is_tangled
+    return state.of_bodies(sheets), state.of_bodies(state.has("outer skin") & ~state.is_tangled)
 
 
-def fill_rooms(work: Work) -> None:
+def fill_rooms(state: State) -> None:
     """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins."""
-    reach, record = work.reach, work.record
-    in_sheets, in_shells = (_rooms_near(work, walls) for walls in _walls(work))
-    in_shells = in_shells[reach.volumes(in_shells) >= _SLIT_VOLUME * work.volume]
-    cells = reach.rooms_outside(np.union1d(in_sheets, in_shells), work.query())
+    reach = state.reach
+    (in_sheets, body), (in_shells, _) = (_rooms_near(state, walls) for walls in _walls(state))
+    large = np.unique(in_shells)
+    large = large[reach.volumes(large) >= _SLIT_VOLUME * state.volume]
+    cells = reach.rooms_outside(np.setdiff1d(np.union1d(in_sheets, large), 0), state.query())
     if len(cells) == 0:
         return
-    rooms = np.unique(reach.room.ravel()[cells])
-    wrap = _wrap(work, reach.around_cells(cells), _WRAP_ERROR, work.query())
-    left, walled = _sheets_but_walls(work, rooms, wrap)
-    parts = work.parts
-    # More parts than can be united overlap in what was made of them.
-    if len(left.faces) < len(work.sheets.faces) or len(parts) > MOST_UNITED:
-        parts = [part for part in parts if not part.is_slab]
-        parts += [part._replace(is_slab=True) for part in skins(left)]
-        filled = unite([*(part.shape for part in parts), wrap])
-    else:
-        filled = unite([as_manifold(work.solid), wrap])
-    triangles = size_of(filled) / size_of(work.solid)
-    if volume_of(filled) <= work.volume or area_of(filled) * triangles**_TRIANGLES >= area_of(work.solid):
+    wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
+    filled = unite([as_manifold(state.solid), wrap])
+    triangles = size_of(filled) / size_of(state.solid)
+    if volume_of(filled) <= state.volume or area_of(filled) * triangles**_TRIANGLES >= area_of(state.solid):
         return
-    wrapped = np.concatenate([walled, np.flatnonzero(work.by_room)])
-    record.note(wrapped, "wrapped")
-    work.solid = filled
-    work.parts = [*parts, Piece(wrap, int(wrapped.min(initial=record.bodies - 1)))]
+    wrapped = np.unique(body[np.isin(in_sheets, reach.room.ravel()[cells])])
+    state.note(wrapped, "wrapped")
+    state.solid = filled
+    state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
 
 
-def _rooms_near(work: Work, walls: Soup) -> IntArray:
-    """The rooms that faces may be walls of."""
-    if not work.reach.room.any() or not _is_large(work, walls):
-        return np.empty(0, dtype=np.int64)
-    near = np.unique(work.reach.rooms_near(points_covering(walls.vertices, walls.faces, DEFAULT_GAP)[0]))
-    return near[near > 0]
+def _rooms_near(state: State, walls: Soup) -> tuple[IntArray, IntArray]:
+    """The rooms that points of faces may be walls of, 0 for none, and the body of each point."""
+    if not state.reach.room.any() or not _is_large(state, walls):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
+    return state.reach.rooms_near(points).astype(np.int64), walls.body[on]
 
 
-def _sheets_but_walls(work: Work, rooms: IntArray, wrap: Manifold) -> tuple[Soup, IntArray]:
-    """The sheets that the wrap of some rooms does not replace, and the bodies with walls of the rooms.
-
-    It replaces those that are only walls, unless it leaves some of their body's outside, as noise does.
-    """
-    sheets = work.sheets
-    points, on = spread_points(sheets.vertices, sheets.faces, DEFAULT_GAP)
-    is_elsewhere = once_in_each_place(lambda some: ~np.isin(work.reach.rooms_near(some), rooms), points)
-    is_wall = np.bincount(on, is_elsewhere, len(sheets.faces)) == 0
-    bodies = np.unique(sheets.body[is_wall])
-    points, on = points[is_wall[on]], on[is_wall[on]]
-    wrapped = query_of(wrap, work.surface.threads)
-
-    def is_left_out(points: FloatArray) -> BoolArray:
-        away = wrapped.distance(points) > HALF_THICKNESS
-        away[away] = ~wrapped.inside(points[away])
-        return away
-
-    left_out = on[once_in_each_place(is_left_out, points)]
-    is_wall &= ~np.isin(sheets.body, sheets.body[left_out])
-    return sheets.only(~is_wall), bodies
-
-
-def may_have_slits(work: Work) -> bool:
+def may_have_slits(state: State) -> bool:
     """Whether there may be slits in outer skins and along fillings."""
-    if not _may_fill(work):
+    if not _may_fill(state):
         return False
-    return _is_large(work, work.of_bodies(_with_slits(work))) or tunnels_in(work.solid) > _TUNNELS
+    return _is_large(state, state.of_bodies(_with_slits(state))) or tunnels_in(state.solid) > _TUNNELS
 
 
-def _with_slits(work: Work) -> BoolArray:
-    has = work.record.has
-    return (has("outer skin") | has("wrapped") | work.by_room) & ~work.is_tangled
+def _with_slits(state: State) -> BoolArray:
+    has = state.has
+    return (has("outer skin") | has("wrapped") | state.by_room) & ~state.is_tangled
 
 
-def fill_slits(work: Work) -> None:
+def fill_slits(state: State) -> None:
     """Fill slits that nothing can reach: cuts would have to follow them."""
-    query, gap = work.query(), work.wanted.gap
+    query, gap = state.query(), state.wanted.gap
     points, on = spread_points(query.vertices, query.faces, DEFAULT_GAP)
-    deep = work.reach.is_deep(points, _DEEP * gap)
+    deep = state.reach.is_deep(points, _DEEP * gap)
     points, across = points[deep], face_normals(query.vertices, query.faces[on[deep]])
-    is_on_cap = work.surface.distance(points) > 2 * HALF_THICKNESS
+    is_on_cap = state.surface.distance(points) > 2 * HALF_THICKNESS
     across *= gap * np.where(is_on_cap, _BETWEEN_CAPS, _BESIDE)[:, None]
     for side in (1, -1):  # the solid lies on both sides of a slit
         inside = query.inside(points + side * across)
         points, across = points[inside], across[inside]
     if len(points) == 0:
         return
-    wrap = _wrap(work, work.reach.around_points(points), _WRAP_ERROR, query)
-    filled = unite([as_manifold(work.solid), wrap])
-    is_little = abs(volume_of(filled) / work.volume - 1) < _SLIT_VOLUME
-    if is_little and area_of(filled) < (1 - _BARED) * area_of(work.solid):
-        work.solid = filled
-        work.parts.append(Piece(wrap, int(_with_slits(work).argmax())))
+    wrap = _wrap(state, state.reach.around_points(points), _WRAP_ERROR, query)
+    filled = unite([as_manifold(state.solid), wrap])
+    is_little = abs(volume_of(filled) / state.volume - 1) < _SLIT_VOLUME
+    if is_little and area_of(filled) < (1 - _BARED) * area_of(state.solid):
+        state.solid = filled
+        state.parts.append(Piece(wrap, int(_with_slits(state).argmax())))
 
 
-def _may_fill(work: Work) -> bool:
+def _may_fill(state: State) -> bool:
     """Whether what nothing can reach may become solid."""
-    return work.wanted.open_bodies != "thin" and not work.wanted.keep_cavities and work.volume != 0
+    fills = state.wanted.open_bodies != "thin" and not state.wanted.keep_cavities
+    return fills and state.volume != 0 and len(state.parts) <= MOST_UNITED  # more of them overlap each other
 
 
-def _is_large(work: Work, walls: Soup) -> bool:
+def _is_large(state: State, walls: Soup) -> bool:
     """Whether faces could enclose a ball."""
-    return bool(walls.area.sum() >= 4 * np.pi * work.wanted.gap**2)
+    return bool(walls.area.sum() >= 4 * np.pi * state.wanted.gap**2)
 
 
-def _wrapped(work: Work, soup: Soup) -> Manifold:
+def _wrapped(state: State, soup: Soup) -> Manifold:
     """What the ball cannot reach from outside some faces."""
-    reach = Reach.of(soup.vertices, soup.faces, work.wanted.gap, work.wanted.cells)
-    faces = SurfaceQuery(soup.vertices, soup.faces, work.surface.threads)
+    reach = Reach.of(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
+    faces = SurfaceQuery(soup.vertices, soup.faces, state.surface.threads)
     return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)
 
 
-def _wrap(work: Work, cells: BoolArray, error: float, solid: SurfaceQuery | None = None) -> Manifold:
+def _wrap(state: State, cells: BoolArray, error: float, solid: SurfaceQuery | None = None) -> Manifold:
     """Return a solid of grid cells, projected onto the input where it does not overlap `solid`, and simplified."""
-    return to_manifold(*work.reach.wrap(cells, work.surface, HALF_THICKNESS, solid)).simplify(error)
+    return to_manifold(*state.reach.wrap(cells, state.surface, HALF_THICKNESS, solid)).simplify(error)
 
 
 def _crossings(soup: Soup, patch: IntArray) -> int:

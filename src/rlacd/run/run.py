@@ -54,7 +54,8 @@ anything else that counts as false; None, as from a function that returns nothin
 
 StoppedBy = Literal["timeout", "cancel"]
 
-FINISH, FINISH_SHARE, LEAST_FINISH = 0.4, 0.04, 0.1
+FINISH, FINISH_SHARE = 0.4, 0.04
+LEAST_FINISH = FINISH / 4
 """After a stop, finishing may take `FINISH` seconds plus `FINISH_SHARE` of the timeout, and always at least
 `LEAST_FINISH` seconds; then optional work is skipped. After a cancellation it may take half as long: the command line
 then still has to write files. The promise is 1 s and 10 %: the rest is for what cannot be skipped."""
@@ -134,7 +135,7 @@ class Run:
         self._whole.__enter__()
         self._pool = ThreadPoolExecutor(self.threads, initializer=use_stop, initargs=(self.stop,))
         self._before = use_stop(self.stop)
-        self.stop.begin(self._look)
+        self.stop.begin(self.may_continue)
         self.stop.arm(self._timeout - self.elapsed)
         return self
 
@@ -362,9 +363,6 @@ class Run:
     def _stop_by(self, reason: StoppedBy) -> None:
         self.stopped_by, self.stopped_in, self._stopped_at = reason, self._stage, self.elapsed
         self.stop.trip()
-
-    def _look(self) -> None:
-        self.may_continue()
 
 
 def available_cpus() -> int:

@@ -36,10 +36,6 @@ class Work:
         """Units left."""
         return self.most - self.done
 
-    def share(self, among: int) -> float:
-        """Get an equal share of what is left."""
-        return self.left if math.isinf(self.left) else self.left // among
-
     def close(self) -> None:
         """Close the account: all further payments fail."""
         self.is_spent = True

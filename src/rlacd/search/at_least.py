@@ -17,11 +17,13 @@ from rlacd import _native
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.component import Component, Part
+from rlacd.solid.distance import PLACES
+from rlacd.solid.frame import HALF_THICKNESS
 
-UNCOVERED = 1e-3
+UNCOVERED = HALF_THICKNESS
 """How far outside the hulls a point of the solid may lie, in the normalised frame."""
 
-CANDIDATES = 1000
+CANDIDATES = PLACES // 2
 """Points of the solid's surface to choose from, besides the corners of the hulls."""
 
 POINTS, POINTS_PER_PART = 90, 3

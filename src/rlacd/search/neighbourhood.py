@@ -14,18 +14,65 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from rlacd._native import Stopped
+from rlacd.criteria.criterion import Criterion
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
+from rlacd.planes.sweep import SweepCache
+from rlacd.policies import Greedy
 from rlacd.run import Begun, Run
-from rlacd.search.context import FEW_PARTS, SearchContext
+from rlacd.search.operators import Exchange, recut, redistribute
 from rlacd.search.part_graph import Cluster, PartGraph
-from rlacd.search.recut import Exchange, recut
-from rlacd.search.redistribute import redistribute
-from rlacd.solid.component import Part
+from rlacd.solid.component import Component, Part
+
+PLANES_PER_AXIS = OFFSETS_PER_AXIS // 2
+"""Neighbourhoods are small: half the planes give results as good in half the time."""
+
+CONCAVE_EDGES = EDGES_PER_COMPONENT // 2
+"""Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
+
+FEW_PARTS = 20
+"""With more parts than this, searching around the first pass gains more per unit of work than another pass, and trials
+begin without waiting for the least number of parts."""
+
+
+PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
+"""Scores of the greedy policy for further passes over the whole solid, best first."""
+
+
+@dataclass(frozen=True)
+class SearchContext:
+    """The problem that a search solves and the tools it solves it with.
+
+    Attributes
+    ----------
+    root : Component
+        The solid.
+    criterion : Criterion
+        Every new part meets it.
+    seed : int
+    sweeps : SweepCache
+        Sweeps of the solid's components, including those of the first pass.
+    scores : sequence of str
+        Of the greedy policies that cut neighbourhoods and, if time allows, make further passes over the whole solid.
+    enough : callable
+        Returns the least number of parts of any decomposition: the search ends there. May wait for that.
+    near_sweeps : SweepCache
+        Coarser sweeps of components in neighbourhoods.
+    """
+
+    root: Component
+    criterion: Criterion
+    seed: int = 0
+    sweeps: SweepCache = field(default_factory=SweepCache)
+    scores: Sequence[str] = PORTFOLIO
+    enough: Callable[[], int] = lambda: 1
+    near_sweeps: SweepCache = field(default_factory=lambda: SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES))
+
 
 LAG = 8
 """A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that many can be under way
@@ -45,10 +92,10 @@ PARTS_PER_RECUT = 4
 """Between two attempts to redistribute all parts, one cluster is recut for every so many parts: a recut takes the work
 of four attempts to redistribute a part and saves a fifth as many parts, but changes what there is to redistribute."""
 
-PATIENCE = 24
+PATIENCE = 3 * LAG
 """By default the search is exhausted after this many trials per part without a gain, ..."""
 
-LEAST_TRIALS = 32
+LEAST_TRIALS = 4 * LAG
 """... but not before this many: where parts are few, trials cost little."""
 
 
@@ -107,7 +154,7 @@ class Neighbourhood:
         self._context = context
         self._run = run
         self._patience = patience
-        self._policies = [ranking(context.near_sweeps) for ranking in context.rankings]
+        self._policies = [Greedy(score, sweeps=context.near_sweeps) for score in context.scores]
         self._random = np.random.default_rng(context.seed)
         self._graph = PartGraph(parts, context.criterion, run)
         self._best = list(parts)

@@ -10,7 +10,7 @@ from rlacd import _native
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.numbered import NumberedParts
 from rlacd.run import Run, work
-from rlacd.search.recut import Exchange
+from rlacd.search.operators import Exchange
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import TOUCHING_FACES, Part, touch
 

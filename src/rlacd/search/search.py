@@ -11,9 +11,9 @@ from typing import Any
 from rlacd.cut import CutCache, CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import drop_slivers, grow_cover
+from rlacd.policies import Greedy
 from rlacd.run import Run
-from rlacd.search.context import FEW_PARTS, Ranking, SearchContext
-from rlacd.search.neighbourhood import PATIENCE, Neighbourhood, SearchOutcome, cost
+from rlacd.search.neighbourhood import FEW_PARTS, PATIENCE, Neighbourhood, SearchContext, SearchOutcome, cost
 from rlacd.solid.component import Part
 
 BEST_SECONDS = 5.0
@@ -133,7 +133,7 @@ def search(
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
     elif steps is not None and seconds is None:
         allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
-    others = context.rankings[1:] if first == "greedy" else context.rankings  # greedy is the first of them
+    others = context.scores[1:] if first == "greedy" else context.scores  # greedy is the first of them
     state = _Search(context, others, run, first_pass, a_pass, HOPELESS * len(parts))
     if bounded:
         with run.limited(allowed):
@@ -166,7 +166,7 @@ def eliminate_parts(context: SearchContext, parts: Sequence[Part], run: Run) -> 
 
     This is the only search inside a pass, and only used where it is quick: where hulls are tested against balls.
     """
-    state = Neighbourhood(replace(context, rankings=()), parts, run)
+    state = Neighbourhood(replace(context, scores=()), parts, run)
     state.redistribute_all()
     return state.parts
 
@@ -176,25 +176,25 @@ class _Search:
     """Passes over the whole solid, and searches from each."""
 
     context: SearchContext
-    others: Sequence[Ranking]
+    others: Sequence[str]
     run: Run
     first_pass: int
     seconds_of_a_pass: float
     hopeless: int
     fewest: float = math.inf
 
-    def passes(self, parts: list[Part], rankings: Sequence[Ranking]) -> list[list[Part]]:
-        """The given parts and those of further passes, one for each ranking; best first."""
+    def passes(self, parts: list[Part], scores: Sequence[str]) -> list[list[Part]]:
+        """The given parts and those of further passes, one for each score; best first."""
         run, context, cache = self.run, self.context, CutCache()
         found = [parts]
-        for ranking in rankings:
+        for score in scores:
             if (
                 run.is_over
                 or len(parts) <= context.enough()
                 or self.seconds_of_a_pass > SHARE_OF_TIME * run.seconds_left
             ):
                 break
-            tree = CutTree(context.root, ranking(context.sweeps), run, cache)
+            tree = CutTree(context.root, Greedy(score, sweeps=context.sweeps), run, cache)
             with run.quietly(), run.limited(ANOTHER_PASS * self.first_pass):
                 other = cut_and_merge(tree, context.criterion, run, most=self.hopeless, strict=True)
                 if other.unmet or run.is_over:

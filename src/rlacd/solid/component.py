@@ -16,13 +16,14 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.hull import Hull
+from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.solid import Shape, mesh_of
 
 NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
-LOST_VOLUME = 1e-6
+LOST_VOLUME = TOLERANCE
 """Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
 
 
@@ -286,6 +287,15 @@ class Component(Part):
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
         pieces = _native.connected_pieces(self.vertices, self.faces, NEGLIGIBLE_VOLUME)
         return [self] if pieces is None else [Component.of(piece, self) for piece in pieces]
+
+
+FILM = HALF_THICKNESS / 5
+"""Mean thickness up to which a part is a film that a cut or rounding has left: sheets are ten times thicker."""
+
+
+def is_film(part: Part) -> bool:
+    """Whether the part's mean thickness, twice its volume over its area, is at most `FILM`."""
+    return 2 * part.volume <= FILM * _native.mesh_area(part.vertices, part.faces)
 
 
 def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:

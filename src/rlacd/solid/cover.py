@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 from manifold3d import Manifold
-from numpy.typing import NDArray
 
 from rlacd._native import Stopped
 from rlacd.run import Run
@@ -20,7 +19,10 @@ from rlacd.solid.solid import Solid, surface_of
 from rlacd.solid.topology import compacted, point_bodies
 
 MOST_HULLS = 2000
-"""If there are more bodies, neighbours along a space-filling curve share a hull."""
+"""If there are more bodies, neighbours in the columns of a grid share a hull."""
+
+_CELLS = MOST_HULLS ** (1 / 3) / 2
+"""Per unit of length of that grid."""
 
 _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
@@ -71,22 +73,12 @@ def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
     vertices, first = vertices[used], np.searchsorted(body[order], np.arange(count))
     if count > MOST_HULLS:
         group = np.empty(count, dtype=np.int64)
-        group[np.argsort(_along_a_curve(vertices[order[first]]), kind="stable")] = (
-            np.arange(count) * MOST_HULLS // count
-        )
+        cells = np.floor(_CELLS * vertices[order[first]])
+        group[np.lexsort(cells.T)] = np.arange(count) * MOST_HULLS // count
         order = order[np.argsort(group[body[order]], kind="stable")]
         first = np.searchsorted(group[body[order]], np.arange(MOST_HULLS))
     placed = vertices[order]
     return np.split(placed, first[1:])
-
-
-def _along_a_curve(points: FloatArray) -> NDArray[np.int64]:
-    """Ranks [N] of points [N, 3], given in the frame, along a Z-order curve."""
-    cell = np.clip((points + 1) * 512, 0, 1023).astype(np.int64)
-    place = np.zeros(len(points), dtype=np.int64)
-    for bit, axis in itertools.product(range(10), range(3)):
-        place |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
-    return place
 
 
 def _hull(points: FloatArray, run: Run) -> Hull:

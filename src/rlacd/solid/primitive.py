@@ -171,3 +171,6 @@ class Balls:
     def in_input(self, frame: Frame) -> Balls:
         """Map balls from the normalised frame to the input's frame and unit."""
         return Balls(frame.to_input(self.centres), self.radii / frame.scale)
+
+
+NO_BALLS = Balls(np.empty((0, 3)), np.empty(0))

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from rlacd._native import HullUnion, poll_stop, sample_surface
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import Frame
 from rlacd.solid.topology import IntArray
 
-SURFACE_SAMPLES = 10_000
+SURFACE_SAMPLES = 5 * PLACES
 LEAST_OF_LABEL = 32
 """Points spread over the surface, and at least over each label's share of it."""
 

@@ -27,7 +27,7 @@ class BodyRepair:
     body
         Number of the body, by its first face in the input.
     step
-        The last step it needed, one of `rlacd.repair.work.STEPS`.
+        The last step it needed, one of `rlacd.repair.state.STEPS`.
     faces_in, faces_out
         Triangles before and after; a body joined to others counts its share before the union.
     deviation

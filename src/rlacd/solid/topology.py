@@ -13,9 +13,7 @@ volume, those of enclosed rooms negative; a face with both sides in one componen
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import TypeVar
 
 import numpy as np
@@ -24,6 +22,7 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.hull import TOLERANCE
 
 Index = TypeVar("Index", bound=np.signedinteger)
 IntArray = NDArray[np.int64]
@@ -120,7 +119,7 @@ def is_balanced(faces: IntArray, edges: Edges) -> BoolArray:
     return np.asarray(2 * forward == edges.valence)
 
 
-NO_FILM = 1e-12
+NO_FILM = TOLERANCE**2
 """Films of less area than this are folds that rounding has closed."""
 
 
@@ -171,8 +170,12 @@ class Sides:
 
     Attributes
     ----------
-    find_wedges
-        Returns what `wedges` and `facing` are: many inputs need neither.
+    wedges
+        Pairs of halfedges ``(h, g)``, ``[W, 2]``. Going around their edge from its smaller to its larger vertex by the
+        right-hand rule, g follows h with nothing in between. A boundary edge gives ``h == g``. Faces at equal angles,
+        to the precision of float32 files, and all around edges of trusted faces alternate as their windings require.
+    facing
+        The sides that bound each wedge ``[W, 2]``, on its first and on its second halfedge.
     label
         ``[2F]``, the component of every side.
     volume
@@ -183,55 +186,29 @@ class Sides:
         ``[F]``, whether both sides of the face lie in one component.
     """
 
-    find_wedges: Callable[[], tuple[IntArray, IntArray]]
+    wedges: IntArray
+    facing: IntArray
     label: IntArray
     volume: FloatArray
     area: FloatArray
     sheet: BoolArray
-
-    @property
-    def wedges(self) -> IntArray:
-        """Pairs of halfedges ``(h, g)``, ``[W, 2]``.
-
-        Going around their edge from its smaller to its larger vertex by the right-hand rule, g follows h with nothing
-        in between. A boundary edge gives ``h == g``. Faces at equal angles, to the precision of float32 files, and all
-        around edges of trusted faces alternate as their windings require.
-        """
-        return self.find_wedges()[0]
-
-    @property
-    def facing(self) -> IntArray:
-        """The sides that bound each wedge ``[W, 2]``, on its first and on its second halfedge."""
-        return self.find_wedges()[1]
 
 
 def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
     return np.bincount(group, values, number).astype(np.float64)
 
 
-def both_sides(patch: IntArray) -> IntArray:
-    """Return ``[2F]`` the component of every side if fronts join only fronts, given the patch ``[F]`` of each face."""
-    return (2 * patch[:, None] + np.arange(2)).ravel()
-
-
 def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> Sides:
     """Join the sides of all faces across their wedges, except where ``trusted`` ``[F]`` faces meet by their angles."""
-
-    @cache
-    def wedges() -> tuple[IntArray, IntArray]:
-        return _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence), trusted)
-
-    if (edges.valence == 2).all() and is_balanced(faces, edges).all():
-        number, patch = components(len(faces), *(edges.halfedges // 3))
-        number, label = 2 * number, both_sides(patch)
-    else:
-        number, label = components(2 * len(faces), *np.ascontiguousarray(wedges()[1].T))
+    wedges, facing = _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence), trusted)
+    number, label = components(2 * len(faces), *np.ascontiguousarray(facing.T))
     poll_stop()
     tetrahedra = signed_tetrahedra(vertices, faces)
     area = face_areas(vertices, faces)
     front, back = label[0::2], label[1::2]
     return Sides(
-        find_wedges=wedges,
+        wedges=wedges,
+        facing=facing,
         label=label,
         volume=_sums(front, tetrahedra, number) - _sums(back, tetrahedra, number),
         area=_sums(front, area, number) + _sums(back, area, number),

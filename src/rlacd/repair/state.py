@@ -17,85 +17,12 @@ from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, sha
 from rlacd.repair.soup import Soup, no_faces
 from rlacd.repair.union import size_of, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
-from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.solid import BodyRepair, Hole, Shape, Solid
 from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, marked
 
 STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
 """The possible steps for a body, from the least change to the most."""
-
-
-class Record:
-    """The repairs of all bodies so far.
-
-    Parameters
-    ----------
-    bodies : int
-    body_of_input : int64 [F]
-        The body of each face of the input.
-
-    Attributes
-    ----------
-    step : int64 [bodies]
-        The step that changed a body most, an index of `STEPS`.
-    beyond, lost : float64 [bodies]
-        Greatest distance of the repaired surface from the input's, and of the input's outside the solid from it.
-    """
-
-    def __init__(self, bodies: int, body_of_input: IntArray) -> None:
-        self.bodies = bodies
-        self.body_of_input = body_of_input
-        self.step = np.zeros(bodies, dtype=np.int64)
-        self.beyond, self.lost = np.zeros((2, bodies))
-
-    @property
-    def deviation(self) -> FloatArray:
-        """Greatest distance between the repaired surface and the input's: float64 ``[bodies]``."""
-        return np.maximum(self.beyond, self.lost)
-
-    def note(self, bodies: IntArray, step: str) -> None:
-        """Record a step; a body keeps the one that changes it most."""
-        noted = marked(bodies, self.bodies)
-        self.step[noted] = np.maximum(self.step[noted], STEPS.index(step))
-
-    def has(self, step: str) -> BoolArray:
-        """Return ``[bodies]`` whether this is the step of a body."""
-        return np.asarray(self.step == STEPS.index(step))
-
-    def rows(self, faces_out: IntArray) -> tuple[BodyRepair, ...]:
-        """One row per body, given the triangles ``[bodies]`` after the repair."""
-        faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
-        rows = zip(self.step.tolist(), faces_in.tolist(), faces_out.tolist(), self.deviation.tolist(), strict=True)
-        return tuple(BodyRepair(i, STEPS[s], a, b, d) for i, (s, a, b, d) in enumerate(rows))
-
-
-def measure(record: Record, surface: SurfaceQuery, solid: SurfaceQuery) -> IntArray:
-    """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
-    if record.step.max() < STEPS.index("outer skin"):
-        return np.empty(0, dtype=np.int64)
-    kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
-    poll_stop()
-    own = solid.faces[~kept]
-    points, _ = points_covering(
-        solid.vertices, own, affordable(DEFAULT_GAP, float(face_areas(solid.vertices, own).sum()))
-    )
-    closest, face = surface.closest(points)
-    np.maximum.at(record.beyond, record.body_of_input[face], np.linalg.norm(points - closest, axis=1))
-
-    replaced = np.flatnonzero((record.step[record.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
-    faces = surface.faces[replaced]
-    spacing = affordable(DEFAULT_GAP, float(face_areas(surface.vertices, faces).sum()))
-    points, on = points_covering(surface.vertices, faces, spacing)
-    distance = solid.distance(points)
-    lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)  # the middle of a slab is half as far from its surface
-    lost = lost[~solid.inside(points[lost])]
-    np.maximum.at(record.lost, record.body_of_input[replaced[on[lost]]], distance[lost])
-    corners = np.unique(faces[_native.longest_edges(surface.vertices, faces) <= spacing])  # the first of the points
-    is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
-    leads_out = np.asarray(is_out[faces].any(axis=1))
-    leads_out[on[lost]] = True
-    return replaced[leads_out]
 
 
 _WELDS = (2e-5, 5e-4)
@@ -144,7 +71,7 @@ class Piece(NamedTuple):
     is_slab: bool = False
 
 
-class Work:
+class State:
     """The input in the normalised frame, and what became of its bodies, which are numbered after cracks are welded.
 
     Attributes
@@ -152,8 +79,13 @@ class Work:
     surface : SurfaceQuery
         The input.
     wanted : Wanted
-    record : Record
-        What was done to each body.
+    bodies : int
+    body_of_input : int64 [F]
+        The body of each face of the input.
+    step : int64 [bodies]
+        The step that changed a body most, an index of `STEPS`.
+    beyond, lost : float64 [bodies]
+        Greatest distance of the repaired surface from the input's, and of the input's outside the solid from it.
     soup : Soup
         Its faces, with the caps.
     sheets : Soup
@@ -174,16 +106,17 @@ class Work:
         faces, origin = close_cracks(surface.vertices, surface.faces, edges, _WELDS)
         if faces is not surface.faces:
             edges = Edges.of(faces, len(surface.vertices))
-        count, body = bodies_of(faces, edges)
-        body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
-        body_of_input[origin] = body
-        self.record = Record(count, body_of_input)
-        self.record.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
+        self.bodies, body = bodies_of(faces, edges)
+        self.body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
+        self.body_of_input[origin] = body
+        self.step = np.zeros(self.bodies, dtype=np.int64)
+        self.beyond, self.lost = np.zeros((2, self.bodies))
+        self.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
         self.soup = Soup(surface.vertices, faces, body, known_edges=edges)
         self.sheets = no_faces(surface.vertices)
         self.parts: list[Piece] = []
         self.solid: Shape = Manifold()
-        self.by_room, self.is_tangled = np.zeros((2, count), dtype=bool)
+        self.by_room, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
         self.holes: list[Hole] = []
         self.warnings: list[str] = []
         self._asked: tuple[Shape, SurfaceQuery] | None = None
@@ -199,6 +132,15 @@ class Work:
             self._asked = self.solid, query_of(self.solid, self.surface.threads)
         return self._asked[1]
 
+    def note(self, bodies: IntArray, step: str) -> None:
+        """Record a step; a body keeps the one that changes it most."""
+        noted = marked(bodies, self.bodies)
+        self.step[noted] = np.maximum(self.step[noted], STEPS.index(step))
+
+    def has(self, step: str) -> BoolArray:
+        """Return ``[bodies]`` whether this is the step of a body."""
+        return np.asarray(self.step == STEPS.index(step))
+
     @property
     def volume(self) -> float:
         """Volume of the solid."""
@@ -211,17 +153,20 @@ class Work:
     def result(self, warnings: tuple[str, ...]) -> Solid:
         """The solid that is reported, with warnings of the input before those of its repair."""
         self._warn_of_holes()
-        faces_out = np.zeros(self.record.bodies, dtype=np.int64)
+        faces_out = np.zeros(self.bodies, dtype=np.int64)
         for part in self.parts:
             faces_out[part.body] += size_of(part.shape)
+        faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
+        columns = self.step, faces_in, faces_out, np.maximum(self.beyond, self.lost)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
         return Solid(
             self.solid,
             (self.surface.vertices, self.surface.faces.astype(np.int32)),
             self._frame,
-            self.record.rows(faces_out),
+            tuple(BodyRepair(i, STEPS[step], *row) for i, (step, *row) in enumerate(rows)),
             (*warnings, *self.warnings),
             holes=tuple(self.holes),
-            body_of=self.record.body_of_input,
+            body_of=self.body_of_input,
             index=self.surface.index,
             pieces=[part.shape for part in self.parts] if len(self.parts) > 1 and not self.wanted.keep_cavities else [],
         )
@@ -235,7 +180,7 @@ class Work:
                 f"Holes were closed although the caps lead up to {depth:.3f} (longest side = 2) away from the surface,"
                 f" at {self._places([hole for hole in self.holes if hole.is_closed])}."
             )
-        is_thin = self.record.has("slab")
+        is_thin = self.has("slab")
         is_thin[[part.body for part in self.parts if not part.is_slab]] = False  # only fins of it are
         openings = [hole for hole in self.holes if not hole.is_closed and is_thin[hole.body]]
         shells = len({hole.body for hole in openings})
@@ -251,4 +196,33 @@ class Work:
         return named + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
 
     def _place(self, point: ArrayLike, body: int) -> str:
-        return self._frame.place(point, body if self.record.bodies > 1 else None)
+        return self._frame.place(point, body if self.bodies > 1 else None)
+
+
+def measure(state: State) -> IntArray:
+    """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
+    surface, solid = state.surface, state.query()
+    if state.step.max() < STEPS.index("outer skin"):
+        return np.empty(0, dtype=np.int64)
+    kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
+    poll_stop()
+    own = solid.faces[~kept]
+    points, _ = points_covering(
+        solid.vertices, own, affordable(DEFAULT_GAP, float(face_areas(solid.vertices, own).sum()))
+    )
+    closest, face = surface.closest(points)
+    np.maximum.at(state.beyond, state.body_of_input[face], np.linalg.norm(points - closest, axis=1))
+
+    replaced = np.flatnonzero((state.step[state.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
+    faces = surface.faces[replaced]
+    spacing = affordable(DEFAULT_GAP, float(face_areas(surface.vertices, faces).sum()))
+    points, on = points_covering(surface.vertices, faces, spacing)
+    distance = solid.distance(points)
+    lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)  # the middle of a slab is half as far from its surface
+    lost = lost[~solid.inside(points[lost])]
+    np.maximum.at(state.lost, state.body_of_input[replaced[on[lost]]], distance[lost])
+    corners = np.unique(faces[_native.longest_edges(surface.vertices, faces) <= spacing])  # the first of the points
+    is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
+    leads_out = np.asarray(is_out[faces].any(axis=1))
+    leads_out[on[lost]] = True
+    return replaced[leads_out]
