@@ -26,10 +26,10 @@ from rlacd.errors import OptionError, RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import drop_slivers, merge_parts
 from rlacd.options.navigable import NavigableSpace
-from rlacd.planes.candidates import OFFSETS_PER_AXIS
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
 from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy, make_policy
-from rlacd.policies.greedy import EDGES_PER_COMPONENT, least_hulls
+from rlacd.policies.greedy import least_hulls
 from rlacd.policies.network import KIND, SHORTLIST, Network, best_planes, load_network
 from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.repair.repair import repair
