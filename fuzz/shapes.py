@@ -90,7 +90,7 @@ def judged(
 ) -> Row:
     """Decompose a shape, possibly again with another number of threads, and fill in its row."""
     spec = JobSpec.of(options, file_format=ending)
-    row = replace(row, steps=list(shape.steps), options=spec.as_plain()["options"], faces=len(shape.faces))
+    row = replace(row, steps=list(shape.steps), options=spec.options, faces=len(shape.faces))
     mesh = write_mesh(folder / f"{row.seed}.ply", shape.vertices, shape.faces)
     start = time.perf_counter()
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import threading
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -109,5 +110,4 @@ class InProcess:
 
 
 def _values(spec: JobSpec, mesh: Path, name: str, stem: str) -> dict[str, Any]:
-    values = {"spec": spec.as_plain(), "path": str(mesh), "name": name, "stem": stem}
-    return {**values, "hull_only": False, "out": None, "parent": ""}
+    return {"spec": asdict(spec), "path": str(mesh), "name": name, "stem": stem, "hull_only": False}

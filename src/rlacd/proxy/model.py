@@ -34,6 +34,10 @@ MARGIN = 1.5
 """Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
 
 
+MOST_CUTS = 2
+"""How often a part is cut on the solid: hulls of its pieces may grow to cover the surface until they fail again."""
+
+
 @dataclass
 class _Lifted:
     """A part on its way to the solid.
@@ -41,18 +45,18 @@ class _Lifted:
     Attributes
     ----------
     hull : Hull
-    is_fresh : bool
-        Whether it comes from the proxy, and was not cut on the solid.
     part : Part or None
         Its part of the solid, if that is known for this hull.
     is_met : bool
         Whether that is known to meet the goal.
+    cuts : int
+        How often it was cut on the solid; 0 if it comes from the proxy.
     """
 
     hull: Hull
-    is_fresh: bool
     part: Part | None = None
     is_met: bool = False
+    cuts: int = 0
 
     @property
     def on_solid(self) -> Part:
@@ -68,8 +72,8 @@ class _Lifted:
         """
         grown = Hull.of(np.concatenate([self.hull.vertices, points]))
         assert grown is not None, "a hull stays solid when it grows"
-        self.hull = limit_hull(grown, tolerance=SIMPLE_FIRST / 2 if self.is_fresh else TOLERANCE)
-        self.part = None if self.is_fresh or self.part is None else self.part.with_hull(self.hull)
+        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.cuts else SIMPLE_FIRST / 2)
+        self.part = self.part.with_hull(self.hull) if self.cuts and self.part is not None else None
         self.is_met = False
 
 
@@ -107,7 +111,7 @@ class Lift:
             Cut parts again if they meet their criterion on the proxy only.
         """
         with self.run.shielded():
-            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST), True) for part in parts]
+            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
             self._cover(lifted)
             hulls = [each.hull for each in lifted]
         try:
@@ -121,16 +125,17 @@ class Lift:
         self._clip(lifted)
         while failing := self._failing(lifted):
             for i in reversed(failing):
-                lifted[i : i + 1] = self._cut_again(lifted[i].on_solid)
+                lifted[i : i + 1] = self._cut_again(lifted[i])
             self._cover(lifted)
             self._clip(lifted)
         return [each.on_solid for each in lifted]
 
-    def _cut_again(self, part: Part) -> list[_Lifted]:
-        """Cut a part of the solid."""
+    def _cut_again(self, failing: _Lifted) -> list[_Lifted]:
+        """Cut a part of the solid; the second time with room for its pieces' hulls to grow."""
+        part, tighter = failing.on_solid, 1 - failing.cuts * MARGIN * self.deviation / self.goal.overhang
         tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
-        new = cut_and_merge(tree, self.goal, self.run).parts or [part]
-        return [_Lifted(part.hull, False, part) for part in new]
+        new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts or [part]
+        return [_Lifted(part.hull, part, is_met=True, cuts=failing.cuts + 1) for part in new]
 
     def confirmed(self, hull: Hull) -> Part | None:
         """Get what the solid fills of a hull; None if it does not meet the goal."""
@@ -162,12 +167,12 @@ class Lift:
         return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
     def _failing(self, lifted: Sequence[_Lifted]) -> list[int]:
-        """Indices of the parts that fail on the solid, but for those that were cut there before."""
-        fresh = [i for i, each in enumerate(lifted) if each.is_fresh and not each.is_met]
-        verdicts = self.run.map(self.goal.is_met, [lifted[i].on_solid for i in fresh])
-        for i, is_met in zip(fresh, verdicts, strict=True):
+        """Indices of the parts that fail on the solid, but for those that were cut there `MOST_CUTS` times."""
+        asked = [i for i, each in enumerate(lifted) if each.cuts < MOST_CUTS and not each.is_met]
+        verdicts = self.run.map(self.goal.is_met, [lifted[i].on_solid for i in asked])
+        for i, is_met in zip(asked, verdicts, strict=True):
             lifted[i].is_met = is_met
-        return [i for i in fresh if not lifted[i].is_met]
+        return [i for i in asked if not lifted[i].is_met]
 
 
 @dataclass(frozen=True)

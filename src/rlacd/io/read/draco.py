@@ -51,10 +51,11 @@ def decode_draco(path: Path, primitives: Sequence[Json], required: bool, arrays:
         accessors = {name: arrays.accessor(index) for name, index in primitive["attributes"].items()}
         if not required and "bufferView" in accessors["POSITION"]:
             continue  # the same triangles, not compressed
+        numbers = compressed["attributes"]
         asked[str(at)] = {
-            attribute: (int(number), bool(accessors[attribute].get("normalized")), ITEMS[accessors[attribute]["type"]])
-            for attribute, number in compressed["attributes"].items()
-            if attribute.startswith(("POSITION", "JOINTS_", "WEIGHTS_"))
+            name: (int(numbers[name]), bool(accessors[name].get("normalized")), ITEMS[accessors[name]["type"]])
+            for name in ("POSITION", *numbers)
+            if name.startswith(("POSITION", "JOINTS_", "WEIGHTS_"))
         }
         view = arrays.view(compressed["bufferView"])
         arrays.need(len(view))
