@@ -59,14 +59,14 @@ def test_no_result_goes_over_a_mesh(tmp_path: Path) -> None:
     inner.mkdir(parents=True)
     trimesh.creation.box().export(inner.parent / "x.glb")
     trimesh.creation.box().export(inner / "x.stl")
-    before = tree(inner.parent)
-    refused = batch(inner.parent, "-o", inner.parent)
-    assert refused.exit_code == 2
-    assert "among the meshes" in refused.stderr
-    refused = batch(inner.parent, "-o", tmp_path, "--quality", "fast")
-    assert refused.exit_code == 5
-    assert "in/x.glb is there already" in refused.stderr
-    assert {name: data for name, data in tree(inner.parent).items() if name in before} == before
+    before = tree(tmp_path)
+    for out in (tmp_path, inner.parent):
+        for glob in ("**/*", "*.stl"):
+            refused = batch(inner.parent, "-o", out, "--glob", glob)
+            assert refused.exit_code == 2
+            assert "overwrite the input" in refused.stderr or "among the meshes" in refused.stderr
+            assert tree(tmp_path) == before
+    assert batch(inner.parent, "-o", tmp_path, "--glob", "x.glb", "--dry-run").exit_code == 0
 
 
 @pytest.mark.promise("batch-resumes")

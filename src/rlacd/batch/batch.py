@@ -238,8 +238,18 @@ class Batch:
         assets = find_assets(self.assets, self.glob, here, self.spec.ending)
         if not assets:
             which = "" if self.glob == EVERYTHING else f" whose name fits {self.glob!r}"
-            raise MeshFileError(f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, ....")
+            raise MeshFileError(f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, … files.")
+        if here is not None:
+            self._refuse_results_over_meshes(assets, here)
         return assets
+
+    def _refuse_results_over_meshes(self, assets: list[Asset], here: Path) -> None:
+        """The folder of results may hold that of the meshes, in which a folder may have the same name again."""
+        places = {here.resolve() / asset.place for asset in assets}
+        for asset in assets if self.glob == EVERYTHING else find_assets(self.assets, EVERYTHING, here):
+            for path in (asset.path, asset.path.resolve()):
+                if path.parent.resolve() / path.stem in places:
+                    raise OptionError(f"a result would overwrite the input {asset.path}; choose another folder.")
 
     def _task(self, asset: Asset, manifest: Ledger, store: ResultStore) -> tuple[Task, bool]:
         """Return the mesh with the key of its result, and whether that result exists."""

@@ -48,7 +48,7 @@ def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[st
     """
     for name, data in files.items():
         if not owns(name) and store.read(name) not in (None, data):
-            raise OutputNameError(f"{name} is there already, and in no row of the manifest; move it or choose another.")
+            raise OutputNameError(f"{name} is there already, but not by this batch: move it or choose another folder.")
     for name, data in files.items():
         store.write(name, data)
     return {name: len(data) for name, data in files.items()}

@@ -105,7 +105,9 @@ def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
         flag, found = name.replace("_", "-"), _LENGTH.fullmatch(word.strip())
         value, unit = (_number(found[1]), found[2]) if found else (_number(word), None)
         if value is None:
-            raise OptionError(f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length.")
+            raise OptionError(
+                f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length such as 5mm."
+            )
         if unit not in UNITS:
             taken[name] = value / 100 * longest if unit == "%" else value
             continue

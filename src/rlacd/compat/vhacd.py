@@ -91,5 +91,7 @@ def _triangles(faces: Any) -> npt.NDArray[np.int64]:
     if array.ndim == 1 and len(array) % 4 == 0 and (array[::4] == 3).all():
         array = array.reshape(-1, 4)[:, 1:]
     if array.ndim == 1 and len(array) % 3:
-        raise MeshDataError("flat faces are neither 3, a, b, c, 3, ... nor a, b, c, a, ...: triangulate them first.")
+        raise MeshDataError(
+            "flat faces are neither 3, a, b, c, 3, ... nor a, b, c, a, ...: triangulate polygons first."
+        )
     return (array if array.ndim > 1 else array.reshape(-1, 3)).astype(np.int64)

@@ -135,15 +135,14 @@ def _left(balls: Balls, union: _native.HullUnion, threads: int) -> FloatArray:
 
 
 def too_narrow(found: Sequence[dict[str, Any]], reached: Reached, is_stopped: bool) -> list[str]:
-    """Warn of passages that keep less than asked for, and of others at least as wide as the tolerance that lose over a
-    third of their radius."""
+    """Warn of passages that keep less than asked for, and of others that lose over a third of their radius."""
     options, scale, asked, others = reached.options, reached.solid.frame.scale, [], []
     ball, told = options.keep_open_abs, MOSTLY if options.keep_open_abs is None else 1 - LEAST_LOSS
     for at, radius, left in (one.values() for one in found):
         if radius * scale >= least_kept(options, scale):
             if left < (options.keep_open or 0.0) * radius + (ball or 0.0) - ACCURACY * radius:
                 asked.append((at, radius, left))
-        elif radius * scale >= options.threshold and left < told * radius:
+        elif left < told * radius:
             others.append((at, radius, left))
     reason = "the work was stopped before" if is_stopped else "limits on the hulls leave no other way"
     share = "over a third" if ball is None else f"over a tenth, too narrow for a ball of radius {ball:.4g}"

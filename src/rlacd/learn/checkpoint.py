@@ -69,7 +69,7 @@ def load_checkpoint(path: Path) -> tuple[dict[str, dict[str, NDArray[Any]]], dic
             for whole in file.files:
                 owner, _, name = whole.partition(".")
                 arrays.setdefault(owner, {})[name] = file[whole]
-        version = state["version"]
+        version = state.get("version", "before 0.1.0")
     except damage as error:
         raise TrainingError(f"the checkpoint {path} is damaged ({error}); remove it to train again.") from error
     if version != __version__:

@@ -219,7 +219,9 @@ class Training:
         arrays, state = found
         for name, value in dataclasses.asdict(self.options).items():
             if name not in MAY_CHANGE and (was := state["options"][name]) != value:
-                raise OptionError(f"{name} is {value!r}, but was {was!r} when the run began: resume with that.")
+                raise OptionError(
+                    f"{name} is {value!r}, but was {was!r} when the run began: give that, or begin another run."
+                )
         if state["encoder"] != self.encoder.digest:
             raise OptionError(f"{self.options.encoder_weights} holds other weights than the run began with.")
         self.network.load_state_dict(tensors(arrays["network"]))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rlacd._native import points_within
 from rlacd.errors import import_extra
 from rlacd.io.write import write_file
 from rlacd.io.write.palette import linear_from_srgb
@@ -24,6 +25,9 @@ from rlacd.view.render import Body, Spheres, render_apart
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
+BALLS_AT_ONCE = 256
+"""Of which all pairs are looked at when balls are chosen; the others are searched once for all chosen ones."""
+
 TO_Z_UP = {  # rows: the source of the drawing's x, y, z axes
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
     "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),  # +z, the front of glTF, faces the camera
@@ -150,14 +154,21 @@ def picture_bytes(
 
 def apart(balls: Balls) -> Balls:
     """Choose balls that do not overlap, smallest first; all of them together would look like one cloud."""
-    order = np.argsort(balls.radii, kind="stable")
-    hidden = np.zeros(len(balls), dtype=bool)
-    shown: list[int] = []
-    for i in order:
-        if not hidden[i]:
-            shown.append(int(i))
-            hidden |= np.linalg.norm(balls.centres - balls.centres[i], axis=1) < balls.radii + balls.radii[i]
-    return Balls(balls.centres[shown], balls.radii[shown])
+    left, shown = np.argsort(balls.radii, kind="stable"), list[int]()
+    while len(left):
+        some, left = left[:BALLS_AT_ONCE], left[BALLS_AT_ONCE:]
+        chosen = list[int]()
+        for i in some:
+            away = np.linalg.norm(balls.centres[chosen] - balls.centres[i], axis=1)
+            if (away >= balls.radii[chosen] + balls.radii[i]).all():
+                chosen.append(int(i))
+        reach = balls.radii[chosen] + balls.radii.max()
+        counts, near = points_within(balls.centres[left], balls.centres[chosen], reach)
+        by, other = np.repeat(chosen, counts), left[near]
+        away = np.linalg.norm(balls.centres[by] - balls.centres[other], axis=1)
+        left = np.delete(left, near[away < balls.radii[by] + balls.radii[other]])
+        shown += chosen
+    return balls.some(np.array(shown))
 
 
 def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:

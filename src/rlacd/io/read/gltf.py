@@ -104,7 +104,7 @@ def _checked(path: Path, header: Json) -> list[Json]:
 
 
 def _unread(path: Path, extension: str) -> MeshFileError:
-    how = "export it without, or, if that compresses it, run  npx @gltf-transform/cli copy IN.glb OUT.glb"
+    how = "export it without it, or, if it is a compression, run  npx @gltf-transform/cli copy IN.glb OUT.glb"
     return MeshFileError(f"{path} requires the extension {extension!r:.60}, which is not read: {how}")
 
 

@@ -86,7 +86,9 @@ def load_mesh(source: Source) -> InputMesh:
         return without_engine_hulls(_baked(kind, Contents(geometry_of(source, kind), asset=asset)))
     if isinstance(source, tuple) and len(source) == 2:
         return replace(_baked("arrays", Contents(one_shape("arrays", *arrays_of(*source)))), nodes=(), node_of=None)
-    raise MeshDataError(f"cannot take a mesh from {type(source).__name__}: give a path, trimesh, or (vertices, faces)")
+    raise MeshDataError(
+        f"cannot take a mesh from {type(source).__name__}: give a path, a trimesh object or (vertices, faces)"
+    )
 
 
 def _read(path: Path) -> Contents:
@@ -127,7 +129,9 @@ def _baked(name: str, contents: Contents) -> InputMesh:
     for node, (v, f) in contents.geometry:
         if len(f) and (f.min() < 0 or f.max() >= len(v)):
             wrong = int(f[(f < 0) | (f >= len(v))][0])
-            raise MeshDataError(f"a face uses vertex {wrong} of {len(v)}, counted from 0: the file is damaged")
+            raise MeshDataError(
+                f"a face uses vertex {wrong}, but there are {len(v)} (counted from 0): the file is damaged"
+            )
         if solid and not len(f):
             continue
         if not np.array_equal(node.transform, np.eye(4)):

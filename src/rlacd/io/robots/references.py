@@ -90,14 +90,18 @@ class References:
             return None
         name = reference.split("://", 1)[1].split("/", 1)[0]
         if not name:
-            raise MeshFileError(f"{self._robot} refers to {reference}, which names no package.")
+            raise MeshFileError(
+                f"{self._robot} refers to {reference}, which names no package: package://NAME/FILE does."
+            )
         if name in self._named:
             return self._named[name]
         if name.strip(". ") and not set(name) & {"\\", "\0"}:
             for folder in self._candidates(name):
                 if folder.is_dir():
                     return folder
-        raise MeshFileError(f"{self._robot} needs the package {name}, not found: give --package-dir {name}=FOLDER.")
+        raise MeshFileError(
+            f"{self._robot} needs the package {name}, which was not found: give --package-dir {name}=FOLDER."
+        )
 
     def _candidates(self, name: str) -> Iterator[Path]:
         """Candidate folders of a package, likeliest first: above the file, beside those folders, in ROS paths."""

@@ -173,7 +173,7 @@ def rewrite_stage(
 def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:
     """Check, before any work, that what `source` becomes can be written to `place`; raises as `rewrite_robot`."""
     if place.suffix.lower() not in endings:
-        raise OptionError(f"{source} can only become another {' or '.join(endings)}, not {shown(str(place))}.")
+        raise OptionError(f"{source} can only be rewritten as another {' or '.join(endings)}, not {shown(str(place))}.")
     if os.path.realpath(source) == os.path.realpath(place):
         raise OptionError(f"{place} would overwrite the input; choose another name.")
     check_name(place)

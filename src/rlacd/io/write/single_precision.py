@@ -75,7 +75,7 @@ def required_hull(hull: Triangulated, name: str, where: str) -> tuple[Triangles,
         rounded = rounded_hull(hull, shift)
     if rounded is None:
         said = f"cannot write {name} {where}: it is too thin for single precision"
-        raise OutputError(f"{said}; scale the mesh, or write .obj, .ply or .stl, which are in double.")
+        raise OutputError(f"{said}; scale the mesh, or write .obj, .ply or .stl in double precision.")
     return rounded, shift
 
 
