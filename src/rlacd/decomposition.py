@@ -1,4 +1,4 @@
-"""The result of a decomposition: hulls, what they cost, and how to keep or look at them."""
+"""The result of a decomposition: hulls, their report, and how to save and show them."""
 
 from __future__ import annotations
 
@@ -77,7 +77,12 @@ class Decomposition(Result):
         ``seconds`` : dict
             Wall time of each stage, and their ``total``.
         ``repair`` : list of dict
-            For each body of the input, the step that made it a closed solid and how far that moved its surface.
+            For each body of the input, the step that changed it most and how far that moved its surface.
+        ``holes`` : list of dict
+            Those of bodies that have an inside, the most doubtful first: ``body`` in ``repair``, ``at_abs``,
+            ``width_abs`` and whether it was ``closed``.
+        ``nodes`` : list of dict
+            With the option `per_node`: each node's name (``node``), ``parts`` and ``scale``.
         ``provenance`` : list of dict
             For each hull, in the order of ``hulls``, what most of the surface inside it belongs to: ``node``, the name
             of the input's node, None if it has no scene; ``body``, its number in ``repair``. Also in

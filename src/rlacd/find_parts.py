@@ -1,6 +1,6 @@
 """From a mesh to the parts of its solid: repair, simplify, cut, merge, search, lift; to at most so many parts.
 
-Each stage returns the best so far when the run stops, and none sends the data back.
+Lift and limit cut again what fails; no other stage looks back.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ class _Decomposer:
     def at_most(self, most: int, free: list[Part], goal: Criterion) -> list[Part]:
         """The decomposition into at most so many parts whose largest error is least, among those under coarser goals.
 
-        `free` is that without a limit, which has more. The solid as one part remains where there is no time.
+        `free` is that without a limit, which has more. If there is no time, the solid stays one part.
         """
         run, whole, limited = self.run, self.model.solid, LimitedCriterion(goal, self.options.hull_limits)
         best, least = list[Part]([whole]), math.inf

@@ -18,7 +18,9 @@ import pytest
 import trimesh
 from click.testing import CliRunner, Result
 
+from rlacd.batch import find_assets
 from rlacd.cli.main import app
+from rlacd.io.read.load import FORMATS
 from tests.batch.trouble import make_trouble, tree, write_ell
 
 TIMES = "timings.jsonl"
@@ -206,6 +208,12 @@ def test_a_folder_of_robots_with_their_meshes_beside_them_takes_one_command(tmp_
         assert len(pybullet.getCollisionShapeData(body, -1)) == row["parts"] > 1
         assert len(pybullet.getVisualShapeData(body)) == 1
     pybullet.disconnect()
+
+
+def test_all_formats_that_are_read_are_meshes_of_a_batch(tmp_path: Path) -> None:
+    for ending in FORMATS:
+        (tmp_path / f"{ending}.{ending}").touch()
+    assert [asset.name for asset in find_assets(tmp_path)] == sorted(f"{ending}.{ending}" for ending in FORMATS)
 
 
 def test_a_dry_run_tells_and_writes_nothing(assets: Path, tmp_path: Path) -> None:

@@ -16,12 +16,11 @@ from typing import Literal
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import mesh_files
+from rlacd.io.read.load import FORMATS
 from rlacd.io.write.encode import GENERATOR
 from rlacd.io.write.folder import listed_hulls
 
-_MESHES = "obj stl ply off glb gltf vrm dae 3mf fbx step stp iges igs usd usda usdc usdz"
-
-ENDINGS = tuple(f".{ending}" for ending in _MESHES.split())
+ENDINGS = tuple(f".{ending}" for ending in FORMATS)
 """File endings that count as meshes, in upper or lower case."""
 
 ROBOTS = (".urdf", ".xml")

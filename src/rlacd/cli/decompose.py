@@ -26,8 +26,8 @@ IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
 """File formats that define the metre as their unit, or are read in metres whatever theirs is."""
 
 MESH = (
-    "The mesh: obj, stl, ply, off, glb, gltf, vrm, dae, 3mf, usd, fbx, step, iges. It need not be closed or clean. "
-    "Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced. - reads stdin."
+    "The mesh: obj, stl, ply, off, xyz, msh, glb, gltf, vrm, dae, zae, 3mf, usd, fbx, step, iges. It need not be "
+    "closed or clean. Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced. - reads stdin."
 )
 
 FROM = "What stdin holds, if IN is -: obj, stl, ...  [default: told from its content]"

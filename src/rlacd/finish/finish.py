@@ -47,7 +47,7 @@ class Finished(NamedTuple):
 
 
 def misses_some(reached: Reached, run: Run) -> bool:
-    """Whether a stop left parts that miss some of a small solid, as happens to one that crosses itself."""
+    """Whether a stop left parts that miss some of a small solid, as can happen where it crosses itself."""
     solid = reached.solid
     if run.stopped_by is None or not 0 < len(solid.faces) <= PLACES:
         return False
@@ -283,7 +283,7 @@ def within_reach(sides: FloatArray, hull: Hull, growth: float) -> FloatArray:
 
 
 def kept_within(part: Part, sides: FloatArray, criterion: Criterion) -> Part:
-    """Get the part without what its hull, that of a simpler copy of the solid, has beyond the half-spaces.
+    """Get the part with its hull cut back to the half-spaces: hulls made on a proxy may reach beyond them.
 
     The part stays as it is if nothing is beyond, or if it would no longer meet the criterion.
     """

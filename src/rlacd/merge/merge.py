@@ -51,7 +51,7 @@ def merge_parts(
     Parameters
     ----------
     parts : sequence of Part
-        Parts with disjoint interiors.
+        Parts; they may overlap where the solid was clipped.
     criterion : Criterion
         Every union meets it.
     run : Run

@@ -25,7 +25,7 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     Parameters
     ----------
     parts : sequence of Part
-        Parts with disjoint interiors.
+        Parts; they may overlap where the solid was clipped.
     suspects : sequence of Part, optional
         The parts that may be dropped; all by default.
 

@@ -184,7 +184,7 @@ class Model:
     solid : Component
     proxy : Proxy or None
     threshold : float
-        Of the criterion, which the proxy's deviation is a share of.
+        The criterion's; `_margin` relates the proxy's deviation to it.
     """
 
     solid: Component
@@ -213,9 +213,8 @@ class Model:
         return goal.scaled(factor - self._margin) if self.proxy is not None or factor != 1.0 else goal
 
     def lift(self, parts: list[Part], goal: Criterion, policy: Policy, run: Run, *, merge: bool) -> list[Part]:
-        """Carry parts of the model to the solid, where they meet the goal; nothing to do where it is the solid."""
-        if self.proxy is None:
-            return parts
+        """Carry parts of the model to the solid, where they meet the goal."""
+        assert self.proxy is not None
         with run.stage("lift"):
             lift = Lift(self.solid, self.proxy.deviation, goal, policy, run)
             parts = lift(parts, mend=run.stopped_by is None)

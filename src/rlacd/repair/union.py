@@ -26,9 +26,9 @@ _FLAT_MESH = 1e-11
 # Number of triangles united at once; the work may be stopped between batches.
 _MESHES_UNITED = 5 * MOST_UNITED
 
-# Pairs of crossing triangles, or corners of their arrangement, that are united at once; pairs after which solids are
-# not united exactly, and more per triangle: manifold3d takes about
-# 6 microseconds for each, and the unions of solids that cross themselves have ever more of them.
+# Crossing pairs, or corners of their arrangement, united at once. Solids with more pairs than this, plus so many per
+# triangle, are not united exactly: manifold3d takes about 6 microseconds for each, and unions of solids that cross
+# themselves have ever more of them.
 _MOST_CROSSINGS, _PER_TRIANGLE = 200_000, 5
 
 

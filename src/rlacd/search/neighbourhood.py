@@ -51,7 +51,7 @@ class SearchContext:
     Attributes
     ----------
     root : Component
-        The solid.
+        What is cut: the solid, or its proxy.
     criterion : Criterion
         Every new part meets it.
     seed : int

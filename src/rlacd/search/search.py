@@ -164,7 +164,7 @@ def search(
 def eliminate_parts(context: SearchContext, parts: Sequence[Part], run: Run) -> list[Part]:
     """Try once to redistribute each part to the parts around it; parts that cannot go stay.
 
-    This is the only search inside a pass, and only used where it is quick: where hulls are tested against balls.
+    With `fast` it is the only search, for criteria that ask for it (`Criterion.eliminates`).
     """
     state = Neighbourhood(replace(context, scores=()), parts, run)
     state.redistribute_all()

@@ -216,7 +216,7 @@ class Component(Part):
     solid : Shape
         The solid, in the normalised frame; not flat. A surface [V, 3], [F, 3] has to be closed and oriented.
     threads : int
-        Number of threads that may prepare the tests of how well hulls are filled.
+        Threads that prepare `filling`.
 
     Raises
     ------

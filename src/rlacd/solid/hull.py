@@ -91,7 +91,6 @@ def limit_hull(
     tolerance : float
         Removing nearly redundant corners and facets, which is always done, moves no point of the result farther than
         this from the hull.
-
     sides : FloatArray
         Half-spaces n.x <= d that hold the hull, rows of unit n and d [P, 4]. The result stays in them, unless the
         limits leave no such hull.

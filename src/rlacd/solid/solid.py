@@ -27,7 +27,7 @@ class BodyRepair:
     body
         Number of the body, by its first face in the input.
     step
-        The last step it needed, one of `rlacd.repair.state.STEPS`.
+        The step that changed it most, one of `rlacd.repair.state.STEPS`.
     faces_in, faces_out
         Triangles before and after; a body joined to others counts its share before the union.
     deviation
@@ -96,7 +96,7 @@ class Solid:
     holes
         The holes of bodies that have an inside, the most doubtful first.
     body_of
-        ``[F]``, the body of each face of the surface; None if there is only one.
+        ``[F]``, the body of each face of the surface; None if the solid did not go through the steps.
     is_as_given
         Whether the shape is the surface, in another order.
     index

@@ -49,7 +49,7 @@ def read_file(path: str | os.PathLike[str], most: int = LARGEST_FILE) -> bytes:
 
 
 def read_named(path: Path, most: int = LARGEST_FILE, name: str | None = None) -> bytes:
-    """Do the same for a file that a user or a file names; raises MeshFileError."""
+    """Read a file that a user or another file names, as `read_file` does; raises MeshFileError."""
     try:
         return read_file(path, most)
     except FileNotFoundError as error:

@@ -37,7 +37,7 @@ def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> Int
 
 
 def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArray:
-    """The triangles of `triangles_of` as places in ``corners``. Raises ValueError where one has no point."""
+    """The triangles of `triangles_of` as places in ``corners``. Raises ValueError if a corner refers to no point."""
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
     if (counts == 3).all():
