@@ -92,7 +92,7 @@ def _() -> bytes:
     return threemf(model(f'<object id="1">{MESH}</object>{doubled}', '<item objectid="41"/>'))
 
 
-@refused("a part of itself.3mf", "itself")
+@refused("a part of itself.3mf", "inside parts")
 def _() -> bytes:
     ring = '<object id="2"><components><component objectid="3"/></components></object>'
     ring += '<object id="3"><components><component objectid="2"/><component objectid="1"/></components></object>'

@@ -93,7 +93,7 @@ def _() -> bytes:
     return collada(nodes=nodes, scene='<node id="n"><instance_node url="#n0"/></node>')
 
 
-@refused("a node in itself.dae", "in itself")
+@refused("a node in itself.dae", "inside parts")
 def _() -> bytes:
     nodes = '<node id="a"><instance_node url="#b"/></node><node id="b"><instance_node url="#a"/></node>'
     return collada(nodes=nodes, scene='<node id="n"><instance_node url="#a"/></node>')
