@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,7 +121,7 @@ class Lift:
             return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
 
     def _tested(self, lifted: list[_Lifted]) -> list[Part]:
-        """Clip the solid to the hulls, and cut it there where one fails, until all meet the goal."""
+        """Clip the solid to the hulls, and cut it there where one fails, until none is left to cut (see `_failing`)."""
         self._clip(lifted)
         while failing := self._failing(lifted):
             for i in reversed(failing):
@@ -134,8 +134,9 @@ class Lift:
         """Cut a part of the solid; the second time with room for its pieces' hulls to grow."""
         part, tighter = failing.on_solid, 1 - failing.cuts * MARGIN * self.deviation / self.goal.overhang
         tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
-        new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts or [part]
-        return [_Lifted(part.hull, part, is_met=True, cuts=failing.cuts + 1) for part in new]
+        new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
+        cuts = failing.cuts + 1
+        return [_Lifted(part.hull, part, True, cuts) for part in new] or [replace(failing, cuts=cuts)]
 
     def confirmed(self, hull: Hull) -> Part | None:
         """Get what the solid fills of a hull; None if it does not meet the goal."""
