@@ -160,3 +160,44 @@ def test_a_share_and_a_radius_are_told_apart() -> None:
         rlacd.decompose(trimesh.creation.box(), keep_open_abs=0.001)
     with pytest.raises(OptionError, match="keep_open_abs, a radius"):
         rlacd.decompose(trimesh.creation.box(), keep_open=0.9, keep_open_abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.promise("keep-open")
+@pytest.mark.parametrize("shape", ["peg_hole", "plate_hole", "carrier"])
+def test_a_peg_falls_through_its_hole_in_mujoco_and_jams_without(shape: str) -> None:
+    """As wide as 0.95 of the hole; it falls freely and starts 1 mm above."""
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    holes: dict[str, tuple[Manifold, float, list[tuple[float, float]]]] = {
+        "peg_hole": (Manifold.cube((60, 60, 30), True) - bore(10, 0, 0, 128).scale((1, 1, 10)), 10, [(0, 0)]),
+        "plate_hole": (Manifold.cube((100, 60, 10), True) - bore(10, 0, 0).scale((1, 1, 10)), 10, [(0, 0)]),
+        "carrier": (Manifold.cube((120, 80, 40), True), 12, [(x, y) for x in (-30, 30) for y in (-18, 18)]),
+    }
+    solid, radius, places = holes[shape]
+    if shape == "carrier":
+        for x, y in places:
+            solid -= bore(12, x, y).scale((1, 1, 20))
+    mesh = trimesh_of(solid).apply_scale(1e-3)
+
+    def fallen(result: rlacd.Decomposition) -> list[bool]:
+        top = mesh.bounds[1, 2]
+        size, start = 0.95e-3 * radius, top + 1e-3
+        geoms = "".join(f'<geom type="mesh" mesh="h{i}" friction="0.1"/>' for i in range(len(result.hulls)))
+        assets = "".join(
+            f'<mesh name="h{i}" vertex="{" ".join(f"{v:.9g}" for v in np.asarray(hull.vertices).ravel())}"/>'
+            for i, hull in enumerate(result.hulls)
+        )
+        pegs = "".join(
+            f'<body pos="{x * 1e-3} {y * 1e-3} {start + 1.1 * size}"><freejoint/>'
+            f'<geom type="cylinder" size="{size} {1.0 * size}" friction="0.1" mass="0.1"/></body>'
+            for x, y in places
+        )
+        model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><option timestep="0.0005"/><asset>{assets}</asset><worldbody>{geoms}{pegs}</worldbody></mujoco>'
+        )
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 1000)
+        return [bool(data.qpos[7 * i + 2] < mesh.bounds[0, 2] - size) for i in range(len(places))]
+
+    assert not any(fallen(rlacd.decompose(mesh, quality="fast", threads=1)))
+    assert all(fallen(rlacd.decompose(mesh, keep_open=0.97, quality="fast", threads=1)))
