@@ -57,7 +57,7 @@ pictures: $(VENV)/test-extras
 	$(BIN)/python examples/pictures.py docs $(MESHES)
 
 # The first table of docs/benchmarks.md, of the meshes that quick.txt of the folder lists, or of all if there is none.
-# CoACD takes most of an hour; a run that was stopped goes on.
+# CoACD takes most of the half hour; a run that was stopped goes on.
 benchmarks: $(VENV)/bench
 	$(BIN)/python -m benchmarks compare $(MESHES) $(addprefix --list ,$(wildcard $(MESHES)/quick.txt)) \
 	  --out build/benchmarks

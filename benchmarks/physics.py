@@ -22,8 +22,10 @@ from benchmarks.simulate import (
     STEP,
     drops_in_mujoco,
     get_mujoco,
+    get_warp,
     model_size,
     pile_in_mujoco,
+    pile_in_warp,
     scaled_source,
 )
 from benchmarks.store import Row, Task, load_hulls
@@ -40,8 +42,10 @@ ONE_HULL = "fast:max_hulls=1"
 METHODS = f"{ONE_HULL},fast,default,fast:max_vertices=16,fast:primitives=true,coacd,vhacd"
 
 
-def _check(methods: str, **_: object) -> None:
+def _check(methods: str, worlds: int | None, **_: object) -> None:
     get_mujoco()
+    if worlds:
+        get_warp()
     for name in words(methods):
         make_method(name) if name in OTHERS else rlacd_options(name)
 
@@ -49,7 +53,8 @@ def _check(methods: str, **_: object) -> None:
 @experiment(_check)
 @click.option("--methods", default=METHODS, show_default=True, help="coacd, vhacd, and rlacd as for compare.")
 @click.option("--piles", default=1, type=click.IntRange(1), help="Piles of each object, turned differently.")
-def app(bench: Bench, methods: str, piles: int) -> Page:
+@click.option("--worlds", type=click.IntRange(1), help="The pile in so many worlds at once too, in MuJoCo Warp.")
+def app(bench: Bench, methods: str, piles: int, worlds: int | None) -> Page:
     """Simulate the hulls in MuJoCo: a pile, and balls dropped into every hole; needs rlacd[sim].
 
     \b
@@ -60,8 +65,9 @@ def app(bench: Bench, methods: str, piles: int) -> Page:
         for way, result, cpu in _decompositions(bench, mesh, list(groups)):
             row: Row = {"mesh": mesh}
             try:
-                row |= {"error": result} if isinstance(result, str) else {**_simulated(result, piles), "cpu": cpu}
-            except (RlacdError, ValueError) as error:
+                row |= {"error": result} if isinstance(result, str) else _simulated(result, piles, worlds)
+                row["cpu"] = cpu
+            except (RlacdError, ValueError, RuntimeError) as error:
                 row["error"] = " ".join(str(error).split())[:200]
             groups[way].append(row)
             bench.say(f"{way}: {row}")
@@ -94,7 +100,7 @@ def _decompositions(bench: Bench, mesh: str, ways: Sequence[str]) -> Iterator[tu
         yield way, Result(shapes, {"name": "mesh", "mass": mass}, source), row["cpu"]
 
 
-def _simulated(result: Result, piles: int) -> Row:
+def _simulated(result: Result, piles: int, worlds: int | None) -> Row:
     rates, contacts = zip(*(pile_in_mujoco(result, seed) for seed in range(piles)), strict=True)
     return {
         "parts": len(result),
@@ -106,6 +112,7 @@ def _simulated(result: Result, piles: int) -> Row:
         **asdict(drops_in_mujoco(result)),
         "rate": statistics.geometric_mean(rates),
         "contacts": statistics.fmean(contacts),
+        **({"warp": pile_in_warp(result, worlds)} if worlds else {}),
     }
 
 
@@ -147,6 +154,14 @@ def _column(rows: list[Row], first: list[Row]) -> dict[str, str]:
         "steps/s": f"{statistics.geometric_mean(row['rate'] for row in rows):.0f}",
         "steps/s, ratio": ratio_of(rows, first, "rate"),
         "contacts": f"{mean(rows, 'contacts'):.0f}",
+        **(_in_warp(rows, first) if "warp" in rows[0] else {}),
+    }
+
+
+def _in_warp(rows: list[Row], first: list[Row]) -> dict[str, str]:
+    return {
+        "MuJoCo Warp, steps/s": f"{statistics.geometric_mean(row['warp'] for row in rows):,.0f}",
+        "MuJoCo Warp, ratio": ratio_of(rows, first, "warp"),
     }
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,12 @@ SIZE = 0.2
 """Longest side of every object in metres; simulators are tuned for things that a hand can hold."""
 
 COPIES, SECONDS, STEP = 20, 2.5, 0.002
+
+WARP_STEPS = 100
+"""Steps that are timed in MuJoCo Warp."""
+
+PAIRS = 3000
+"""Room in each world for pairs of hulls whose boxes meet."""
 
 BIN = 1.6
 """Half the width of the bin that the pile falls into, in longest sides."""
@@ -88,6 +96,58 @@ def pile_in_mujoco(result: Result, seed: int = 0) -> tuple[float, float]:
         Mean number of contacts per step, over the last second.
     """
     mujoco = get_mujoco()
+    model = _pile(result, seed)
+    data = mujoco.MjData(model)
+    steps = round(SECONDS / STEP)
+    contacts = np.zeros(steps)
+    began = time.process_time()
+    for step in range(steps):
+        mujoco.mj_step(model, data)
+        contacts[step] = data.ncon
+    return steps / (time.process_time() - began), float(contacts[-round(1 / STEP) :].mean())
+
+
+def pile_in_warp(result: Result, worlds: int, seed: int = 0) -> float:
+    """Time the same pile once it lies, in many worlds at once, in MuJoCo Warp; on a GPU if there is one.
+
+    Returns
+    -------
+    steps_per_second : float
+        Steps of all worlds together, per second of wall time.
+
+    Raises
+    ------
+    RuntimeError
+        A world has more contacts than there was room for, so that it is not what MuJoCo simulates.
+    """
+    mujoco, (warp, mujoco_warp) = get_mujoco(), get_warp()
+    model = _pile(result, seed)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, round((SECONDS - 0.5) / STEP))
+    most = 8 * data.ncon + 200  # four rows a contact, and as much again
+    there = mujoco_warp.put_model(model)
+    now = mujoco_warp.put_data(model, data, nworld=worlds, nconmax=PAIRS, njmax=most)
+    for _ in range(3):  # compiles the kernels
+        mujoco_warp.step(there, now)
+    step: Callable[[], None] = partial(mujoco_warp.step, there, now)
+    if warp.is_cuda_available():
+        with warp.ScopedCapture() as capture:
+            step()
+        step = partial(warp.capture_launch, capture.graph)
+    warp.synchronize()
+    began = time.perf_counter()
+    for _ in range(WARP_STEPS):
+        step()
+    warp.synchronize()
+    spent = time.perf_counter() - began
+    if now.nefc.numpy().max() >= most or now.ncollision.numpy().max() >= PAIRS * worlds:
+        raise RuntimeError("MuJoCo Warp had no room for all contacts; raise PAIRS.")
+    return worlds * WARP_STEPS / spent
+
+
+def _pile(result: Result, seed: int) -> Any:
+    """MuJoCo's model of copies above a bin, each turned by the seed."""
+    mujoco = get_mujoco()
     random = np.random.default_rng(seed)
     places = [(x, y, 1.0 + 1.2 * z) for z in range(COPIES) for x in (-0.7, 0.7) for y in (-0.7, 0.7)][:COPIES]
     spec = mujoco.MjSpec()
@@ -101,15 +161,7 @@ def pile_in_mujoco(result: Result, seed: int = 0) -> tuple[float, float]:
             at = [-BIN * SIZE * x * (normal[2] == 0) for x in normal]
             plane = mujoco.mjtGeom.mjGEOM_PLANE
             spec.worldbody.add_geom(type=plane, size=[9, 9, 1], pos=at, zaxis=normal)
-        model = spec.compile()
-    data = mujoco.MjData(model)
-    steps = round(SECONDS / STEP)
-    contacts = np.zeros(steps)
-    began = time.process_time()
-    for step in range(steps):
-        mujoco.mj_step(model, data)
-        contacts[step] = data.ncon
-    return steps / (time.process_time() - began), float(contacts[-round(1 / STEP) :].mean())
+        return spec.compile()
 
 
 def drops_in_mujoco(result: Result) -> Drops:
@@ -200,3 +252,14 @@ def get_mujoco() -> Any:
     except ImportError as error:
         raise MissingExtraError("MuJoCo is missing: run  pip install 'rlacd[sim]'  and try again.") from error
     return mujoco
+
+
+def get_warp() -> tuple[Any, Any]:
+    """Import Warp and MuJoCo Warp, or say how to install them."""
+    try:
+        import mujoco_warp
+        import warp
+    except ImportError as error:
+        raise MissingExtraError("MuJoCo Warp is missing: run  pip install mujoco-warp  and try again.") from error
+    warp.config.quiet = True
+    return warp, mujoco_warp
