@@ -24,7 +24,7 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
 
-from rlacd.learn.encoders import PublishedEncoder
+from rlacd.learn.encoders import PublishedEncoder, pick_device
 from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, Sizes, seen_below
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
 from rlacd.learn.options import TrainOptions
@@ -309,3 +309,17 @@ def test_the_paper_preset_sees_what_the_paper_sees() -> None:
     widths = [layer.out_features for layer in network.layers if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
     assert network.layers[0].in_features == 384 + 384
+
+
+def test_a_gpu_is_taken_where_it_pays_or_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    chosen = {
+        (encoder, device): pick_device(TrainOptions(encoder=encoder, device=device)).type
+        for encoder in ("sweep", "i2p-mae")
+        for device in ("auto", "cpu", "cuda")
+    }
+    assert {pair for pair, device in chosen.items() if device == "cuda"} == {
+        ("sweep", "cuda"),
+        ("i2p-mae", "auto"),
+        ("i2p-mae", "cuda"),
+    }

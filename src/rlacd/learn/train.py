@@ -108,7 +108,7 @@ class Training:
     ) -> None:
         self.folder, self.options, self.rollouts, self.validation, self.say = folder, options, rollouts, validation, say
         self.encoder = make_encoder(options)
-        self.device = pick_device(options.device)
+        self.device = pick_device(options)
         torch.manual_seed(options.seed)
         self.network = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)
         self.target = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)

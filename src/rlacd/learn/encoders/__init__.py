@@ -81,21 +81,24 @@ def make_encoder(options: TrainOptions) -> Encoder:
         if not weights:
             how = f"give --encoder-weights FILE, the pre-trained checkpoint that {PUBLISHED} links to"
             raise OptionError(f"encoder i2p-mae needs weights: {how}, or use --encoder sweep, which needs none.")
-        network = I2PMAEEncoder.from_checkpoint(Path(weights)).to(pick_device(options.device))
+        network = I2PMAEEncoder.from_checkpoint(Path(weights)).to(pick_device(options))
         return PublishedEncoder(network, options.points)
     if weights:
         raise OptionError(f"encoder {options.encoder} takes no weights; leave --encoder-weights out, or use i2p-mae.")
     return SweepEncoder(options.threshold)
 
 
-def pick_device(name: str) -> torch.device:
-    """Get the device for ``cpu``, ``cuda`` or ``auto``: a GPU when there is one.
+def pick_device(options: TrainOptions) -> torch.device:
+    """Get the device that the options ask for.
 
     Raises
     ------
     OptionError
         A GPU is requested and there is none.
     """
-    if name == "cuda" and not torch.cuda.is_available():
+    has_gpu = torch.cuda.is_available()
+    if options.device == "cuda" and not has_gpu:
         raise OptionError("device is 'cuda', but torch finds no GPU; use cpu, or install torch for CUDA.")
-    return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
+    if options.device == "auto":  # the network of sweep is so small that it learns as fast on the CPU
+        return torch.device("cuda" if has_gpu and options.encoder == "i2p-mae" else "cpu")
+    return torch.device(options.device)
