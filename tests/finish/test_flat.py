@@ -16,7 +16,8 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
-from tests.shapes import box
+from tests.bounded import bounded
+from tests.shapes import box, trimesh_of
 
 DEEP = 1e-4
 """How far hulls may reach through the ground (the longest side is 2)."""
@@ -25,6 +26,18 @@ DEEP = 1e-4
 def test_a_box_rests_on_every_side_and_a_sphere_on_none() -> None:
     assert len(resting_sides(Component(box((-1, -1, -0.2), (1, 1, 0.2))))) == 6
     assert len(resting_sides(Component(Manifold.sphere(1.0, 64)))) == 0
+
+
+def _of_a_fine_ball() -> tuple[int, int]:
+    ball = Manifold.sphere(1.0, 400)  # 80,000 triangles
+    stopped = rlacd.decompose(trimesh_of(ball), timeout=0.01, threads=1)
+    return len(resting_sides(Component(ball))), len(stopped)
+
+
+@pytest.mark.slow
+def test_a_fine_ball_takes_no_more_time_than_its_number_of_facets_asks_for() -> None:
+    """Pairs of its facets or corners would take minutes."""
+    assert bounded(_of_a_fine_ball, seconds=20) == (0, 1)
 
 
 def test_it_does_not_rest_where_its_centre_of_mass_is_not_above() -> None:

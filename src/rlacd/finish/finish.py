@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import trimesh
 
 from rlacd import _native
@@ -33,6 +34,7 @@ from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps, limit_
 from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
+from rlacd.solid.topology import Edges
 
 LARGEST = float(np.finfo(np.float64).max)
 """The largest coordinate."""
@@ -172,12 +174,13 @@ def in_input(hull: Hull, frame: Frame, limits: HullLimits = NO_LIMITS) -> trimes
 def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
     """Get the part with the hull that `in_input` made of its own, in the frame: what has to be measured.
 
-    The same part if no vertex moved by more than `TOLERANCE`, as always unless the coordinates resolve little.
+    The same part if no vertex is farther than `TOLERANCE` from its own hull, as always unless the coordinates resolve
+    little.
     """
     points = frame.to_frame(there.vertices)
     if part.hull.primitive is not None or np.abs(points).max() > LARGEST_COORDINATE:
         return part
-    if all(np.abs(part.hull.vertices - point).max(axis=1).min() <= TOLERANCE for point in points):
+    if _native.Surface(part.hull.vertices, part.hull.faces).distance(points).max() <= TOLERANCE:
         return part
     hull = Hull.of(points)
     return part if hull is None else part.with_hull(hull)
@@ -263,8 +266,10 @@ def resting_sides(solid: Component) -> FloatArray:
     areas = np.sqrt(dots(normals, normals))
     outwards = np.cross(edges, normals[:, None])
     below = (dots(outwards, centre - corners) <= 0).all(axis=1)  # whether the centre is in each facet's prism
+    patch = _flat_patches(hull, normals, areas)
+    is_large = np.bincount(patch, areas)[patch] >= SIDE_AREA * areas.sum()
     sides, seen = [], areas == 0
-    for face in np.flatnonzero(below):
+    for face in np.flatnonzero(below & is_large):
         if seen[face]:
             continue
         normal = normals[face] / areas[face]
@@ -274,6 +279,20 @@ def resting_sides(solid: Component) -> FloatArray:
         if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
             sides.append([*normal, offset + TOLERANCE])
     return np.array(sides).reshape(-1, 4)
+
+
+def _flat_patches(hull: Hull, normals: FloatArray, areas: FloatArray) -> npt.NDArray[np.int64]:
+    """Number the patches [F] of facets across whose edges the hull is flat, whichever of the two facets is asked."""
+    faces = hull.faces.astype(np.int64)
+    halfedges = Edges.of(faces, len(hull.vertices)).halfedges
+    face, opposite = halfedges // 3, faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]
+    depth = [
+        dots(hull.vertices[far] - hull.vertices[faces[near, 0]], normals[near]) + TOLERANCE * areas[near]
+        for near, far in zip(face, opposite[::-1], strict=True)
+    ]
+    is_flat = np.maximum(*depth) >= 0
+    _, patch = _native.components(len(faces), *(np.ascontiguousarray(each[is_flat]) for each in face))
+    return patch
 
 
 def within_reach(sides: FloatArray, hull: Hull, growth: float) -> FloatArray:
