@@ -19,6 +19,10 @@ constexpr double kFlat = 1e-9;
 // A collapse whose point is farther away than this (the hull is about 2 wide) adds too much volume to be useful.
 constexpr double kReach = 50;
 
+// Beside a corner with more facets than this, diagonals of flat sides are not collapsed: each of the many would have to
+// be planned anew, for all of these facets, whenever one edge of such a side is.
+constexpr std::size_t kManyFacets = 200;
+
 // A facet with less area than this share of a square on its longest side has no usable normal.
 constexpr double kSliver = 1e-6;
 
@@ -247,7 +251,10 @@ void ConvexCollapse::apply(const Collapse& collapse) {
     ++version_[edge.from];
     reach_[edge.from] = kUnknown;
   }
-  for (const HorizonEdge& edge : ring) schedule(edge.from, apex);
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Facet &left = facets_[fan[i]], &right = facets_[fan[(i + ring.size() - 1) % ring.size()]];
+    if (ring.size() <= kManyFacets || dot(left.normal, right.normal) < 1 - kFlat) schedule(ring[i].from, apex);
+  }
 }
 
 }  // namespace rlacd

@@ -270,6 +270,7 @@ def resting_sides(solid: Component) -> FloatArray:
     is_large = np.bincount(patch, areas)[patch] >= SIDE_AREA * areas.sum()
     sides, seen = [], areas == 0
     for face in np.flatnonzero(below & is_large):
+        _native.poll_stop()
         if seen[face]:
             continue
         normal = normals[face] / areas[face]

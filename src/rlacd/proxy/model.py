@@ -64,15 +64,15 @@ class _Lifted:
         assert self.part is not None, "clipped first"
         return self.part
 
-    def grow(self, points: FloatArray) -> None:
-        """Take in points.
+    def grow(self, points: FloatArray, simple: bool) -> None:
+        """Take in points, with a `simple` hull if there is time.
 
         A part that was cut on the solid stays what it is, without the slivers that were left out, and its hull is not
         simplified: there may be no room for it below the threshold.
         """
         grown = Hull.of(np.concatenate([self.hull.vertices, points]))
         assert grown is not None, "a hull stays solid when it grows"
-        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.cuts else SIMPLE_FIRST / 2)
+        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.cuts else SIMPLE_FIRST / 2) if simple else grown
         self.part = self.part.with_hull(self.hull) if self.cuts and self.part is not None else None
         self.is_met = False
 
@@ -110,15 +110,22 @@ class Lift:
         mend : bool
             Cut parts again if they meet their criterion on the proxy only.
         """
-        with self.run.shielded():
+        covering: list[Hull] = []
+        try:
             lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
             self._cover(lifted)
-            hulls = [each.hull for each in lifted]
-        try:
-            return self._tested(lifted) if mend else self.run.map(self._clipped, hulls)
+            covering = [each.hull for each in lifted]
+            return self._tested(lifted) if mend else self.run.map(self._clipped, covering)
         except Stopped:
             self.run.note_stop()
-            return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)]
+        with self.run.shielded():
+            return [part.with_hull(hull) for part, hull in zip(parts, covering or self._covering(parts), strict=True)]
+
+    def _covering(self, parts: Sequence[Part]) -> list[Hull]:
+        """Get hulls that cover the solid, without the time to simplify them."""
+        lifted = [_Lifted(part.hull) for part in parts]
+        self._cover(lifted, simple=False)
+        return [each.hull for each in lifted]
 
     def _tested(self, lifted: list[_Lifted]) -> list[Part]:
         """Clip the solid to the hulls, and cut it there where one fails, until none is left to cut (see `_failing`)."""
@@ -143,7 +150,7 @@ class Lift:
         part = self._clipped(hull)
         return part if self.goal.is_met(part) else None
 
-    def _cover(self, lifted: Sequence[_Lifted]) -> None:
+    def _cover(self, lifted: Sequence[_Lifted], simple: bool = True) -> None:
         """Grow hulls where necessary to cover the solid's surface; those that need not grow stay the same."""
         points = self.solid.filling.uncovered(
             [each.hull.vertices for each in lifted],
@@ -154,7 +161,7 @@ class Lift:
         )
         for each, own in zip(lifted, points, strict=True):
             if len(own):
-                each.grow(own)
+                each.grow(own, simple)
 
     def _clip(self, lifted: Sequence[_Lifted]) -> None:
         """Get what the solid fills of hulls that have changed."""
