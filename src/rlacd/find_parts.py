@@ -209,8 +209,8 @@ class _Decomposer:
     ) -> tuple[list[Part], SearchSummary | None]:
         """The parts after the search of the quality level and its summary; `asked` is the solid's unscaled goal."""
         options, run, found = self.options, self.run, None
-        policy = options.policy if isinstance(options.policy, str) else ""
-        context = SearchContext(self.model.component, goal, options.seed, self.sweeps)
+        policy = options.first_policy if isinstance(options.first_policy, str) else ""
+        context = SearchContext(self.model.component, goal, options.seed, self.sweeps, first=policy)
         given = options.quality, options.budget, options.search_steps
         quality, seconds, steps = given if asked is not None else ("balanced", None, None)
         assert quality is not None, "filled in by the options"
@@ -233,7 +233,7 @@ class _Decomposer:
                     bound = run.start(partial(at_least, self.model.solid, parts, asked.overhang, run))
                     enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
                     context = replace(context, enough=enough)
-                parts, found = search(context, merged, run, quality, seconds, steps, policy)
+                parts, found = search(context, merged, run, quality, seconds, steps)
                 if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
                     parts = min(parts, eliminate_parts(context, merged, run), key=cost)
         except Stopped:

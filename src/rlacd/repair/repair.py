@@ -22,7 +22,6 @@ from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes, may_have_holes
 from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
-from rlacd.repair.state import STEPS as NAMES
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
@@ -81,7 +80,7 @@ def _is_nothing(state: State) -> bool:
 def _take_hull(state: State) -> None:
     """Take the convex hull of all points."""
     state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
-    state.step[:] = NAMES.index("hull")
+    state.note(np.arange(state.bodies), "hull")
     state.solid = hull_of_points(state.surface.vertices)
     state.parts = [Piece(state.solid, 0)]
 
