@@ -90,6 +90,23 @@ inline void append(Mesh& out, const Mesh& other) {
   for (const Triangle& f : other.faces) out.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
 }
 
+// Appends the vertices that are asked for to others, in that order, and gets their numbers there.
+class Renumbered {
+ public:
+  Renumbered(const std::vector<Vec3>& from, std::vector<Vec3>& to) : from_(from), to_(to), number_(from.size(), -1) {}
+  std::int32_t operator()(std::int32_t vertex) {
+    std::int32_t& number = number_[vertex];
+    if (number < 0) number = static_cast<std::int32_t>(to_.size()), to_.push_back(from_[vertex]);
+    return number;
+  }
+  Triangle operator()(const Triangle& f) { return {(*this)(f[0]), (*this)(f[1]), (*this)(f[2])}; }
+
+ private:
+  const std::vector<Vec3>& from_;
+  std::vector<Vec3>& to_;
+  std::vector<std::int32_t> number_;
+};
+
 struct Box {
   Vec3 lower{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
              std::numeric_limits<double>::infinity()};
@@ -135,10 +152,12 @@ inline Box box_of_faces(const Mesh& mesh) {
   return box;
 }
 
-struct HalfSpace {  // normal . x <= offset
+struct Plane {  // normal . x = offset
   Vec3 normal;
   double offset;
+  double depth(Vec3 p) const { return offset - dot(normal, p); }  // below it
 };
+using HalfSpace = Plane;  // what lies below it: normal . x <= offset
 
 // How far a box reaches from its middle along a direction, given half its extents.
 inline double reach_along(Vec3 n, Vec3 half) {

@@ -50,10 +50,6 @@ double noise(std::uint64_t i) {
   return static_cast<double>((i ^ (i >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-std::uint64_t directed(std::int32_t from, std::int32_t to) {
-  return static_cast<std::uint64_t>(from) << 32 | static_cast<std::uint32_t>(to);
-}
-
 // The edges of the rims, edge i from corner i of the rims to the next, and what becomes of them.
 //
 // Nodes are the corners and after them each crossing twice: node n + 2k is crossing k on the first of its edges, node

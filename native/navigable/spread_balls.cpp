@@ -358,7 +358,7 @@ std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
   const Box& box = hull.box();
   const std::size_t count = candidates != nullptr ? candidates->size() : balls.centres.size();
   for (std::size_t i = 0; i < count; ++i) {
-    if (i % kChunk == 0) poll_stop();
+    poll_stop(i);
     const std::int32_t ball = candidates != nullptr ? (*candidates)[i] : static_cast<std::int32_t>(i);
     const Vec3 c = balls.centres[ball];
     const double radius = balls.radii[ball], enough = radius - least;

@@ -37,12 +37,12 @@ from rlacd.repair.wraps import (
     wrap_all,
     wrap_sheets,
 )
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import NO_FILM, BoolArray, IntArray, bodies_of, compacted, detach_films
+from rlacd.solid.topology import NO_FILM, bodies_of, compacted, detach_films
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
@@ -207,7 +207,7 @@ def _take_steps(state: State) -> None:
             step(state)
 
 
-def _is_inside(vertices: FloatArray, faces: IntArray, film: BoolArray, threads: int | None) -> BoolArray:
+def _is_inside(vertices: FloatArray, faces: Int64Array, film: BoolArray, threads: int | None) -> BoolArray:
     """Return ``[F]`` which films lie inside the other faces: where two bodies touch."""
     inside = film.copy()
     if film.any():

@@ -17,9 +17,10 @@ from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, sha
 from rlacd.repair.soup import Soup, no_faces
 from rlacd.repair.union import size_of, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
+from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.solid import BodyRepair, Hole, Shape, Solid
-from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, marked
+from rlacd.solid.topology import Edges, bodies_of, marked
 
 OUTCOMES = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
 """The steps that may have changed a body most, from the least change to the most."""
@@ -131,7 +132,7 @@ class State:
             self._asked = self.solid, query_of(self.solid, self.surface.threads)
         return self._asked[1]
 
-    def note(self, bodies: IntArray, step: str) -> None:
+    def note(self, bodies: Int64Array, step: str) -> None:
         """Record a step; a body keeps the one that changes it most."""
         noted = marked(bodies, self.bodies)
         self.step[noted] = np.maximum(self.step[noted], OUTCOMES.index(step))
@@ -198,7 +199,7 @@ class State:
         return self._frame.place(point, body if self.bodies > 1 else None)
 
 
-def measure(state: State) -> IntArray:
+def measure(state: State) -> Int64Array:
     """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
     surface, solid = state.surface, state.query()
     if state.step.max() < OUTCOMES.index("outer skin"):

@@ -23,7 +23,7 @@ from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
 from rlacd.planes.sweep import SweepCache
-from rlacd.policies import Greedy
+from rlacd.policies import Greedy, Policy
 from rlacd.run import Begun, Run
 from rlacd.search.operators import Exchange, recut, redistribute
 from rlacd.search.part_graph import Cluster, PartGraph
@@ -58,7 +58,7 @@ class SearchContext:
         Sweeps of the solid's components, including those of the first pass.
     scores : sequence of str
         Of the greedy policies that cut neighbourhoods and, if time allows, make further passes over the whole solid.
-    first : str
+    first_policy : str or Policy
         The policy of the first pass, which is not repeated: ``greedy`` has the first of the scores.
     enough : callable
         Returns the least number of parts of any decomposition: the search ends there. May wait for that.
@@ -71,7 +71,7 @@ class SearchContext:
     seed: int = 0
     sweeps: SweepCache = field(default_factory=SweepCache)
     scores: Sequence[str] = PORTFOLIO
-    first: str = "greedy"
+    first_policy: str | Policy = "greedy"
     enough: Callable[[], int] = lambda: 1
     near_sweeps: SweepCache = field(default_factory=lambda: SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES))
 

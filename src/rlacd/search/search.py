@@ -130,7 +130,7 @@ def search(
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
     elif steps is not None and seconds is None:
         allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
-    others = context.scores[1:] if context.first == "greedy" else context.scores
+    others = context.scores[1:] if context.first_policy == "greedy" else context.scores
     state = _Search(context, others, run, first_pass, a_pass, HOPELESS * len(parts))
     if bounded:
         with run.limited(allowed):
