@@ -71,6 +71,14 @@ inline Corners corners_of(const Mesh& mesh, const Triangle& face) {
 inline Vec3 long_normal(const Corners& t) { return cross(t[1] - t[0], t[2] - t[0]); }
 inline Vec3 long_normal(const Mesh& mesh, const Triangle& face) { return long_normal(corners_of(mesh, face)); }
 
+// Normal to a flat polygon, twice as long as its area.
+inline Vec3 polygon_normal(const std::vector<Vec3>& corners) {
+  Vec3 doubled;
+  for (std::size_t i = 2; i < corners.size(); ++i)
+    doubled = doubled + cross(corners[i - 1] - corners[0], corners[i] - corners[0]);
+  return doubled;
+}
+
 // The side from corner k to the next that is longest, the first of several.
 inline int longest_side(const Corners& t) {
   int longest = 0;

@@ -272,7 +272,7 @@ Outlines outlines_of(const std::vector<Vec3>& vertices, const Rims& rims, Vec3 o
   return outlines;
 }
 
-// The vertex at each corner, and the corner as a point of the plane.
+// What there is at the corners of all loops: their vertices, or points of the plane.
 template <class Item>
 std::vector<Item> joined(const std::vector<std::vector<Item>>& loops) {
   std::vector<Item> all;
