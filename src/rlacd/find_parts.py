@@ -141,8 +141,7 @@ class _Decomposer:
             if self.model.proxy is None:
                 return parts, done.criterion, found
             policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
-            scaled = goal if factor == 1.0 else goal.scaled(factor)
-            return self.model.lift(parts, scaled, policy, self.run, merge=self.options.merge), goal, found
+            return self.model.lift(parts, goal, factor, policy, self.run, merge=self.options.merge), goal, found
 
     def keeps(self, most: int, parts: list[Part]) -> bool:
         """Whether there are at most so many parts."""

@@ -206,13 +206,16 @@ class Model:
         share = factor if self.proxy is None else factor - self.proxy.margin(goal)
         return goal if share == 1.0 else goal.scaled(share)
 
-    def lift(self, parts: list[Part], goal: Criterion, policy: Policy, run: Run, *, merge: bool) -> list[Part]:
-        """Carry parts of the model to the solid, where they meet the goal."""
+    def lift(
+        self, parts: list[Part], goal: Criterion, factor: float, policy: Policy, run: Run, *, merge: bool
+    ) -> list[Part]:
+        """Carry parts of the model to the solid, where they meet the goal, scaled by a factor."""
         assert self.proxy is not None
+        scaled = goal if factor == 1.0 else goal.scaled(factor)
         with run.stage("lift"):
-            lift = Lift(self.solid, self.proxy, goal, policy, run)
+            lift = Lift(self.solid, self.proxy, scaled, policy, run)
             parts = lift(parts, mend=run.stopped_by is None)
             if merge and run.stopped_by is None:  # the margin may have kept some apart
-                looser = goal.scaled(1 + self.proxy.margin(goal))
+                looser = scaled.scaled(1 + self.proxy.margin(goal))
                 parts = merge_lifted(parts, self.component, looser, lift.confirmed, run)
         return parts
