@@ -30,11 +30,6 @@ from tests.test_sweep import SOLIDS
 CRITERION = Concavity(0.04)
 
 
-@pytest.fixture
-def meshes(tmp_path: Path) -> Path:
-    return write_meshes(tmp_path / "meshes")
-
-
 def volumes(components: list[Component]) -> list[tuple[float, float]]:
     return sorted((c.volume, c.hull.volume) for c in components)
 
@@ -113,7 +108,8 @@ def test_valid_planes_need_no_sweep_and_are_valid_by_it() -> None:
     assert differ < 0.1 * total
 
 
-def test_unreadable_meshes_are_left_out_and_counted(meshes: Path) -> None:
+def test_unreadable_meshes_are_left_out_and_counted(tmp_path: Path) -> None:
+    meshes = write_meshes(tmp_path / "meshes")
     listed = list_meshes(meshes, max_faces=1000, validation=2, seed=0)
     assert listed.unreadable == 1
     assert len(listed.training) == 3

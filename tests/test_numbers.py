@@ -23,7 +23,7 @@ from rlacd.cut_and_merge import MOST_CUTTING, MOST_MERGING, MOST_PER_FACE
 from rlacd.finish import narrowed, primitives, report
 from rlacd.io.read import apart, contents, open_file, xml
 from rlacd.io.robots import spans
-from rlacd.io.write.model import LENGTHS, MASSES
+from rlacd.io.write.model import MASSES, SIZES
 from rlacd.merge import grow
 from rlacd.options import Options
 from rlacd.planes.candidates import EDGES_PER_COMPONENT
@@ -106,7 +106,7 @@ LIMITS = {
         f"more than {report.COVERAGE_TOLERANCE:g} outside",
     ],
     "docs/guides/robots.md": [
-        f"smaller than {1e3 * LENGTHS[0]:g} mm or larger than {LENGTHS[1]:g} m",
+        f"smaller than {1e3 * SIZES[0]:g} mm or larger than {SIZES[1]:g} m",
         f"lighter than {1e6 * MASSES[0]:g} mg or heavier than {1e-3 * MASSES[1]:,g} t",
     ],
     "docs/guides/primitives.md": [

@@ -183,12 +183,13 @@ def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
     pieces: list[Component] = [bar]
     for offset in (-1.0, 0.2, 1.1):
         pieces = [side for piece in pieces for side in piece.cut(Plane((1, 0, 0), offset)) if side is not None]
-    exchange = recut(pieces, [], Greedy("hull-sum", sweeps=SweepCache(12, 0)), CRITERION, Run(1))
+    policy = Greedy("hull-sum", sweeps=SweepCache(12, 0))
+    exchange = recut(pieces, [], CRITERION, policy, bar, Run(1))
     assert exchange is not None
     assert exchange.gain == 3
     assert exchange.into[0].volume == pytest.approx(3)
     # With no time left, nothing is found.
-    assert recut(pieces, [], Greedy("hull-sum", sweeps=SweepCache(12, 0)), CRITERION, Run(1, -1.0)) is None
+    assert recut(pieces, [], CRITERION, policy, bar, Run(1, -1.0)) is None
 
 
 def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Criterion) -> None:
@@ -204,7 +205,9 @@ def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Cri
 def test_a_part_is_divided_between_its_neighbours() -> None:
     left, middle, right = bent_bar()
     solid = together([left, middle, right])
-    found = [redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid) for seed in range(5)]
+    found = [
+        redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), solid, Run(1)) for seed in range(5)
+    ]
     assert any(found)
     for exchange in found:
         if exchange is not None:
@@ -215,8 +218,8 @@ def test_a_part_is_divided_between_its_neighbours() -> None:
 def test_a_part_that_sticks_out_stays() -> None:
     slab, pin = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((0.4, 0.4, 0.2), (0.6, 0.6, 0.9)))
     solid = together([slab, pin])
-    assert redistribute(pin, [slab], CRITERION, np.random.default_rng(0), solid) is None
-    assert redistribute(pin, [], CRITERION, np.random.default_rng(0), solid) is None
+    assert redistribute(pin, [slab], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
+    assert redistribute(pin, [], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
 
 
 def test_all_or_nothing() -> None:
@@ -226,8 +229,8 @@ def test_all_or_nothing() -> None:
     parts: list[Part] = [slab, tower]
     bent = Part.glued(long, tower)
     solid = together([slab, long, tower])
-    assert redistribute(bent, [slab], CRITERION, np.random.default_rng(0), solid) is None
-    assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid) is not None
+    assert redistribute(bent, [slab], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
+    assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid, Run(1)) is not None
 
 
 @settings(max_examples=30, deadline=None)
@@ -235,7 +238,7 @@ def test_all_or_nothing() -> None:
 def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
     solid = together(stack)
     part, *around = sorted(stack, key=lambda part: part.hull.volume)
-    once, again = (redistribute(part, around, CRITERION, np.random.default_rng(seed), solid) for _ in range(2))
+    once, again = (redistribute(part, around, CRITERION, np.random.default_rng(seed), solid, Run(1)) for _ in range(2))
     assert (once is None) == (again is None)
     if once is not None and again is not None:
         check(once, part, around, CRITERION)

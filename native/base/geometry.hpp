@@ -71,6 +71,14 @@ inline Corners corners_of(const Mesh& mesh, const Triangle& face) {
 inline Vec3 long_normal(const Corners& t) { return cross(t[1] - t[0], t[2] - t[0]); }
 inline Vec3 long_normal(const Mesh& mesh, const Triangle& face) { return long_normal(corners_of(mesh, face)); }
 
+// Normal to a flat polygon, twice as long as its area.
+inline Vec3 polygon_normal(const std::vector<Vec3>& corners) {
+  Vec3 doubled;
+  for (std::size_t i = 2; i < corners.size(); ++i)
+    doubled = doubled + cross(corners[i - 1] - corners[0], corners[i] - corners[0]);
+  return doubled;
+}
+
 // The side from corner k to the next that is longest, the first of several.
 inline int longest_side(const Corners& t) {
   int longest = 0;
@@ -89,6 +97,23 @@ inline void append(Mesh& out, const Mesh& other) {
   out.vertices.insert(out.vertices.end(), other.vertices.begin(), other.vertices.end());
   for (const Triangle& f : other.faces) out.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
 }
+
+// Appends the vertices that are asked for to others, in that order, and gets their numbers there.
+class Renumbered {
+ public:
+  Renumbered(const std::vector<Vec3>& from, std::vector<Vec3>& to) : from_(from), to_(to), number_(from.size(), -1) {}
+  std::int32_t operator()(std::int32_t vertex) {
+    std::int32_t& number = number_[vertex];
+    if (number < 0) number = static_cast<std::int32_t>(to_.size()), to_.push_back(from_[vertex]);
+    return number;
+  }
+  Triangle operator()(const Triangle& f) { return {(*this)(f[0]), (*this)(f[1]), (*this)(f[2])}; }
+
+ private:
+  const std::vector<Vec3>& from_;
+  std::vector<Vec3>& to_;
+  std::vector<std::int32_t> number_;
+};
 
 struct Box {
   Vec3 lower{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
@@ -135,10 +160,12 @@ inline Box box_of_faces(const Mesh& mesh) {
   return box;
 }
 
-struct HalfSpace {  // normal . x <= offset
+struct Plane {  // normal . x = offset
   Vec3 normal;
   double offset;
+  double depth(Vec3 p) const { return offset - dot(normal, p); }  // below it
 };
+using HalfSpace = Plane;  // what lies below it: normal . x <= offset
 
 // How far a box reaches from its middle along a direction, given half its extents.
 inline double reach_along(Vec3 n, Vec3 half) {

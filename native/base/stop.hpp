@@ -83,5 +83,10 @@ class ThisStop {
 inline void poll_stop() {
   if (this_stop != nullptr) this_stop->poll();
 }
+// At every 256th of the steps of a loop that are too quick for more.
+template <class Integer>
+void poll_stop(Integer step) {
+  if (step % 256 == 0) poll_stop();
+}
 
 }  // namespace rlacd

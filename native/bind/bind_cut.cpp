@@ -38,9 +38,9 @@ auto columns(std::array<std::optional<Piece>, 2> sides) {
 void bind_cut(nb::module_& m) {
   m.def(
       "candidate_planes", released([](const Mesh& mesh, const Mesh& hull, int per_axis, std::size_t edges) {
-        std::vector<CandidatePlane> planes;
+        std::vector<Plane> planes;
         if (per_axis > 0) planes = equidistant_planes(mesh, hull, per_axis);
-        for (const CandidatePlane& plane : concave_planes(mesh, hull, edges)) planes.push_back(plane);
+        for (const Plane& plane : concave_planes(mesh, hull, edges)) planes.push_back(plane);
         std::vector<Vec3> normals;
         std::vector<double> offsets;
         for (const auto& [normal, offset] : planes) normals.push_back(normal), offsets.push_back(offset);

@@ -24,8 +24,6 @@ constexpr int fields(Tag<Crossings>) { return 2; }
 
 namespace {
 
-constexpr std::size_t kBetweenPolls = 4096;
-
 using NodesIn = VectorIn<std::int64_t>;
 using MarksIn = nb::ndarray<const bool, nb::c_contig, nb::device::cpu>;
 
@@ -47,7 +45,7 @@ void def_on_faces(nb::module_& m, const char* name, const char* text, const Meas
   const auto kernel = [measure](const WideMesh& mesh) {
     std::vector<decltype(measure(Corners()))> values(mesh.faces.size());
     for (std::size_t f = 0; f < values.size(); ++f) {
-      if (f % kBetweenPolls == 0) poll_stop();
+      poll_stop(f);
       values[f] = measure(corners_of(mesh, mesh.faces[f]));
     }
     return values;
@@ -67,7 +65,7 @@ std::pair<std::int64_t, std::vector<std::int64_t>> components(std::int64_t count
   require(a.shape(0) == b.shape(0), "a link has two ends");
   Groups groups(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < a.shape(0); ++i) {
-    if (i % kBetweenPolls == 0) poll_stop();
+    poll_stop(i);
     for (const std::int64_t end : {a(i), b(i)}) require(end >= 0 && end < count, "node out of range");
     groups.join(a(i), b(i));
   }

@@ -50,10 +50,6 @@ double noise(std::uint64_t i) {
   return static_cast<double>((i ^ (i >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-std::uint64_t directed(std::int32_t from, std::int32_t to) {
-  return static_cast<std::uint64_t>(from) << 32 | static_cast<std::uint32_t>(to);
-}
-
 // The edges of the rims, edge i from corner i of the rims to the next, and what becomes of them.
 //
 // Nodes are the corners and after them each crossing twice: node n + 2k is crossing k on the first of its edges, node
@@ -276,7 +272,7 @@ Outlines outlines_of(const std::vector<Vec3>& vertices, const Rims& rims, Vec3 o
   return outlines;
 }
 
-// The vertex at each corner, and the corner as a point of the plane.
+// What there is at the corners of all loops: their vertices, or points of the plane.
 template <class Item>
 std::vector<Item> joined(const std::vector<std::vector<Item>>& loops) {
   std::vector<Item> all;

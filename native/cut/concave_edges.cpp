@@ -158,7 +158,7 @@ Vec3 snapped(Vec3 n) {
 
 // The three planes that contain an edge: the bisector of the reflex angle, and the planes of its two faces, normals
 // pointing outwards.
-using EdgePlanes = std::array<CandidatePlane, 3>;
+using EdgePlanes = std::array<Plane, 3>;
 
 EdgePlanes planes_of(const Mesh& mesh, const ReflexEdge& edge) {
   const Vec3 across = edge.normal[0] - edge.normal[1];  // at least 0.17 long
@@ -180,7 +180,7 @@ class PlaneSpace {
 
   // By differences: a sum of squares minus a product would leave 1e-8 between equal planes, and that noise would decide
   // between equivalent edges.
-  double difference(const CandidatePlane& p, const CandidatePlane& q) const {
+  double difference(const Plane& p, const Plane& q) const {
     const double hp = height(p), hq = height(q);
     const double same_way = norm2(p.normal - q.normal) + (hp - hq) * (hp - hq);
     const double other_way = norm2(p.normal + q.normal) + (hp + hq) * (hp + hq);
@@ -188,7 +188,7 @@ class PlaneSpace {
   }
 
  private:
-  double height(const CandidatePlane& p) const { return (p.offset - dot(p.normal, centre_)) / radius_; }
+  double height(const Plane& p) const { return (p.offset - dot(p.normal, centre_)) / radius_; }
 
   Vec3 centre_;
   double radius_;
@@ -222,7 +222,7 @@ std::vector<ReflexEdge> spread_out(std::vector<Contender>& contenders, const Pla
       const double away = norm(c.centre - best.centre);
       c.distance = chosen.empty() ? away : std::min(c.distance, away);
       for (int k = 0; k < 3; ++k)
-        for (const CandidatePlane& taken : best.planes)
+        for (const Plane& taken : best.planes)
           c.novelty[k] = std::min(c.novelty[k], space.difference(c.planes[k], taken));
     }
     chosen.push_back(best.edge);
@@ -241,7 +241,7 @@ double above_face(const Mesh& mesh, const Triangle& face, Vec3 outward) {
 }
 
 // Of the two representations of a plane, the one whose normal has a positive largest coordinate.
-CandidatePlane turned(const CandidatePlane& plane) {
+Plane turned(const Plane& plane) {
   if (plane.normal[longest_axis(plane.normal)] > 0) return plane;
   return {Vec3{} - plane.normal, -plane.offset};
 }
@@ -275,24 +275,24 @@ std::vector<ReflexEdge> chosen_edges(const Mesh& mesh, const Mesh& hull, std::si
 
 }  // namespace
 
-std::vector<CandidatePlane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_t count) {
+std::vector<Plane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_t count) {
   const PlaneSpace space(Box::of(hull.vertices));
-  std::vector<CandidatePlane> planes;
+  std::vector<Plane> planes;
   for (const ReflexEdge& edge : chosen_edges(mesh, hull, count)) {
     EdgePlanes own = planes_of(mesh, edge);
     for (const int side : {0, 1})
       own[side + 1].offset = above_face(mesh, mesh.faces[edge.face[side]], own[side + 1].normal);
-    for (const CandidatePlane& plane : own) {
-      const CandidatePlane candidate = turned(plane);
+    for (const Plane& plane : own) {
+      const Plane candidate = turned(plane);
       if (std::all_of(planes.begin(), planes.end(),
-                      [&](const CandidatePlane& other) { return space.difference(candidate, other) > kSamePlane; }))
+                      [&](const Plane& other) { return space.difference(candidate, other) > kSamePlane; }))
         planes.push_back(candidate);
     }
   }
   return planes;
 }
 
-std::vector<CandidatePlane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int per_axis) {
+std::vector<Plane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int per_axis) {
   constexpr double kSameAxis = 1e-3;  // sine of an angle
   std::vector<Vec3> directions = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (const Vec3 axis : principal_axes(mesh)) {
@@ -301,7 +301,7 @@ std::vector<CandidatePlane> equidistant_planes(const Mesh& mesh, const Mesh& hul
     rest[nearest] = 0;
     directions.push_back(norm(rest) < kSameAxis ? directions[static_cast<std::size_t>(nearest)] : axis);
   }
-  std::vector<CandidatePlane> planes;
+  std::vector<Plane> planes;
   for (const Vec3 direction : directions) {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (const Vec3 p : hull.vertices) low = std::min(low, dot(p, direction)), high = std::max(high, dot(p, direction));

@@ -14,8 +14,6 @@ namespace {
 constexpr double kOnPlane = 1e-13;  // relative to the mesh's largest coordinate: above the rounding of a height
 constexpr double kFlat = 1e-12;     // relative to the same: corners this close to a line or a plane lie in it
 
-using Edge = std::array<std::int32_t, 2>;
-
 class Cutter {
  public:
   Cutter(const Mesh& mesh, Vec3 normal, double offset)
@@ -58,7 +56,7 @@ class Cutter {
         faces.push_back({polygon[k], polygon[k + 2], polygon[(k + 3) % 4]});
       }
     }
-    std::vector<std::vector<std::int32_t>> loops = rims(boundary(std::move(in_plane)), -which);
+    std::vector<std::vector<std::int32_t>> loops = rims(net(std::move(in_plane)), -which);
     straighten(faces, loops);
     return compacted(faces, loops);
   }
@@ -68,18 +66,18 @@ class Cutter {
     return static_cast<std::size_t>(point) >= sides_.size() || sides_[point] == 0;
   }
 
+  Vec3 normal_of(const Triangle& f) const { return long_normal({points_[f[0]], points_[f[1]], points_[f[2]]}); }
+
   // Whether a triangle in the plane bounds the side from outside.
   bool bounds(const Triangle& f, int which) const {
-    const Vec3 a = points_[f[0]];
-    const double up = dot(normal_, cross(points_[f[1]] - a, points_[f[2]] - a));
+    const double up = dot(normal_, normal_of(f));
     return which < 0 ? up > 0 : up <= 0;
   }
 
   // The point where an edge crosses the plane: exactly on it where possible.
   std::int32_t crossing(std::int32_t a, std::int32_t b) {
     if (a > b) std::swap(a, b);
-    const auto key = static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
-    const auto [known, is_new] = crossings_.try_emplace(key, static_cast<std::int32_t>(points_.size()));
+    const auto [known, is_new] = crossings_.try_emplace(directed(a, b), static_cast<std::int32_t>(points_.size()));
     if (is_new) {
       const double t = heights_[a] / (heights_[a] - heights_[b]);
       RLACD_ASSERT(sides_[a] * sides_[b] < 0 && t > 0 && t < 1);
@@ -88,28 +86,6 @@ class Cutter {
       points_.push_back(p);
     }
     return known->second;
-  }
-
-  // The edges without those that also run the other way.
-  static std::vector<Edge> boundary(std::vector<Edge> edges) {
-    const auto undirected = [](const Edge& e) { return std::minmax(e[0], e[1]); };
-    std::sort(edges.begin(), edges.end(), [&](const Edge& e, const Edge& g) {
-      const auto [e0, e1] = undirected(e);
-      const auto [g0, g1] = undirected(g);
-      return e0 != g0 ? e0 < g0 : e1 != g1 ? e1 < g1 : e[0] < g[0];
-    });
-    std::vector<Edge> left;
-    for (std::size_t i = 0; i < edges.size();) {
-      const auto [low, high] = undirected(edges[i]);
-      int ascending = 0;
-      for (;
-           i < edges.size() && std::min(edges[i][0], edges[i][1]) == low && std::max(edges[i][0], edges[i][1]) == high;
-           ++i)
-        ascending += edges[i][0] == low ? 1 : -1;
-      for (; ascending > 0; --ascending) left.push_back({low, high});
-      for (; ascending < 0; ++ascending) left.push_back({high, low});
-    }
-    return left;
   }
 
   // Loops against the boundary's edges; outside is where the normal times `up` points.
@@ -196,14 +172,11 @@ class Cutter {
   // Moves a point onto its neighbour on the rim, if the faces around it lie in a plane and none flips.
   bool moves_to(std::int32_t v, std::int32_t to, std::vector<Triangle>& faces,
                 std::unordered_map<std::int32_t, std::vector<std::size_t>>& around, std::vector<char>& is_gone) const {
-    const auto doubled_area = [&](const Triangle& f) {
-      return cross(points_[f[1]] - points_[f[0]], points_[f[2]] - points_[f[0]]);
-    };
     std::vector<std::size_t>& own = around[v];
     Vec3 normal;
     for (const std::size_t f : own)
       if (!is_gone[f])
-        if (const Vec3 n = doubled_area(faces[f]); norm2(n) > norm2(normal)) normal = n;
+        if (const Vec3 n = normal_of(faces[f]); norm2(n) > norm2(normal)) normal = n;
     normal = normalized(normal);
     int shared = 0;
     for (const std::size_t f : own) {
@@ -219,7 +192,7 @@ class Cutter {
       }
       if (has_both)
         ++shared;
-      else if (!(dot(normal, doubled_area(moved)) > 0))
+      else if (!(dot(normal, normal_of(moved)) > 0))
         return false;
     }
     if (shared != 1) return false;
@@ -237,16 +210,9 @@ class Cutter {
 
   OpenSide compacted(const std::vector<Triangle>& faces, const std::vector<std::vector<std::int32_t>>& rims) const {
     OpenSide out;
-    std::vector<std::int32_t> number(points_.size(), -1);
-    const auto numbered = [&](std::int32_t point) {
-      if (number[point] < 0) {
-        number[point] = static_cast<std::int32_t>(out.mesh.vertices.size());
-        out.mesh.vertices.push_back(points_[point]);
-      }
-      return number[point];
-    };
+    Renumbered numbered(points_, out.mesh.vertices);
     out.mesh.faces.reserve(faces.size());
-    for (const Triangle& f : faces) out.mesh.faces.push_back({numbered(f[0]), numbered(f[1]), numbered(f[2])});
+    for (const Triangle& f : faces) out.mesh.faces.push_back(numbered(f));
     for (const std::vector<std::int32_t>& rim : rims) {
       out.rims.emplace_back();
       for (const std::int32_t point : rim) out.rims.back().push_back(numbered(point));
@@ -266,6 +232,18 @@ class Cutter {
 };
 
 }  // namespace
+
+std::vector<Edge> net(std::vector<Edge> edges) {
+  const auto key = [](const Edge& e) { return std::array{std::min(e[0], e[1]), std::max(e[0], e[1]), e[0]}; };
+  std::sort(edges.begin(), edges.end(), [&](const Edge& a, const Edge& b) { return key(a) < key(b); });
+  std::vector<Edge> left;
+  for (const Edge& e : edges)
+    if (!left.empty() && left.back() == Edge{e[1], e[0]})
+      left.pop_back();
+    else
+      left.push_back(e);
+  return left;
+}
 
 std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal) {
   const int axis = longest_axis(normal);

@@ -22,6 +22,17 @@ struct OpenSide {
   std::vector<std::vector<std::int32_t>> rims;  // loops of vertices
 };
 
+using Edge = std::array<std::int32_t, 2>;
+
+// An edge as a key: directed, and the same for both directions.
+inline std::uint64_t directed(std::int32_t from, std::int32_t to) {
+  return static_cast<std::uint64_t>(from) << 32 | static_cast<std::uint32_t>(to);
+}
+inline std::uint64_t undirected(std::int32_t a, std::int32_t b) { return directed(std::min(a, b), std::max(a, b)); }
+
+// The edges without those that also run the other way, by their ends.
+std::vector<Edge> net(std::vector<Edge> edges);
+
 // Coordinates of points on a plane that preserve orientation as seen against the normal.
 std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal);
 

@@ -20,26 +20,6 @@ constexpr double kSame = kCoincident;  // distance at which vertices are one, or
 constexpr double kFilm = 1e-9;         // thickness of the film over the solids by which the union's volume may differ
 constexpr int kDeepest = 8;            // times that an edge between stops may have stops: two, but for rounding
 
-using Edge = std::array<std::int32_t, 2>;
-
-std::uint64_t undirected(std::int32_t a, std::int32_t b) {
-  if (a > b) std::swap(a, b);
-  return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
-}
-
-// The edges without those that also run the other way.
-std::vector<Edge> net(std::vector<Edge> edges) {
-  const auto key = [](const Edge& e) { return std::array{std::min(e[0], e[1]), std::max(e[0], e[1]), e[0]}; };
-  std::sort(edges.begin(), edges.end(), [&](const Edge& a, const Edge& b) { return key(a) < key(b); });
-  std::vector<Edge> left;
-  for (const Edge& e : edges)
-    if (!left.empty() && left.back() == Edge{e[1], e[0]})
-      left.pop_back();
-    else
-      left.push_back(e);
-  return left;
-}
-
 class Reunion {
  public:
   explicit Reunion(const std::vector<Mesh>& solids) {
@@ -53,7 +33,7 @@ class Reunion {
     take_out();
     for (std::vector<Edge>& rim : rims_) rim = net(std::move(rim));
     meet();
-    for (std::vector<Edge>& rim : rims_) cross(rim);
+    for (std::size_t plane = 0; plane < planes_.size(); ++plane) cross(plane);
     for (std::size_t plane = 0; plane < planes_.size(); ++plane)
       if (!close(plane)) return std::nullopt;
     split_faces();
@@ -67,13 +47,9 @@ class Reunion {
 
  private:
   void drop_unused() {
-    std::vector<std::int32_t> number(mesh_.vertices.size(), -1);
     std::vector<Vec3> used;
-    for (Triangle& f : mesh_.faces)
-      for (std::int32_t& v : f) {
-        if (number[v] < 0) number[v] = static_cast<std::int32_t>(used.size()), used.push_back(mesh_.vertices[v]);
-        v = number[v];
-      }
+    Renumbered numbered(mesh_.vertices, used);
+    for (Triangle& f : mesh_.faces) f = numbered(f);
     mesh_.vertices = std::move(used);
   }
 
@@ -103,10 +79,9 @@ class Reunion {
     rims_.resize(planes_.size());
     std::size_t kept = 0;
     for (const Triangle& f : mesh_.faces) {
-      const auto own = std::find_if(planes_.begin(), planes_.end(), [&](const TouchingPlane& plane) {
-        return std::all_of(f.begin(), f.end(), [&](std::int32_t v) {
-          return std::fabs(dot(plane.normal, mesh_.vertices[v]) - plane.offset) <= kCoincident;
-        });
+      const auto own = std::find_if(planes_.begin(), planes_.end(), [&](const Plane& plane) {
+        return std::all_of(f.begin(), f.end(),
+                           [&](std::int32_t v) { return std::fabs(plane.depth(mesh_.vertices[v])) <= kCoincident; });
       });
       if (own == planes_.end()) {
         mesh_.faces[kept++] = f;
@@ -146,11 +121,12 @@ class Reunion {
       }
   }
 
-  // Notes new vertices where edges of a rim cross.
-  void cross(std::vector<Edge>& rim) {
+  // Notes new vertices where edges of the rims in a plane cross.
+  void cross(std::size_t plane) {
+    std::vector<Edge>& rim = rims_[plane];
     rim = expanded(rim);
     if (rim.empty()) return;
-    const std::vector<PlanePoint> at = flat(rim);
+    const std::vector<PlanePoint> at = on_plane(points_of(rim), planes_[plane].normal);
     std::vector<std::size_t> by_left(rim.size());
     std::iota(by_left.begin(), by_left.end(), 0);
     const auto left = [&](std::size_t i) { return std::min(at[2 * i][0], at[2 * i + 1][0]); };
@@ -295,13 +271,9 @@ class Reunion {
       for (const std::int32_t v : e) points.push_back(mesh_.vertices[v]);
     return points;
   }
-  // The ends of edges in a plane, by its largest extent.
-  std::vector<PlanePoint> flat(const std::vector<Edge>& edges) const {
-    return on_plane(points_of(edges), planes_[static_cast<std::size_t>(&edges - rims_.data())].normal);
-  }
 
   Mesh mesh_;
-  std::vector<TouchingPlane> planes_;
+  std::vector<Plane> planes_;
   std::vector<std::vector<Edge>> rims_;                                 // in each plane
   std::vector<std::int32_t> met_;                                       // the vertices of rims
   std::unordered_map<std::uint64_t, std::vector<std::int32_t>> stops_;  // on an edge, from its smaller vertex

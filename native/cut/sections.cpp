@@ -328,12 +328,7 @@ std::vector<Sections::Measures> Sections::measure_sections() const {
   return measures;
 }
 
-double outline_area(const std::vector<Vec3>& outline, Vec3 n) {
-  Vec3 doubled;
-  for (std::size_t i = 2; i < outline.size(); ++i)
-    doubled = doubled + cross(outline[i - 1] - outline[0], outline[i] - outline[0]);
-  return std::fabs(dot(n, doubled)) / 2;
-}
+double outline_area(const std::vector<Vec3>& outline, Vec3 n) { return std::fabs(dot(n, polygon_normal(outline))) / 2; }
 
 Bundles bundle_planes(const std::vector<Vec3>& directions, const std::vector<double>& offsets) {
   Bundles bundles;

@@ -5,8 +5,7 @@
 // Output: the vertices of each slab that its convex hull may need, the corners of the convex hull of each plane's
 //         section, and the volume of the solid below and above each plane.
 // Algorithm: vertices are sorted into slabs, and every edge is cut by the planes between its ends. Volumes come from
-// the
-//         divergence theorem with the field (n.x - d) n, which vanishes on the cut, so that no cap is needed.
+//         the divergence theorem with the field (n.x - d) n, which vanishes on the cut, so that no cap is needed.
 #pragma once
 
 #include <cstdint>

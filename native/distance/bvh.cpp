@@ -11,8 +11,6 @@ constexpr int kBins = 8;
 // Deeper nodes are halved by count, so no tree is deeper than this plus log2 of the number of triangles, and one made
 // by the shape of another than one more: with the rest of the 31 bits, every traversal fits in a stack of fixed size.
 constexpr int kDeepestHeuristicSplit = 48;
-constexpr int kStack = 96;
-constexpr std::size_t kBetweenPolls = 1024;
 constexpr std::ptrdiff_t kAlone = 20'000;  // trees over no more triangles are made in one thread
 
 // Lower and negated upper ends along the three axes: all are minima, so that they are extended at once.
@@ -275,18 +273,11 @@ Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) c
 void Bvh::within(Vec3 x, double radius, std::vector<std::int32_t>& found) const {
   const std::size_t before = found.size();
   const double most = radius * radius;
-  std::vector<std::int32_t> open = {0};
-  while (!open.empty()) {
-    const Node& node = nodes_[open.back()];
-    open.pop_back();
-    for (int side = 0; side < 2; ++side) {
-      const std::int32_t child = node.child[side];
-      if (node.box[side].distance2(x) > most) continue;
-      if (child >= 0) open.push_back(child);
-      for (std::int32_t slot = ~child; child < 0 && slot < ~child + node.leaf_size[side]; ++slot)
-        if (norm2(triangles_[slot].a - x) <= most) found.push_back(faces_[slot]);
-    }
-  }
+  any_of([&](const Box& box) { return box.distance2(x) <= most; },
+         [&](std::int32_t slot) {
+           if (norm2(triangles_[slot].a - x) <= most) found.push_back(faces_[slot]);
+           return false;
+         });
   std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
 }
 
@@ -300,7 +291,7 @@ std::pair<std::vector<std::int64_t>, std::vector<std::int32_t>> points_within(co
   std::vector<std::int64_t> counts(centres.size());
   std::vector<std::int32_t> found;
   for (std::size_t i = 0; i < centres.size() && found.size() <= most; ++i) {
-    if (i % kBetweenPolls == 0) poll_stop();
+    poll_stop(i);
     const std::size_t before = found.size();
     tree.within(centres[i], radii[i], found);
     counts[i] = static_cast<std::int64_t>(found.size() - before);

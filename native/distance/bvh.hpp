@@ -109,6 +109,25 @@ class Bvh {
   };
   // Nodes come before their children.
   const std::vector<Node>& nodes() const { return nodes_; }
+  // No tree is deeper than what `bvh.cpp` allows, so that every traversal fits in a stack of this size.
+  static constexpr int kStack = 96;
+  // Calls visit(slot) for the triangles in boxes that pass, until it returns true; returns whether it did.
+  template <class Passes, class Visit>
+  bool any_of(const Passes& passes, const Visit& visit) const {
+    std::int32_t stack[kStack];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const Node& node = nodes_[stack[--top]];
+      for (int side = 0; side < 2; ++side) {
+        if (!passes(node.box[side])) continue;
+        if (node.child[side] >= 0) stack[top++] = node.child[side];
+        for (std::int32_t i = 0; i < node.leaf_size[side]; ++i)
+          if (visit(~node.child[side] + i)) return true;
+      }
+    }
+    return false;
+  }
   const TriangleFrame& triangle(std::int32_t slot) const { return triangles_[slot]; }
 
  private:

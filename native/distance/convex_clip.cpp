@@ -42,7 +42,7 @@ class Clip {
       : solid_(solid),
         surface_(surface),
         polytope_(std::move(polytope)),
-        numbers_of_vertices_(solid.vertices.size(), kNone) {
+        number_of_vertex_(solid.vertices, result_.mesh.vertices) {
     crossings_.resize(polytope_.edges.size());
     paths_.resize(polytope_.facets.size());
   }
@@ -82,10 +82,9 @@ class Clip {
       bool is_outside = false;
       for (std::size_t i = first; i < last && !is_outside; ++i) {
         const std::int32_t facet = crossing_[i];
-        const Vec3 n = polytope_.facets[facet].normal;
         const double depth = polytope_.facets[facet].depth(middle);
         // Rounding may only make a box cross.
-        const double reach = std::fabs(n.x) * half.x + std::fabs(n.y) * half.y + std::fabs(n.z) * half.z + 1e-12;
+        const double reach = reach_along(polytope_.facets[facet].normal, half) + 1e-12;
         is_outside = depth < -reach;
         if (depth < reach) crossing_.push_back(facet);
       }
@@ -109,8 +108,7 @@ class Clip {
 
   // A face of the solid that no facet crosses.
   void keep(const Triangle& face) {
-    Triangle numbered;
-    for (int k = 0; k < 3; ++k) numbered[k] = number_of_vertex(face[k]);
+    const Triangle numbered = number_of_vertex_(face);
     if (numbered[0] != numbered[1] && numbered[1] != numbered[2] && numbered[2] != numbered[0])
       result_.mesh.faces.push_back(numbered);
   }
@@ -180,17 +178,8 @@ class Clip {
     }
   }
 
-  std::int32_t number_of_vertex(std::int32_t vertex) {
-    std::int32_t& number = numbers_of_vertices_[vertex];
-    if (number < 0) {
-      number = static_cast<std::int32_t>(result_.mesh.vertices.size());
-      result_.mesh.vertices.push_back(solid_.vertices[vertex]);
-    }
-    return number;
-  }
-
   std::int32_t number_of(const Key& key, Vec3 point) {
-    if (std::get<0>(key) >= 0 && std::get<1>(key) == kNone) return number_of_vertex(std::get<0>(key));
+    if (std::get<0>(key) >= 0 && std::get<1>(key) == kNone) return number_of_vertex_(std::get<0>(key));
     const auto [at, is_new] = numbers_by_key_.try_emplace(key, static_cast<std::int32_t>(result_.mesh.vertices.size()));
     if (is_new) result_.mesh.vertices.push_back(point);
     return at->second;
@@ -362,9 +351,9 @@ class Clip {
   std::vector<Corner> polygon_, kept_;
   std::vector<double> depths_;
   std::vector<std::int32_t> numbers_;
-  std::vector<std::int32_t> numbers_of_vertices_;  // of the solid, -1 for those not met yet
-  std::unordered_map<Key, std::int32_t, KeyHash> numbers_by_key_;
   ConvexClip result_;
+  Renumbered number_of_vertex_;  // of the solid
+  std::unordered_map<Key, std::int32_t, KeyHash> numbers_by_key_;
 };
 
 }  // namespace

@@ -32,30 +32,19 @@ Crossings crossings(const Mesh& mesh, const std::vector<std::int64_t>& body, std
   Crossings found;
   const Bvh bvh(mesh);
   std::vector<std::int64_t> touching(bvh.size());
-  std::vector<std::int32_t> open;
   for (std::int32_t slot = 0; slot < static_cast<std::int32_t>(bvh.size()) && found.pairs <= most; ++slot) {
     poll_stop();
     const Corners own = corners_of(bvh.triangle(slot));
     const Box box = Box::of(own);
-    open.push_back(0);
-    while (!open.empty()) {
-      const Bvh::Node& node = bvh.nodes()[open.back()];
-      open.pop_back();
-      for (int side = 0; side < 2; ++side) {
-        if (!node.box[side].meets(box)) continue;
-        if (node.child[side] >= 0) {
-          open.push_back(node.child[side]);
-          continue;
-        }
-        for (std::int32_t other = ~node.child[side]; other < ~node.child[side] + node.leaf_size[side]; ++other) {
-          if (other <= slot || body[bvh.face(other)] == body[bvh.face(slot)]) continue;
-          if (!do_touch(own, corners_of(bvh.triangle(other)))) continue;
-          ++found.pairs;
-          ++touching[slot];
-          ++touching[other];
-        }
-      }
-    }
+    bvh.any_of([&](const Box& other) { return other.meets(box); },
+               [&](std::int32_t other) {
+                 if (other <= slot || body[bvh.face(other)] == body[bvh.face(slot)]) return false;
+                 if (!do_touch(own, corners_of(bvh.triangle(other)))) return false;
+                 ++found.pairs;
+                 ++touching[slot];
+                 ++touching[other];
+                 return false;
+               });
   }
   for (const std::int64_t count : touching) found.corners += count * (count - 1) / 2;
   found.corners /= 3;

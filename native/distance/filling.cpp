@@ -166,27 +166,15 @@ bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
   Box inner = Box::of(hull.vertices);
   inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
   inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
-  const std::vector<Bvh::Node>& nodes = surface_.bvh().nodes();
-  std::vector<std::int32_t> open = {0};
-  while (!open.empty()) {
+  const auto may_come = [&](const Box& box) {
     poll_stop();
-    const Bvh::Node& node = nodes[open.back()];
-    open.pop_back();
-    for (int side = 0; side < 2; ++side) {
-      if (!node.box[side].meets(inner) || depths.misses(node.box[side])) continue;
-      if (node.child[side] >= 0) {
-        open.push_back(node.child[side]);
-        continue;
-      }
-      for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) {
-        const auto [p, q, r] = corners_of(solid_, solid_.faces[surface_.bvh().face(~node.child[side] + i)]);
-        for (const Vec3 corner : {p, q, r})
-          if (inner.holds(corner) && depths.holds(corner)) return true;
-        if (depths.meets(p, q, r)) return true;
-      }
-    }
-  }
-  return false;
+    return box.meets(inner) && !depths.misses(box);
+  };
+  return surface_.bvh().any_of(may_come, [&](std::int32_t slot) {
+    const Corners t = corners_of(solid_, solid_.faces[surface_.bvh().face(slot)]);
+    return std::any_of(t.begin(), t.end(), [&](Vec3 corner) { return inner.holds(corner) && depths.holds(corner); }) ||
+           depths.meets(t[0], t[1], t[2]);
+  });
 }
 
 bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {

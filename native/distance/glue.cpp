@@ -91,7 +91,7 @@ struct Facet {
       box.extend(corner[i]);
     }
     for (int i = 0; i < 3; ++i) longest2 = std::max(longest2, norm2(corner[i] - corner[(i + 1) % 3]));
-    const Vec3 n = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    const Vec3 n = long_normal(mesh, face);
     height = longest2 > 0 ? norm(n) / std::sqrt(longest2) : 0;
     normal = normalized(n);
     offset = dot(normal, corner[0]);
@@ -132,14 +132,7 @@ std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
 void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common) {
   const std::vector<Facet> others = facets_within(b, common);
   // Unions are glued again and again, so vertices that no triangle needs any more are left behind.
-  std::vector<std::int32_t> place(a.vertices.size(), -1);
-  const auto taken_over = [&](std::int32_t vertex) {
-    if (place[vertex] < 0) {
-      place[vertex] = static_cast<std::int32_t>(out.vertices.size());
-      out.vertices.push_back(a.vertices[vertex]);
-    }
-    return place[vertex];
-  };
+  Renumbered taken_over(a.vertices, out.vertices);
   std::vector<Polygon> polygons;
   for (const Triangle& face : a.faces) {
     poll_stop();
@@ -160,7 +153,7 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
       }
     }
     if (whole) {
-      out.faces.push_back({taken_over(face[0]), taken_over(face[1]), taken_over(face[2])});
+      out.faces.push_back(taken_over(face));
       continue;
     }
     for (const Polygon& p : polygons) {
@@ -216,16 +209,16 @@ bool do_touch(const Mesh& a, const Mesh& b) {
   return false;
 }
 
-void add_touching_planes(std::vector<TouchingPlane>& planes, const Mesh& a, const Mesh& b) {
+void add_touching_planes(std::vector<Plane>& planes, const Mesh& a, const Mesh& b) {
   const std::vector<Facet> others = facets_within(b, box_of_faces(a));
   std::vector<Facet> own = facets_within(a, box_of_faces(b));
   // Large faces first: their planes are the most exact.
   std::stable_sort(own.begin(), own.end(), [](const Facet& f, const Facet& g) { return f.height > g.height; });
   for (const Facet& facet : own) {
     poll_stop();
-    const bool is_known = std::any_of(planes.begin(), planes.end(), [&](const TouchingPlane& plane) {
+    const bool is_known = std::any_of(planes.begin(), planes.end(), [&](const Plane& plane) {
       return std::all_of(std::begin(facet.corner), std::end(facet.corner),
-                         [&](Vec3 p) { return std::fabs(dot(plane.normal, p) - plane.offset) <= kCoincident; });
+                         [&](Vec3 p) { return std::fabs(plane.depth(p)) <= kCoincident; });
     });
     if (is_known) continue;
     if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))

@@ -22,11 +22,7 @@ Mesh glue(const Mesh& a, const Mesh& b);
 // Whether two solids touch face to face, not just in an edge or a point.
 bool do_touch(const Mesh& a, const Mesh& b);
 
-// Adds the planes n.x = d in which two solids touch.
-struct TouchingPlane {
-  Vec3 normal;
-  double offset;
-};
-void add_touching_planes(std::vector<TouchingPlane>& planes, const Mesh& a, const Mesh& b);
+// Adds the planes in which two solids touch.
+void add_touching_planes(std::vector<Plane>& planes, const Mesh& a, const Mesh& b);
 
 }  // namespace rlacd

@@ -148,14 +148,10 @@ class Gathering {
   }
   Mesh take() {
     const std::vector<std::int32_t> first = first_in_place(soup_.vertices);
-    std::vector<std::int32_t> number(first.size());
     Mesh mesh;
-    for (std::size_t v = 0; v < first.size(); ++v) {
-      const bool is_new = first[v] == static_cast<std::int32_t>(v);
-      number[v] = is_new ? static_cast<std::int32_t>(mesh.vertices.size()) : number[first[v]];
-      if (is_new) mesh.vertices.push_back(soup_.vertices[v]);
-    }
-    for (const auto& [a, b, c] : soup_.faces) mesh.faces.push_back({number[a], number[b], number[c]});
+    Renumbered numbered(soup_.vertices, mesh.vertices);
+    for (const std::int32_t v : first) numbered(v);
+    for (const auto& [a, b, c] : soup_.faces) mesh.faces.push_back(numbered({first[a], first[b], first[c]}));
     return mesh;
   }
 

@@ -108,7 +108,7 @@ Winding::Winding(const Bvh& bvh) : bvh_(bvh), moments_(2 * bvh.nodes().size()) {
 double Winding::at(Vec3 p, double accuracy) const {
   const std::vector<Bvh::Node>& nodes = bvh_.nodes();
   double angle = 0;
-  std::int32_t stack[96];
+  std::int32_t stack[Bvh::kStack];
   int top = 0;
   stack[top++] = 0;
   while (top > 0) {
@@ -136,28 +136,14 @@ double Winding::at(Vec3 p, double accuracy) const {
 }
 
 double Winding::of_closed(Vec3 p) const {
-  const std::vector<Bvh::Node>& nodes = bvh_.nodes();
   int left = 0;
-  std::int32_t stack[96];
-  int top = 0;
-  stack[top++] = 0;
-  while (top > 0) {
-    const Bvh::Node& node = nodes[stack[--top]];
-    for (int side = 0; side < 2; ++side) {
-      const std::int32_t child = node.child[side];
-      if (!meets(node.box[side], p)) continue;
-      if (child >= 0) {
-        stack[top++] = child;
-        continue;
-      }
-      for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) {
-        const std::optional<int> sign = crossing(bvh_.triangle(~child + i), p);
-        if (!sign) return std::round(at(p, kInDoubt));
-        left += *sign;
-      }
-    }
-  }
-  return left;
+  const bool is_in_doubt = bvh_.any_of([p](const Box& box) { return meets(box, p); },
+                                       [&](std::int32_t slot) {
+                                         const std::optional<int> sign = crossing(bvh_.triangle(slot), p);
+                                         left += sign.value_or(0);
+                                         return !sign;
+                                       });
+  return is_in_doubt ? std::round(at(p, kInDoubt)) : left;
 }
 
 }  // namespace rlacd

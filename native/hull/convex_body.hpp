@@ -3,8 +3,7 @@
 // In:  a closed convex triangle mesh.
 // Out: signed distances, negative inside; exact up to rounding.
 // How: inside, the nearest facet plane gives the distance. Outside, the farthest plane is a lower bound that settles
-// most
-//      queries; the rest go to a tree of boxes over the facets, built when first needed.
+//      most queries; the rest go to a tree of boxes over the facets, built when first needed.
 #pragma once
 
 #include <memory>

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "base/mesh_measures.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -37,17 +38,6 @@ struct Facet {
         normal(n) {}
   bool operator<(const Facet& other) const { return key != other.key ? key < other.key : area > other.area; }
 };
-
-bool is_thin(const Mesh& hull, double extent) {
-  double volume = 0, area = 0;  // six times and twice
-  const Vec3 origin = hull.vertices[hull.faces[0][0]];
-  for (const Triangle& face : hull.faces) {
-    const Vec3 product = long_normal(hull, face);
-    volume += dot(hull.vertices[face[0]] - origin, product);
-    area += norm(product);
-  }
-  return 2 * volume / 3 <= kThin * extent * area;
-}
 
 // The planes around a thin hull: those across the largest facet that touch an edge, and those of its box.
 void add_around(const Mesh& hull, double extent, std::vector<Facet>& facets) {
@@ -87,7 +77,8 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
   }
   if (facets.empty()) throw std::invalid_argument("the hull has no facet with an area");
   const Box box = box_of_faces(hull);
-  if (const double extent = norm(box.upper - box.lower); is_thin(hull, extent)) add_around(hull, extent, facets);
+  if (const double extent = norm(box.upper - box.lower); 2 * mesh_volume(hull) <= kThin * extent * mesh_area(hull))
+    add_around(hull, extent, facets);
   std::sort(facets.begin(), facets.end());
   facets.erase(std::unique(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.key == b.key; }),
                facets.end());

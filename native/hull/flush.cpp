@@ -58,13 +58,6 @@ Polygon ordered(const std::vector<Vec3>& corners, Vec3 normal) {
   return polygon;
 }
 
-double area_of(const Polygon& polygon) {
-  Vec3 doubled;
-  for (std::size_t i = 2; i < polygon.size(); ++i)
-    doubled = doubled + cross(polygon[i - 1] - polygon[0], polygon[i] - polygon[0]);
-  return norm(doubled) / 2;
-}
-
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = -std::numeric_limits<double>::infinity();
 };
@@ -146,7 +139,7 @@ FlushBody::Contact FlushBody::contact(const FlushBody& other, double depth, doub
       if (!faces_it[i] || ranges[i].most <= -reached || beyond(polygon, side.normal, side.offset).most <= -reached)
         continue;
       const Polygon near = cut(polygon, -side.normal, reached - side.offset);
-      const double area = area_of(near);
+      const double area = norm(polygon_normal(near)) / 2;
       areas[i] += area;
       if (area <= kLeastArea) continue;
       const Vec3 middle = middle_of(near);

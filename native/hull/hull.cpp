@@ -14,8 +14,7 @@ namespace {
 
 constexpr double kRoundoff = 0x1p-53;
 constexpr int kExactRange = 100;  // coordinates with binary exponents beyond this, either way, are scaled
-constexpr std::int32_t kBetweenPolls = 4096;
-constexpr double kFat = 1e-2;  // least ratio of inradius to extent at which the tolerance applies
+constexpr double kFat = 1e-2;     // least ratio of inradius to extent at which the tolerance applies
 
 }  // namespace
 
@@ -37,16 +36,10 @@ void HullBuilder::clear() {
 
 void HullBuilder::drop_inner_points() {
   if (rank_ < 3) return;
-  std::vector<std::int32_t> number(points_.size(), -1);
   std::vector<Vec3> corners;
-  for (Facet& f : facets_) {
-    if (!f.alive) continue;
-    for (std::int32_t& corner : f.corner) {
-      std::int32_t& known = number[corner];
-      if (known < 0) known = static_cast<std::int32_t>(corners.size()), corners.push_back(points_[corner]);
-      corner = known;
-    }
-  }
+  Renumbered numbered(points_, corners);
+  for (Facet& f : facets_)
+    if (f.alive) f.corner = numbered(f.corner);
   points_ = std::move(corners);
   next_outside_.assign(points_.size(), -1);
 }
@@ -182,7 +175,7 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
     return (!fat || height(f, p) >= tolerance_ * norm(f.normal)) && sees(f, p);
   };
   for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) {
-    if ((i - first) % kBetweenPolls == 0) poll_stop();
+    poll_stop(i - first);
     assign(i, alive, clearly);
   }
   std::vector<std::int32_t> pending;

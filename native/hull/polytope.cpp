@@ -12,7 +12,7 @@ std::optional<Polytope> in_general_position(const Mesh& hull, double nudge) {
   const ConvexPlanes planes(hull);
   Vec3 middle{0, 0, 0};
   for (const Vec3 p : hull.vertices) middle = middle + (1.0 / static_cast<double>(hull.vertices.size())) * p;
-  std::vector<Polytope::Facet> all;
+  std::vector<HalfSpace> all;
   std::vector<Vec3> duals;
   for (std::size_t i = 0; i < planes.size(); ++i) {
     const auto plane = static_cast<std::int32_t>(i);

@@ -15,16 +15,11 @@
 namespace rlacd {
 
 struct Polytope {
-  struct Facet {
-    Vec3 normal;
-    double offset;
-    double depth(Vec3 p) const { return offset - dot(normal, p); }
-  };
   struct Edge {
     std::int32_t left, right;  // facets, left < right
     std::int32_t from, to;     // corners, counter-clockwise around the left facet
   };
-  std::vector<Facet> facets;
+  std::vector<HalfSpace> facets;
   std::vector<Vec3> corners;
   std::vector<Edge> edges;
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> edge_between;

@@ -5,8 +5,7 @@
 //      removed without the hull growing by more than the tolerance anywhere are removed in any case. The result stays
 //      in the half-spaces, unless the limits leave no such hull.
 // How: everything is measured after an affine map that makes the hull about as wide in all directions: ratios of
-// volumes
-//      do not change, and needles and plates become well-conditioned.
+//      volumes do not change, and needles and plates become well-conditioned.
 //      (1) Edge collapse. For an edge, the point that lies beyond the planes of all facets around its two corners and
 //      adds least volume is a linear program in three variables (Sander, Gu, Gortler, Hoppe, Snyder: "Silhouette
 //      Clipping", 2000). The polytope is replaced by its hull with that point, which swallows both corners (and maybe

@@ -56,16 +56,10 @@ std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
 Mesh along_a_curve(const Mesh& mesh) {
   Mesh sorted;
   sorted.vertices.reserve(mesh.vertices.size());
-  std::vector<std::int32_t> number(mesh.vertices.size());
-  for (const std::int32_t v : order_along_a_curve(mesh.vertices, Box::of(mesh.vertices))) {
-    number[v] = static_cast<std::int32_t>(sorted.vertices.size());
-    sorted.vertices.push_back(mesh.vertices[v]);
-  }
+  Renumbered numbered(mesh.vertices, sorted.vertices);
+  for (const std::int32_t v : order_along_a_curve(mesh.vertices, Box::of(mesh.vertices))) numbered(v);
   sorted.faces.reserve(mesh.faces.size());
-  for (const std::int32_t f : order_of_faces(mesh)) {
-    const auto [a, b, c] = mesh.faces[f];
-    sorted.faces.push_back({number[a], number[b], number[c]});
-  }
+  for (const std::int32_t f : order_of_faces(mesh)) sorted.faces.push_back(numbered(mesh.faces[f]));
   return sorted;
 }
 

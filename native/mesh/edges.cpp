@@ -13,8 +13,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr std::size_t kBetweenPolls = 4096;
-
 // The other halfedge along the same edge; empty if there are not always two, in opposite directions.
 std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::size_t vertices) {
   Buckets<Run> runs = sorted_halfedges(faces, vertices);
@@ -46,7 +44,7 @@ bool are_fans(const std::vector<Triangle>& faces, const std::vector<std::uint32_
       some[faces[f][c]] = static_cast<std::uint32_t>(3 * f + c);
     }
   for (std::size_t v = 0; v < vertices; ++v) {
-    if (v % kBetweenPolls == 0) poll_stop();
+    poll_stop(v);
     if (leaving[v] == 0) continue;
     std::uint32_t around = 0, at = some[v];
     do {
@@ -126,14 +124,14 @@ Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t ve
     for (int c = 0; c < 3; ++c) runs.count(std::min(f[c], f[c == 2 ? 0 : c + 1]));
   runs.allocate();
   for (std::size_t f = 0; f < faces.size(); ++f) {
-    if (f % kBetweenPolls == 0) poll_stop();
+    poll_stop(f);
     for (int c = 0; c < 3; ++c) {
       const std::int32_t a = faces[f][c], b = faces[f][c == 2 ? 0 : c + 1];
       runs.add(std::min(a, b), {std::max(a, b), static_cast<std::uint32_t>(3 * f + c)});
     }
   }
   for (std::size_t v = 0; v < vertices; ++v) {
-    if (v % kBetweenPolls == 0) poll_stop();
+    poll_stop(v);
     const auto [begin, end] = runs.range(v);
     std::sort(begin, end,
               [](const Run& a, const Run& b) { return a.high != b.high ? a.high < b.high : a.halfedge < b.halfedge; });
@@ -196,7 +194,7 @@ ClosedBodies closed_bodies(const Mesh& mesh) {
   std::vector<Vec3> normals(mesh.faces.size()), apex(found.count);
   double height2 = std::numeric_limits<double>::infinity();
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    if (f % kBetweenPolls == 0) poll_stop();
+    poll_stop(f);
     const auto [a, b, c] = mesh.faces[f];
     const Vec3 p = mesh.vertices[a], q = mesh.vertices[b], r = mesh.vertices[c];
     const Vec3 normal = cross(q - p, r - p);
@@ -228,7 +226,7 @@ Wedges wedges_of(const Mesh& mesh, const std::vector<std::int64_t>& edge_of_half
   wedges.sides.reserve(halfedges);
   std::vector<Spoke> ring;
   for (std::size_t edge = 0; edge < edges; ++edge) {
-    if (edge % kBetweenPolls == 0) poll_stop();
+    poll_stop(edge);
     const auto [begin, end] = around.range(edge);
     ring.clear();
     bool all_trusted = !trusted.empty();

@@ -11,7 +11,6 @@ namespace rlacd {
 namespace {
 
 constexpr int kMostSteps = 768;
-constexpr std::size_t kBetweenPolls = 256;
 
 // Rounded up to 1, 2, 3, 4, 6, 8, 12, 16, ...
 int steps(double length, double spacing) {
@@ -25,17 +24,12 @@ int steps(double length, double spacing) {
 template <class Take>
 void spread_over(const Mesh& mesh, const Triangle& face, double spacing, bool corners_suffice, const Take& take) {
   // From a to b along the longest edge; rows are parallel to it.
-  Vec3 a, b, c;
-  double longest2 = -1;
-  for (int corner = 0; corner < 3; ++corner) {
-    const Vec3 p = mesh.vertices[face[corner]], q = mesh.vertices[face[(corner + 1) % 3]];
-    if (norm2(q - p) <= longest2) continue;
-    longest2 = norm2(q - p);
-    a = p, b = q, c = mesh.vertices[face[(corner + 2) % 3]];
-  }
-  const double base = std::sqrt(longest2);
+  const Corners corners = corners_of(mesh, face);
+  const int k = longest_side(corners);
+  const Vec3 a = corners[k], b = corners[(k + 1) % 3], c = corners[(k + 2) % 3];
+  const double base = norm(b - a);
   if (corners_suffice && base <= spacing) {
-    for (const std::int32_t corner : face) take(mesh.vertices[corner]);
+    for (const Vec3 corner : corners) take(corner);
     return;
   }
   const double height = norm(cross(b - a, c - a)) / std::max(base, std::numeric_limits<double>::min());
@@ -70,7 +64,7 @@ constexpr double kStepU = 0.7548776662466927, kStepV = 0.5698402909980532;
 SpreadPoints spread_points(const Mesh& mesh, double spacing) {
   SpreadPoints spread;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    if (f % kBetweenPolls == 0) poll_stop();
+    poll_stop(f);
     spread_over(mesh, mesh.faces[f], spacing, false, [&](Vec3 point) { spread.points.push_back(point); });
     spread.faces.resize(spread.points.size(), static_cast<std::int32_t>(f));
   }
@@ -81,7 +75,7 @@ MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int6
   MarkedCells cells;
   const auto for_each = [&](const auto& take) {
     for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-      if (f % kBetweenPolls == 0) poll_stop();
+      poll_stop(f);
       spread_over(mesh, mesh.faces[f], spacing, true, take);
     }
   };
@@ -109,7 +103,7 @@ std::vector<std::int64_t> label_cells(const bool* marks, Cell shape) {
   const std::int64_t steps[3] = {shape[1] * shape[2], shape[2], 1}, count = shape[0] * steps[0];
   Groups groups(static_cast<std::size_t>(count));
   for (std::int64_t cell = 0; cell < count; ++cell) {
-    if (cell % (1 << 16) == 0) poll_stop();
+    poll_stop(cell);
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (marks[cell] && cell / steps[axis] % shape[axis] > 0 && marks[cell - steps[axis]])
         groups.join(cell, cell - steps[axis]);
@@ -132,7 +126,7 @@ std::vector<std::int64_t> nearest_labels(const std::int64_t* labels, Cell shape,
   std::vector<std::int64_t> nearest;
   nearest.reserve(cells.size());
   for (std::size_t n = 0; n < cells.size(); ++n) {
-    if (n % 1024 == 0) poll_stop();
+    poll_stop(n);
     std::int64_t found = 0;
     for (std::size_t o = 0; o < offsets.size() && found == 0; ++o) {
       const std::int64_t i = cells[n][0] + offsets[o][0], j = cells[n][1] + offsets[o][1],

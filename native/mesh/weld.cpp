@@ -11,8 +11,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr std::size_t kBetweenPolls = 4096;
-
 struct Hash {
   std::size_t operator()(Vec3 p) const {
     std::size_t hash = 0;
@@ -51,7 +49,7 @@ void for_each_doubled(const std::vector<Triangle>& faces, std::size_t vertices, 
                       const Visit& visit) {
   Buckets<Rest> by_low(vertices);
   for (std::size_t f = 0; f < faces.size(); ++f) {
-    if (f % kBetweenPolls == 0) poll_stop();
+    poll_stop(f);
     if (const Triangle s = sorted(faces[f]); is_counted(s)) by_low.count(s[0]);
   }
   by_low.allocate();
@@ -59,7 +57,7 @@ void for_each_doubled(const std::vector<Triangle>& faces, std::size_t vertices, 
     if (const Triangle s = sorted(faces[f]); is_counted(s))
       by_low.add(s[0], {s[1], s[2], static_cast<std::int32_t>(f)});
   for (std::size_t v = 0; v < vertices; ++v) {
-    if (v % kBetweenPolls == 0) poll_stop();
+    poll_stop(v);
     const auto [begin, end] = by_low.range(v);
     if (end - begin < 2) continue;
     std::sort(begin, end);
@@ -95,7 +93,7 @@ std::vector<std::int32_t> first_in_place(const std::vector<Vec3>& points) {
   known.reserve(points.size());
   std::vector<std::int32_t> first(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (i % kBetweenPolls == 0) poll_stop();
+    poll_stop(i);
     first[i] = known.try_emplace(points[i], static_cast<std::int32_t>(i)).first->second;
   }
   return first;

@@ -34,15 +34,6 @@ std::int32_t BallReach::add(Vec3 point, double clearance) {
   return number;
 }
 
-template <class Action>
-void BallReach::for_neighbours(std::int32_t cell, const Action& action) const {
-  const auto [i, j, k] = grid_.place(cell);
-  for (std::int32_t c = k - 1; c <= k + 1; ++c)
-    for (std::int32_t b = j - 1; b <= j + 1; ++b)
-      for (std::int32_t a = i - 1; a <= i + 1; ++a)
-        if (grid_.holds(a, b, c)) action(grid_.at(a, b, c));
-}
-
 void BallReach::join_cells() {
   const std::int32_t step[3] = {1, grid_.count[0], grid_.count[0] * grid_.count[1]};
   std::int32_t cell = 0;
@@ -63,7 +54,7 @@ void BallReach::join_cells() {
 void BallReach::join_point(std::int32_t point) {
   const auto [i, j, k] = grid_.over(points_[point]);
   if (!grid_.holds(i, j, k)) return;
-  for_neighbours(grid_.at(i, j, k), [&](std::int32_t cell) {
+  grid_.for_neighbours(grid_.at(i, j, k), [&](std::int32_t cell, Vec3) {
     const double clearances = clearance_[point] + grid_.clearance[cell];
     if (is_free(cell) && clearances >= norm(grid_.centre(cell) - points_[point]) + 2 * least_)
       join(node_of(point), node_of_cell(cell));
@@ -134,7 +125,7 @@ bool BallReach::may_be_reached(const std::vector<std::int32_t>& cells, std::int3
   for (std::size_t next = 0; next < open.size(); ++next) {
     poll_stop();
     bool found = false;
-    for_neighbours(open[next], [&](std::int32_t cell) {
+    grid_.for_neighbours(open[next], [&](std::int32_t cell, Vec3) {
       if (!found && mark_[cell] != kShut && may_be_free(cell)) found = enter(cell);
     });
     if (found) return true;
@@ -153,7 +144,7 @@ void BallReach::grow(const std::vector<std::int32_t>& points, const std::vector<
   };
   for (std::size_t p = 0; p < points.size(); ++p) {
     const Place from = {points_[points[p]], clearance_[points[p]], -1};
-    for_neighbours(cells[p], [&](std::int32_t cell) {
+    grid_.for_neighbours(cells[p], [&](std::int32_t cell, Vec3) {
       if (root(node_of_cell(cell)) != root(node_of(points[p]))) {
         const Place* place = place_in(cell);
         if (place == nullptr || !is_way(from, *place)) return;
@@ -165,7 +156,7 @@ void BallReach::grow(const std::vector<std::int32_t>& points, const std::vector<
   for (std::size_t next = 0; next < open.size() && !reached(points[0]); ++next) {
     poll_stop();
     const std::int32_t cell = open[next];
-    for_neighbours(cell, [&](std::int32_t neighbour) {
+    grid_.for_neighbours(cell, [&](std::int32_t neighbour, Vec3) {
       if (mark_[neighbour] == region) return;
       if (root(node_of_cell(neighbour)) != root(node_of_cell(cell))) {
         const Place* from = place_in(cell);

@@ -64,8 +64,6 @@ class BallReach {
   const Place* place_in(std::int32_t cell);
   bool push(Place& place) const;
   bool is_way(const Place& a, const Place& b) const;
-  template <class Action>
-  void for_neighbours(std::int32_t cell, const Action& action) const;
 
   const NavigableField& field_;
   ClearanceGrid& grid_;

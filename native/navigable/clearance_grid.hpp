@@ -46,6 +46,16 @@ struct ClearanceGrid {
   bool holds(std::int32_t i, std::int32_t j, std::int32_t k) const {
     return i >= 0 && j >= 0 && k >= 0 && i < count[0] && j < count[1] && k < count[2];
   }
+  // Calls action(other, step) for a cell and those that touch it, the last axis slowest; a step has entries -1, 0
+  // and 1.
+  template <class Action>
+  void for_neighbours(std::int32_t cell, const Action& action) const {
+    const auto [i, j, k] = place(cell);
+    for (std::int32_t c = -1; c <= 1; ++c)
+      for (std::int32_t b = -1; b <= 1; ++b)
+        for (std::int32_t a = -1; a <= 1; ++a)
+          if (holds(i + a, j + b, k + c)) action(at(i + a, j + b, k + c), Vec3{1.0 * a, 1.0 * b, 1.0 * c});
+  }
   // Coordinates of the cell that contains x, possibly off the grid.
   std::array<std::int32_t, 3> over(Vec3 x) const {
     const auto floor_of = [this](double a, double b) { return static_cast<std::int32_t>(std::floor((a - b) / pitch)); };

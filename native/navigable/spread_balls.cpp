@@ -150,19 +150,14 @@ class Meeting {
   // The neighbour whose uphill direction opposes a cell's most; none on a smooth part.
   const ClearanceGrid::Crossed* at(const ClearanceGrid::Crossed& crossed) const {
     if (index_[crossed.cell] < 0) return nullptr;
-    const auto [i, j, k] = grid_.place(crossed.cell);
     const ClearanceGrid::Crossed* found = nullptr;
     double most = kMeet;
-    for (std::int32_t c = -1; c <= 1; ++c)
-      for (std::int32_t b = -1; b <= 1; ++b)
-        for (std::int32_t a = -1; a <= 1; ++a) {
-          if (!grid_.holds(i + a, j + b, k + c)) continue;
-          const std::int32_t other = index_[grid_.at(i + a, j + b, k + c)];
-          if (other < 0) continue;
-          const Vec3 there = {static_cast<double>(a), static_cast<double>(b), static_cast<double>(c)};
-          const double meet = dot(crossed.room.uphill - grid_.boundary[other].room.uphill, normalized(there));
-          if (meet > most) most = meet, found = &grid_.boundary[other];
-        }
+    grid_.for_neighbours(crossed.cell, [&](std::int32_t cell, Vec3 there) {
+      if (index_[cell] < 0) return;
+      const ClearanceGrid::Crossed& other = grid_.boundary[index_[cell]];
+      const double meet = dot(crossed.room.uphill - other.room.uphill, normalized(there));
+      if (meet > most) most = meet, found = &other;
+    });
     return found;
   }
 
@@ -358,7 +353,7 @@ std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
   const Box& box = hull.box();
   const std::size_t count = candidates != nullptr ? candidates->size() : balls.centres.size();
   for (std::size_t i = 0; i < count; ++i) {
-    if (i % kChunk == 0) poll_stop();
+    poll_stop(i);
     const std::int32_t ball = candidates != nullptr ? (*candidates)[i] : static_cast<std::int32_t>(i);
     const Vec3 c = balls.centres[ball];
     const double radius = balls.radii[ball], enough = radius - least;

@@ -6,9 +6,8 @@
 // The space: points outside the solid, at least r + t from its surface, at most r from the hull, where a ball of radius
 // r stays out of the closed half-spaces, and which the centre of such a ball can reach.
 // How: cells that the boundary crosses (clearance_grid.hpp) give one candidate each, moved exactly onto the boundary;
-// in
-//      creases, where several points of the surface are nearest, onto the crease. Sides of the surface are decided by
-//      the winding number, once per connected region; reachability by ball_reach.hpp. Then candidates are taken
+//      in creases, where several points of the surface are nearest, onto the crease. Sides of the surface are decided
+//      by the winding number, once per connected region; reachability by ball_reach.hpp. Then candidates are taken
 //      greedily, the sharpest first, unless a ball is already there. The same bits for any number of threads.
 #pragma once
 

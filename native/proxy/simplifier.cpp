@@ -23,7 +23,6 @@ constexpr double kFarthest = 1;           // a point moves at most this many len
 constexpr double kTurned = 0.3;           // least cosine of the angle by which a collapse may turn a face
 constexpr std::size_t kMostFailures = 3;  // draws for each face left without an edge that can be collapsed
 constexpr std::size_t kFewest = 4;
-constexpr std::size_t kBetweenPolls = 1024;
 
 // Costs are ranked by their exponent and the first four bits of their mantissa.
 constexpr std::uint16_t kRanks = 1 << 15;
@@ -33,8 +32,6 @@ std::uint16_t rank_of(double cost) {
   std::memcpy(&bits, &cost, sizeof bits);
   return static_cast<std::uint16_t>(bits >> 48);
 }
-
-Vec3 face_normal(Vec3 a, Vec3 b, Vec3 c) { return cross(b - a, c - a); }
 
 }  // namespace
 
@@ -89,10 +86,10 @@ Simplifier::Simplifier(const Mesh& mesh)
       next_(3 * mesh.faces.size(), -1),
       mark_(mesh.vertices.size(), 0) {
   for (std::size_t f = 0; f < faces_.size(); ++f) {
-    if (f % kBetweenPolls == 0) poll_stop();
+    poll_stop(f);
     alive_[f] = place_[f] = static_cast<std::int32_t>(f);
     const auto [a, b, c] = faces_[f];
-    const Vec3 normal = face_normal(points_[a], points_[b], points_[c]);
+    const Vec3 normal = long_normal({points_[a], points_[b], points_[c]});
     const double length = norm(normal);
     for (int k = 0; k < 3; ++k) {
       const std::int32_t v = faces_[f][k], corner = static_cast<std::int32_t>(3 * f) + k;
@@ -122,7 +119,7 @@ void Simplifier::sweep(std::size_t count, int threads) {
   std::vector<char> has_moved(points_.size(), 0);
   std::size_t steps = 0;
   for (const std::int32_t corner : cheap_edges(threads)) {
-    if (++steps % kBetweenPolls == 0) poll_stop();
+    poll_stop(++steps);
     if (size() <= count) return;
     const Triangle& face = faces_[corner / 3];
     const std::int32_t from = face[corner % 3], to = face[(corner + 1) % 3];
@@ -158,7 +155,7 @@ std::vector<std::int32_t> Simplifier::cheap_edges(int threads) const {
 void Simplifier::collapse_drawn(std::size_t count) {
   std::size_t failures = 0, steps = 0;
   while (size() > std::max(count, kFewest) && failures < kMostFailures * size()) {
-    if (++steps % kBetweenPolls == 0) poll_stop();
+    poll_stop(++steps);
     candidates_.clear();
     const std::size_t choices = std::clamp(kChoicesTimesFaces / size(), kFewChoices, kMostChoices);
     for (std::size_t k = 0; k < choices; ++k) candidates_.push_back(random_edge());
@@ -173,19 +170,9 @@ void Simplifier::collapse_drawn(std::size_t count) {
 
 Mesh Simplifier::mesh() const {
   Mesh result;
-  std::vector<std::int32_t> number(points_.size(), -1);
-  for (std::size_t f = 0; f < faces_.size(); ++f) {
-    if (place_[f] < 0) continue;
-    Triangle face = faces_[f];
-    for (std::int32_t& v : face) {
-      if (number[v] < 0) {
-        number[v] = static_cast<std::int32_t>(result.vertices.size());
-        result.vertices.push_back(points_[v]);
-      }
-      v = number[v];
-    }
-    result.faces.push_back(face);
-  }
+  Renumbered numbered(points_, result.vertices);
+  for (std::size_t f = 0; f < faces_.size(); ++f)
+    if (place_[f] >= 0) result.faces.push_back(numbered(faces_[f]));
   return result;
 }
 
@@ -247,7 +234,7 @@ bool Simplifier::turns_over(const std::vector<std::int32_t>& faces, std::int32_t
                             Vec3 point) const {
   for (const std::int32_t f : faces) {
     const Triangle& face = faces_[f];
-    Vec3 corner[3], moved[3];
+    Corners corner, moved;
     bool vanishes = false;
     for (int k = 0; k < 3; ++k) {
       vanishes |= face[k] == other;
@@ -255,8 +242,7 @@ bool Simplifier::turns_over(const std::vector<std::int32_t>& faces, std::int32_t
       moved[k] = face[k] == vertex ? point : corner[k];
     }
     if (vanishes) continue;
-    const Vec3 before = face_normal(corner[0], corner[1], corner[2]);
-    const Vec3 after = face_normal(moved[0], moved[1], moved[2]);
+    const Vec3 before = long_normal(corner), after = long_normal(moved);
     const double product = dot(before, after);
     // A face without an area may become anything that has one.
     if (!(norm2(after) > 0) || product * std::fabs(product) < kTurned * kTurned * norm2(before) * norm2(after))

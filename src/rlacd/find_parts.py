@@ -17,7 +17,7 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, MOST_PER_FACE, cut_and_merge
 from rlacd.merge import drop_slivers, grow_cover, merge_parts
 from rlacd.merge.merge import united_in_turn
-from rlacd.options import Options
+from rlacd.options import FAST, Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy.model import Model
@@ -141,8 +141,7 @@ class _Decomposer:
             if self.model.proxy is None:
                 return parts, done.criterion, found
             policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
-            scaled = goal if factor == 1.0 else goal.scaled(factor)
-            return self.model.lift(parts, scaled, policy, self.run, merge=self.options.merge), goal, found
+            return self.model.lift(parts, goal, factor, policy, self.run, merge=self.options.merge), goal, found
 
     def keeps(self, most: int, parts: list[Part]) -> bool:
         """Whether there are at most so many parts."""
@@ -209,31 +208,34 @@ class _Decomposer:
     ) -> tuple[list[Part], SearchSummary | None]:
         """The parts after the search of the quality level and its summary; `asked` is the solid's unscaled goal."""
         options, run, found = self.options, self.run, None
-        policy = options.policy if isinstance(options.policy, str) else ""
-        context = SearchContext(self.model.component, goal, options.seed, self.sweeps)
+        policy, root = options.first_policy, self.model.component
+        context = SearchContext(root, goal, options.seed, self.sweeps, first_policy=policy)
         given = options.quality, options.budget, options.search_steps
         quality, seconds, steps = given if asked is not None else ("balanced", None, None)
         assert quality is not None, "filled in by the options"
-        eliminates = options.merge and goal.eliminates and policy not in AS_PUBLISHED
-        searches = options.quality != "fast"
-        first = eliminates and (not searches or goal.obstacles is not None)
+        goes_on = options.merge and policy not in AS_PUBLISHED
+        eliminates = goes_on and goal.eliminates
         if run.stopped_by is not None:
             return parts, None
         try:
-            if not searches and options.merge and policy not in AS_PUBLISHED:
-                with run.stage("merge"), run.limited(run.work.done):
-                    parts = grow_cover(parts, goal, run, self.model.component)
-            if run.stopped_by is not None or not (first or searches):
+            if options.quality == FAST:
+                if goes_on:
+                    with run.stage("merge"), run.limited(run.work.done):
+                        parts = grow_cover(parts, goal, run, root)
+                if eliminates and run.stopped_by is None:
+                    with run.stage("search"):
+                        parts = eliminate_parts(context, parts, run)
                 return parts, None
             with run.stage("search"):
+                first = eliminates and goal.obstacles is not None
                 merged = parts = eliminate_parts(context, parts, run) if first else parts
-                if not searches or run.stopped_by is not None:
+                if run.stopped_by is not None:
                     return parts, None
                 if asked is not None:
                     bound = run.start(partial(at_least, self.model.solid, parts, asked.overhang, run))
                     enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
                     context = replace(context, enough=enough)
-                parts, found = search(context, merged, run, quality, seconds, steps, policy)
+                parts, found = search(context, merged, run, quality, seconds, steps)
                 if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
                     parts = min(parts, eliminate_parts(context, merged, run), key=cost)
         except Stopped:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-LENGTHS = ("concavity", "distance")
-"""Criteria that measure a length, which the threshold limits."""
+_LENGTHS = ("concavity", "distance")
 
 
 class Fit(NamedTuple):
@@ -34,7 +33,7 @@ class Fit(NamedTuple):
     @classmethod
     def of(cls, report: Mapping[str, Any]) -> Fit | None:
         """Read a report; None if it does not say."""
-        for name in LENGTHS:
+        for name in _LENGTHS:
             if name in report:
                 found = report[name]
                 return cls(name, found.get("per_part"), found["max"], report.get("options", {}).get("threshold"))
@@ -50,6 +49,11 @@ class Fit(NamedTuple):
     def key(self) -> str:
         """Its entry in the report."""
         return {"added_volume": "volume", "intrusion": "navigable"}.get(self.name, self.name)
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it is a length, which the threshold limits."""
+        return self.name in _LENGTHS
 
     def unit(self, scale: float) -> float:
         """What a length that measures `scale` measures as the criterion does: nothing else if that is a share."""

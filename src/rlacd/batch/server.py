@@ -17,7 +17,7 @@ from rlacd.batch.job_spec import POLICY, JobSpec
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
-from rlacd.fit import LENGTHS, Fit
+from rlacd.fit import Fit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import is_robot, rewrite_robot, usd
@@ -97,7 +97,7 @@ def _robot(spec: JobSpec, robot: Path | usd.Colliders, place: Path, hull_only: b
         warnings.append(warning)
     reports = [mesh.result.report for mesh in done.meshes]
     facts = {what: sum(report[what] for report in reports) for what in ("parts", "faces", "vertices")}
-    fits = [fit for report in reports if (fit := Fit.of(report)) is not None and fit.name in LENGTHS]
+    fits = [fit for report in reports if (fit := Fit.of(report)) is not None and fit.is_length]
     if fits and all(fit.worst is not None for fit in fits):
         facts[fits[0].name] = max(fit.worst for fit in fits if fit.worst is not None)
     return {**facts, "complete": done.complete and not hull_only, "warnings": warnings}

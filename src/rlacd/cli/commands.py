@@ -21,8 +21,8 @@ class Argument(click.Argument):
 
     panel = ARGUMENTS
 
-    def __init__(self, name: str, metavar: str, text: str, kind: Any = Path) -> None:
-        super().__init__([name], metavar=metavar, type=_typed(kind))
+    def __init__(self, name: str, metavar: str, text: str) -> None:
+        super().__init__([name], metavar=metavar, type=_typed(Path))
         self.text = text
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str]:

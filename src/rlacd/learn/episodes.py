@@ -14,10 +14,8 @@ from rlacd.learn.options import TrainOptions
 from rlacd.learn.process import CutProcess
 from rlacd.planes.sweep import valid_planes
 from rlacd.policies.network import Network
-from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray
+from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray, Int64Array
 from rlacd.solid.component import Component
-
-Longs = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +41,11 @@ class Episode:
 
     features: NDArray[np.float16]
     masks: BoolArray
-    state: Longs
-    planes: Longs
+    state: Int64Array
+    planes: Int64Array
     rewards: FloatArray
-    child: Longs
-    owner: Longs
+    child: Int64Array
+    owner: Int64Array
     discounts: FloatArray
     parts: int
     ended: str

@@ -8,12 +8,11 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray
 from rlacd.solid.component import Part, is_film
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import SLIVER_RADIUS, Hull
-from rlacd.solid.topology import BoolArray
 
 SLIVER_LOSS = 2 * HALF_THICKNESS
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""

@@ -263,8 +263,6 @@ class Options:
             object.__setattr__(self, "criterion", "concavity" if self.threshold_abs is None else "distance")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else FAST)
-        if self.policy is None:
-            object.__setattr__(self, "policy", self.default_policy)
         for name, rule in self._conflicts():
             raise OptionError(f"{name} is {getattr(self, name)!r}; it has to be {rule}.")
 

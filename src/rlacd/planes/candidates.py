@@ -56,14 +56,14 @@ class Candidates:
         return Plane((x, y, z), float(self.offsets[k, j]))
 
 
-def axis_and_principal(component: Component, per_axis: int = OFFSETS_PER_AXIS) -> Candidates:
-    """Candidates of one component: `per_axis` planes along x, y, z and its three principal axes.
+def axis_and_principal(component: Component) -> Candidates:
+    """Candidates of one component: the paper's 150 planes, along x, y, z and its three principal axes.
 
-    The planes divide the component's extent along each direction into `per_axis` + 1 equal slabs (the paper, 3.2).
+    The planes divide the component's extent along each direction into equal slabs (the paper, 3.2).
     Principal axes within 0.001 radians of a coordinate axis are replaced by it.
     """
-    directions, offsets = _planes(component, per_axis, 0)
-    return Candidates(np.ascontiguousarray(directions[::per_axis]), offsets.reshape(-1, per_axis))
+    directions, offsets = _planes(component, OFFSETS_PER_AXIS, 0)
+    return Candidates(np.ascontiguousarray(directions[::OFFSETS_PER_AXIS]), offsets.reshape(-1, OFFSETS_PER_AXIS))
 
 
 def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) -> Candidates:

@@ -169,7 +169,7 @@ def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
     lower, upper = heights.min(axis=0), heights.max(axis=0)
     extent = float((upper - lower).max())
     thinner = np.minimum(candidates.offsets - lower[:, None], upper[:, None] - candidates.offsets).ravel()
-    for sliver in (SLIVER, SLIVER / 100):
+    for sliver in SLIVERS:
         valid: BoolArray = thinner > sliver * extent
         if valid.any():
             break

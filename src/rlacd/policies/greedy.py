@@ -109,11 +109,6 @@ def least_hulls(
     return least_excess(component, short, SCORES["hull-sum"], threads) or fallback
 
 
-def generator_of(component: Component, seed: int = 0) -> np.random.Generator:
-    """Get a random generator that a component's vertices and the seed determine, whatever was cut before."""
-    return np.random.default_rng([seed, zlib.crc32(component.vertices.tobytes())])
-
-
 class RandomShortlist:
     """Chooses the plane with the least sum of hull volumes among random planes and those of concave edges.
 
@@ -126,7 +121,7 @@ class RandomShortlist:
     concave_edges : int
         Number of concave edges whose planes join them.
     seed : int
-        See `generator_of`.
+        What is drawn depends on it and the component's vertices, whatever was cut before.
     """
 
     def __init__(self, planes: int = 10, concave_edges: int = EDGES_PER_COMPONENT, seed: int = 0) -> None:
@@ -138,5 +133,6 @@ class RandomShortlist:
         """Choose the plane to cut a component by; None if no candidate is valid."""
         candidates = axis_and_principal(component)
         valid = np.flatnonzero(valid_planes(component, candidates))
-        drawn = generator_of(component, self._seed).choice(valid, min(self._planes, len(valid)), replace=False)
+        random = np.random.default_rng([self._seed, zlib.crc32(component.vertices.tobytes())])
+        drawn = random.choice(valid, min(self._planes, len(valid)), replace=False)
         return least_hulls(component, candidates, drawn, self._concave_edges, threads)

@@ -30,10 +30,6 @@ SIMPLE_FIRST = 2 * HALF_THICKNESS
 """The hulls of a proxy's parts are simplified within this first: they have to grow anyway. Grown hulls are simplified
 within half of it: noise gives them many corners."""
 
-MARGIN = 1.5
-"""Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
-
-
 MOST_CUTS = 2
 """How often a part is cut on the solid: hulls of its pieces may grow to cover the surface until they fail again."""
 
@@ -84,8 +80,7 @@ class Lift:
     Attributes
     ----------
     solid : Component
-    deviation : float
-        Of the proxy.
+    proxy : Proxy
     goal : Criterion
         Tests the parts on the solid.
     policy : Policy
@@ -95,7 +90,7 @@ class Lift:
     """
 
     solid: Component
-    deviation: float
+    proxy: Proxy
     goal: Criterion
     policy: Policy
     run: Run
@@ -139,7 +134,7 @@ class Lift:
 
     def _cut_again(self, failing: _Lifted) -> list[_Lifted]:
         """Cut a part of the solid; the second time with room for its pieces' hulls to grow."""
-        part, tighter = failing.on_solid, 1 - failing.cuts * MARGIN * self.deviation / self.goal.overhang
+        part, tighter = failing.on_solid, 1 - failing.cuts * self.proxy.margin(self.goal)
         tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
         new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
         cuts = failing.cuts + 1
@@ -155,7 +150,7 @@ class Lift:
         points = self.solid.filling.uncovered(
             [each.hull.vertices for each in lifted],
             [each.hull.faces for each in lifted],
-            2 * self.deviation + SIMPLE_FIRST,
+            2 * self.proxy.deviation + SIMPLE_FIRST,
             GROWTH_TO_SPARE,
             self.run.threads,
         )
@@ -191,13 +186,10 @@ class Model:
     ----------
     solid : Component
     proxy : Proxy or None
-    threshold : float
-        The criterion's; `_margin` relates the proxy's deviation to it.
     """
 
     solid: Component
     proxy: Proxy | None
-    threshold: float
 
     @classmethod
     def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, run: Run) -> Model:
@@ -209,7 +201,7 @@ class Model:
                     proxy = simplify(solid, goal.overhang, run.threads, pieces)
             except Stopped:
                 run.note_stop()
-        return cls(solid, proxy, goal.overhang)
+        return cls(solid, proxy)
 
     @property
     def component(self) -> Component:
@@ -218,19 +210,19 @@ class Model:
 
     def tighter(self, goal: Criterion, factor: float = 1.0) -> Criterion:
         """Get what parts of the model have to meet so that those of the solid meet the goal, scaled by a factor."""
-        return goal.scaled(factor - self._margin) if self.proxy is not None or factor != 1.0 else goal
+        share = factor if self.proxy is None else factor - self.proxy.margin(goal)
+        return goal if share == 1.0 else goal.scaled(share)
 
-    def lift(self, parts: list[Part], goal: Criterion, policy: Policy, run: Run, *, merge: bool) -> list[Part]:
-        """Carry parts of the model to the solid, where they meet the goal."""
+    def lift(
+        self, parts: list[Part], goal: Criterion, factor: float, policy: Policy, run: Run, *, merge: bool
+    ) -> list[Part]:
+        """Carry parts of the model to the solid, where they meet the goal, scaled by a factor."""
         assert self.proxy is not None
+        scaled = goal if factor == 1.0 else goal.scaled(factor)
         with run.stage("lift"):
-            lift = Lift(self.solid, self.proxy.deviation, goal, policy, run)
+            lift = Lift(self.solid, self.proxy, scaled, policy, run)
             parts = lift(parts, mend=run.stopped_by is None)
             if merge and run.stopped_by is None:  # the margin may have kept some apart
-                looser = goal.scaled(1 + self._margin)
+                looser = scaled.scaled(1 + self.proxy.margin(goal))
                 parts = merge_lifted(parts, self.component, looser, lift.confirmed, run)
         return parts
-
-    @property
-    def _margin(self) -> float:
-        return 0.0 if self.proxy is None else MARGIN * self.proxy.deviation / self.threshold

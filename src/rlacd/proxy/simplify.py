@@ -19,6 +19,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from rlacd import _native
+from rlacd.criteria import Criterion
 from rlacd.repair.union import CrossingsError, unite
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import DENSE, Component
@@ -49,6 +50,9 @@ may lose more: a sheet of even thickness has less volume once its noise, and so 
 WORTHWHILE = 0.5
 """A proxy has at most this share of the solid's triangles; also the step while it is larger than any looked at."""
 
+MARGIN = 1.5
+"""Parts of a proxy have to be tighter by this share of its deviation: their hulls still have to grow to the solid."""
+
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 """Vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]``, closed."""
 
@@ -66,6 +70,10 @@ class Proxy:
 
     component: Component
     deviation: float
+
+    def margin(self, goal: Criterion) -> float:
+        """By which share of what a goal allows parts of the proxy have to be tighter than those of the solid."""
+        return MARGIN * self.deviation / goal.overhang
 
 
 class _Copy(NamedTuple):

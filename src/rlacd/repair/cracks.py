@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rlacd._native import components, points_within, poll_stop
-from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import Edges, IntArray, first_of_doubled, nondegenerate
+from rlacd.solid.arrays import FloatArray, Int64Array, dots
+from rlacd.solid.topology import Edges, first_of_doubled, nondegenerate
 
 MOST_FREE_EDGES = 500_000
 """A soup with more free edges is not a scan with holes: tracing loops is the one step that walks edge by edge."""
@@ -21,8 +21,8 @@ MOST_NEAR = 100 * MOST_FREE_EDGES
 
 
 def close_cracks(
-    vertices: FloatArray, faces: IntArray, edges: Edges, tolerances: Sequence[float]
-) -> tuple[IntArray, IntArray]:
+    vertices: FloatArray, faces: Int64Array, edges: Edges, tolerances: Sequence[float]
+) -> tuple[Int64Array, Int64Array]:
     """Merge free edges that nearly coincide, with increasing tolerances.
 
     An attempt that closes nothing, or leaves no face, is undone. No two of the faces have the same three corners.
@@ -46,7 +46,7 @@ def close_cracks(
     return faces, origin
 
 
-def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, tolerance: float) -> IntArray:
+def weld_free_vertices(vertices: FloatArray, faces: Int64Array, free: Int64Array, tolerance: float) -> Int64Array:
     """Merge vertices of free edges ``[B, 2]`` that lie within `tolerance` of each other.
 
     Returns faces of the same number, of which some may be degenerate. Vertices keep their places: each group is
@@ -63,7 +63,7 @@ def weld_free_vertices(vertices: FloatArray, faces: IntArray, free: IntArray, to
     return target[faces]
 
 
-def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: float) -> tuple[IntArray, IntArray]:
+def split_at_free_vertices(vertices: FloatArray, faces: Int64Array, tolerance: float) -> tuple[Int64Array, Int64Array]:
     """Insert free vertices into the free edges they lie on (T-junctions).
 
     Returns the faces ``[G, 3]``, split ones replaced by several, and ``[G]`` the old face each comes from.
@@ -91,7 +91,9 @@ def split_at_free_vertices(vertices: FloatArray, faces: IntArray, tolerance: flo
     return new[good], np.concatenate([whole, face[chain_edge[pair]]])[good]
 
 
-def _on_edges(vertices: FloatArray, corners: IntArray, free: IntArray, tolerance: float) -> tuple[IntArray, IntArray]:
+def _on_edges(
+    vertices: FloatArray, corners: Int64Array, free: Int64Array, tolerance: float
+) -> tuple[Int64Array, Int64Array]:
     """Which of some vertices lie on which edges, from the first to the second of the corners ``[N, 3]`` of each face.
 
     Returns pairs of an edge and a vertex, in the order in which they follow each other along the edges.
@@ -119,7 +121,7 @@ def _on_edges(vertices: FloatArray, corners: IntArray, free: IntArray, tolerance
     return edge[on], vertex[on]
 
 
-def free_edges(faces: IntArray, edges: Edges) -> IntArray:
+def free_edges(faces: Int64Array, edges: Edges) -> Int64Array:
     """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them."""
     face, corner = np.divmod(np.flatnonzero((edges.valence == 1)[edges.of_halfedge]), 3)
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)

@@ -10,11 +10,11 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import Surface, poll_stop
 from rlacd.repair.soup import face_normals
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.component import DENSE
 from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import HALF_THICKNESS
-from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled
+from rlacd.solid.topology import first_of_doubled
 
 # Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
 _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
@@ -29,7 +29,7 @@ class SurfaceQuery:
     Built on first use: most inputs never need it.
     """
 
-    def __init__(self, vertices: FloatArray, faces: IntArray, threads: int | None = None) -> None:
+    def __init__(self, vertices: FloatArray, faces: Int64Array, threads: int | None = None) -> None:
         self.vertices = vertices
         self.faces = faces
         self.threads = threads
@@ -47,7 +47,7 @@ class SurfaceQuery:
         """Return the distance ``[N]`` of each point to the faces."""
         return self._surface.distance(points, threads=self.threads or 0)
 
-    def closest(self, points: FloatArray) -> tuple[FloatArray, IntArray]:
+    def closest(self, points: FloatArray) -> tuple[FloatArray, Int64Array]:
         """Return the closest point ``[N, 3]`` of the faces and the face ``[N]`` it lies on."""
         found, face = self._surface.closest(points, threads=self.threads or 0)
         return found, face.astype(np.int64)
@@ -61,12 +61,12 @@ class SurfaceQuery:
         return self.winding(points, is_closed=True) > 0.5
 
 
-def probes(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def probes(vertices: FloatArray, faces: Int64Array) -> FloatArray:
     """Return seven points of every face ``[F, 7, 3]``: a face may begin inside a body and lead out of it."""
     return np.asarray(np.einsum("pk,fkd->fpd", _PROBES, vertices[faces]))
 
 
-def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tuple[FloatArray, IntArray]:
+def points_covering(vertices: FloatArray, faces: Int64Array, spacing: float) -> tuple[FloatArray, Int64Array]:
     """Choose points such that no point of a face is farther than `spacing` from one of them; corners are among them.
 
     Returns the points ``[N, 3]`` and a face ``[N]`` each lies on. Faces no larger than `spacing` share their corners.
@@ -82,7 +82,7 @@ def points_covering(vertices: FloatArray, faces: IntArray, spacing: float) -> tu
     return np.concatenate([vertices[shared], points]), np.concatenate([first[shared], large[on]])
 
 
-def spread_points(vertices: FloatArray, faces: IntArray, spacing: float) -> tuple[FloatArray, IntArray]:
+def spread_points(vertices: FloatArray, faces: Int64Array, spacing: float) -> tuple[FloatArray, Int64Array]:
     """Lay a grid over every face so that no point of a face is farther than `spacing` from a grid point.
 
     Returns the points ``[N, 3]``, corners included, and the face ``[N]`` each lies on.
@@ -97,7 +97,7 @@ def affordable(spacing: float, area: float) -> float:
 
 
 def shared_faces(
-    vertices: FloatArray, faces: IntArray, other_vertices: FloatArray, other_faces: IntArray
+    vertices: FloatArray, faces: Int64Array, other_vertices: FloatArray, other_faces: Int64Array
 ) -> tuple[BoolArray, BoolArray]:
     """Return which faces ``[F]`` and ``[G]`` of two meshes have their corners in the same places, however wound."""
     places = np.concatenate([vertices, other_vertices])
@@ -124,7 +124,7 @@ def is_tangle(solid: SurfaceQuery) -> bool:
     return bool(_inside_out(solid, PLACES)[1].mean() > TANGLED)
 
 
-def tangled_bodies(solid: SurfaceQuery, vertices: FloatArray, faces: IntArray, body: IntArray) -> IntArray:
+def tangled_bodies(solid: SurfaceQuery, vertices: FloatArray, faces: Int64Array, body: Int64Array) -> Int64Array:
     """Return the bodies of which too much is inside out, given the faces that the solid was built from."""
     points, is_wrong = _inside_out(solid, DENSE)  # enough to tell in which bodies
     at = body[SurfaceQuery(vertices, faces, solid.threads).closest(points)[1]]

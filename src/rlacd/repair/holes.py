@@ -25,10 +25,10 @@ from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_po
 from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
 from rlacd.repair.soup import FLAPS, Soup, trust_windings
 from rlacd.repair.state import State
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.solid import Hole
-from rlacd.solid.topology import BoolArray, IntArray, first_of_doubled, marked
+from rlacd.solid.topology import first_of_doubled, marked
 
 HOLE, HOLE_SHARE = 0.1, 0.02
 """A nearly closed body, with holes of at most this share of its area, is closed with caps up to this far away: a scan
@@ -71,7 +71,7 @@ class _Hole:
         Whether it is an end of a bar; whether missing faces left it. Both depend on the other holes.
     """
 
-    loop: IntArray
+    loop: Int64Array
     body: int
     share: float
     of_all: float
@@ -218,7 +218,7 @@ class _Caps:
         may |= np.array([one.is_wound for one in self.holes])[hole[far]]
         return marked(self._body_of_hole[hole[far[~may]]], self._bodies)
 
-    def bodies_of(self, chosen: BoolArray) -> IntArray:
+    def bodies_of(self, chosen: BoolArray) -> Int64Array:
         """The bodies that belong to chosen ones ``[bodies]``: all that share a hole."""
         return np.flatnonzero(chosen[self._joined])
 

@@ -22,7 +22,6 @@ from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes, may_have_holes
 from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
-from rlacd.repair.state import STEPS as NAMES
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
 from rlacd.repair.voxels import DEFAULT_GAP
@@ -38,12 +37,12 @@ from rlacd.repair.wraps import (
     wrap_all,
     wrap_sheets,
 )
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import NO_FILM, BoolArray, IntArray, bodies_of, compacted, detach_films
+from rlacd.solid.topology import NO_FILM, bodies_of, compacted, detach_films
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
@@ -81,7 +80,7 @@ def _is_nothing(state: State) -> bool:
 def _take_hull(state: State) -> None:
     """Take the convex hull of all points."""
     state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
-    state.step[:] = NAMES.index("hull")
+    state.note(np.arange(state.bodies), "hull")
     state.solid = hull_of_points(state.surface.vertices)
     state.parts = [Piece(state.solid, 0)]
 
@@ -208,7 +207,7 @@ def _take_steps(state: State) -> None:
             step(state)
 
 
-def _is_inside(vertices: FloatArray, faces: IntArray, film: BoolArray, threads: int | None) -> BoolArray:
+def _is_inside(vertices: FloatArray, faces: Int64Array, film: BoolArray, threads: int | None) -> BoolArray:
     """Return ``[F]`` which films lie inside the other faces: where two bodies touch."""
     inside = film.copy()
     if film.any():

@@ -21,8 +21,8 @@ import numpy as np
 
 from rlacd._native import components, least_bent, long_normals, poll_stop
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
-from rlacd.solid.arrays import FloatArray, dots
-from rlacd.solid.topology import BoolArray, IntArray, marked, nondegenerate
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
+from rlacd.solid.topology import marked, nondegenerate
 
 _NEXT = np.array([1, 2, 0])
 
@@ -45,8 +45,8 @@ class Rims:
         ``[F]``, whether a face belongs to a flap.
     """
 
-    loops: list[IntArray]
-    beside: list[IntArray]
+    loops: list[Int64Array]
+    beside: list[Int64Array]
     normals: FloatArray
     inverted: BoolArray
     flap: BoolArray
@@ -73,7 +73,7 @@ def rims_of(soup: Soup) -> Rims:
     return Rims([tail[loop] for loop in loops], [rim[loop] // 3 for loop in loops], normals, inverted, flap)
 
 
-def _mated(soup: Soup) -> tuple[IntArray, IntArray]:
+def _mated(soup: Soup) -> tuple[Int64Array, Int64Array]:
     """Return the mate ``[3F]`` of every halfedge, and the component ``[2F]`` of every side."""
     mate = _mates(soup)
     poll_stop()
@@ -89,8 +89,8 @@ def _mated(soup: Soup) -> tuple[IntArray, IntArray]:
 
 
 def _continued(
-    soup: Soup, mate: IntArray, rim: IntArray, swap: BoolArray, weighted: FloatArray
-) -> tuple[IntArray, IntArray]:
+    soup: Soup, mate: Int64Array, rim: Int64Array, swap: BoolArray, weighted: FloatArray
+) -> tuple[Int64Array, Int64Array]:
     """Return the vertex ``[N]`` where each free halfedge begins, seen from outside, and the one that continues it.
 
     Halfedges of faces that are wound the other way are to be swapped; normals ``[F, 3]`` are as long as areas.
@@ -106,7 +106,7 @@ def _continued(
     return tail, _followers(soup.vertices, normal_of_vertex, tail, head, tail_fan, head_fan)
 
 
-def _sides(soup: Soup, mate: IntArray) -> IntArray:
+def _sides(soup: Soup, mate: Int64Array) -> Int64Array:
     """Return ``[2F]`` the component that the front and the back of every face belong to, joined across mates."""
     mated = np.flatnonzero(mate >= 0)
     forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
@@ -118,7 +118,7 @@ def _sides(soup: Soup, mate: IntArray) -> IntArray:
     )[1]
 
 
-def _fans(faces: IntArray, mate: IntArray) -> IntArray:
+def _fans(faces: Int64Array, mate: Int64Array) -> Int64Array:
     """Return ``[3F]`` the fan of each corner: the corners around a vertex that the mates of faces connect."""
     here = np.flatnonzero(mate >= 0)
     there = mate[here]
@@ -129,7 +129,7 @@ def _fans(faces: IntArray, mate: IntArray) -> IntArray:
     return components(3 * len(faces), np.concatenate([here, here_next]), np.concatenate([begins, ends]))[1]
 
 
-def _mates(soup: Soup) -> IntArray:
+def _mates(soup: Soup) -> Int64Array:
     """Return ``[3F]`` the halfedge that continues each across its edge, -1 for none."""
     edge = soup.edges
     mate = np.full(3 * len(soup.faces), -1, dtype=np.int64)
@@ -160,7 +160,7 @@ def _mates(soup: Soup) -> IntArray:
     return mate
 
 
-def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
+def _flaps(soup: Soup, patch: Int64Array) -> BoolArray:
     """Return ``[F]`` whether a face belongs to a small patch with free edges that is attached to other patches."""
     count = int(patch.max(initial=-1)) + 1
     hangs, free = (
@@ -172,8 +172,13 @@ def _flaps(soup: Soup, patch: IntArray) -> BoolArray:
 
 
 def _followers(
-    vertices: FloatArray, normals: FloatArray, tail: IntArray, head: IntArray, tail_fan: IntArray, head_fan: IntArray
-) -> IntArray:
+    vertices: FloatArray,
+    normals: FloatArray,
+    tail: Int64Array,
+    head: Int64Array,
+    tail_fan: Int64Array,
+    head_fan: Int64Array,
+) -> Int64Array:
     """Return ``[N]`` the free edge that continues each at its head, -1 for none.
 
     Seen from outside, going counter-clockwise around a vertex, a fan is followed by a hole, then the next fan.
@@ -209,11 +214,11 @@ def _turns(came_from: FloatArray, here: FloatArray, goes_to: FloatArray, axis: F
     return np.asarray(np.arctan2(dots(np.cross(axis, flat), goes), dots(flat, goes)) % (2 * np.pi))
 
 
-def _cycles(follower: IntArray) -> list[IntArray]:
+def _cycles(follower: Int64Array) -> list[Int64Array]:
     """Return the cycles of a partial permutation."""
     seen = [False] * len(follower)
     step = follower.tolist()
-    cycles: list[IntArray] = []
+    cycles: list[Int64Array] = []
     for start in range(len(step)):
         walk, at = [], start
         while at >= 0 and not seen[at]:
@@ -231,7 +236,7 @@ _EXACT_LOOP = 60
 _SMOOTH_RIM = 0.7
 
 
-def caps_of(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
+def caps_of(soup: Soup, rims: Rims) -> tuple[Int64Array, Int64Array]:
     """Triangulate the loops, no two across the same edge if possible.
 
     Returns the faces ``[C, 3]``, without those with a repeated vertex, and the loop ``[C]`` of each.
@@ -262,7 +267,7 @@ def caps_of(soup: Soup, rims: Rims) -> tuple[IntArray, IntArray]:
     return faces[real], owner[real]
 
 
-def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) -> IntArray:
+def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) -> Int64Array:
     """Triangulate a closed loop of points; a loop may visit a place twice.
 
     Parameters
@@ -277,7 +282,7 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) 
 
     Returns
     -------
-    IntArray
+    Int64Array
         ``[N - 2, 3]`` corners, all of them points of the loop, oriented against the loop to match the adjacent faces.
     """
     if len(points) <= 3:
@@ -290,13 +295,13 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) 
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
     if len(ears) != len(points) - 2:  # the loop's projection crosses itself: no plane fits
         return np.array([(0, i + 1, i) for i in range(1, len(points) - 1)], dtype=np.int64)
-    triangles: IntArray = ears.astype(np.int64)
+    triangles: Int64Array = ears.astype(np.int64)
     a, b, c = triangles.T
     along = ((b - a) % len(points) < (c - a) % len(points)).sum() * 2 > len(triangles)
     return triangles[:, ::-1] if along else triangles
 
 
-def smooth_share(soup: Soup, rims: Rims, caps: IntArray, owner: IntArray) -> FloatArray:
+def smooth_share(soup: Soup, rims: Rims, caps: Int64Array, owner: Int64Array) -> FloatArray:
     """Return ``[L]`` the share of each loop along which its cap continues the adjacent faces."""
     normal = face_normals(soup.vertices, caps)
     # The cap's face at each edge of the rim, found by loop and edge.

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from rlacd._native import components, face_areas, long_normals, poll_stop
-from rlacd.solid.arrays import FloatArray, dots
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.hull import TOLERANCE
-from rlacd.solid.topology import NO_FILM, BoolArray, Edges, IntArray, Sides, has_marked, is_balanced, marked, sides_of
+from rlacd.solid.topology import NO_FILM, Edges, Sides, has_marked, is_balanced, marked, sides_of
 
 FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
@@ -37,8 +37,8 @@ class Soup:
     """
 
     vertices: FloatArray
-    faces: IntArray
-    body: IntArray
+    faces: Int64Array
+    body: Int64Array
     trusted: BoolArray | None = None
     known_edges: Edges | None = None
 
@@ -62,7 +62,7 @@ class Soup:
         return has_marked(marked, self.edges.of_halfedge.reshape(-1, 3))
 
     @cached_property
-    def body_of_side(self) -> IntArray:
+    def body_of_side(self) -> Int64Array:
         """Return ``[C]`` the body of each side component."""
         result = np.zeros(len(self.sides.volume), dtype=np.int64)
         result[self.sides.label] = np.repeat(self.body, 2)
@@ -138,7 +138,7 @@ def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> S
     return replace(soup, known_edges=soup.edges, trusted=before | better[soup.body]) if better.any() else soup
 
 
-def _layers(corners: FloatArray, patch: IntArray) -> float:
+def _layers(corners: FloatArray, patch: Int64Array) -> float:
     """In how many boxes of patches a face lies on average, given its corners ``[F, 3, 3]`` and its patch ``[F]``."""
     lower, upper = boxes_of(corners, patch)
     middle = corners.mean(axis=1)
@@ -146,7 +146,7 @@ def _layers(corners: FloatArray, patch: IntArray) -> float:
     return float(sum(inside))
 
 
-def boxes_of(corners: FloatArray, patch: IntArray) -> tuple[FloatArray, FloatArray]:
+def boxes_of(corners: FloatArray, patch: Int64Array) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper corners ``[P, 3]`` of the boxes of patches, given the patch ``[F]`` of each face."""
     order = np.argsort(patch, kind="stable")
     first = np.flatnonzero(np.diff(patch[order], prepend=-1))
@@ -160,7 +160,7 @@ def no_faces(vertices: FloatArray) -> Soup:
     return Soup(vertices, np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64))
 
 
-def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
+def across(vertices: FloatArray, faces: Int64Array, halfedges: Int64Array) -> FloatArray:
     """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
     face, corner = halfedges // 3, halfedges % 3
     a, b, c = (vertices[faces[face, (corner + i) % 3]] for i in range(3))
@@ -170,13 +170,13 @@ def across(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatA
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
-def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def face_normals(vertices: FloatArray, faces: Int64Array) -> FloatArray:
     """Return ``[F, 3]`` the unit normals of faces; zero for those without an area."""
     normal = long_normals(vertices, faces)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
-def on_repeated_edge(faces: IntArray, count: int) -> BoolArray:
+def on_repeated_edge(faces: Int64Array, count: int) -> BoolArray:
     """Return ``[F]`` which faces have a directed edge that another face has too."""
     key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
     poll_stop()

@@ -17,13 +17,13 @@ from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, sha
 from rlacd.repair.soup import Soup, no_faces
 from rlacd.repair.union import size_of, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
+from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.solid import BodyRepair, Hole, Shape, Solid
-from rlacd.solid.topology import BoolArray, Edges, IntArray, bodies_of, marked
+from rlacd.solid.topology import Edges, bodies_of, marked
 
-STEPS = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
-"""The possible steps for a body, from the least change to the most."""
-
+OUTCOMES = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
+"""The steps that may have changed a body most, from the least change to the most."""
 
 _WELDS = (2e-5, 5e-4)
 
@@ -83,7 +83,7 @@ class State:
     body_of_input : int64 [F]
         The body of each face of the input.
     step : int64 [bodies]
-        The step that changed a body most, an index of `STEPS`.
+        The step that changed a body most, an index of `OUTCOMES`.
     beyond, lost : float64 [bodies]
         Greatest distance of the repaired surface from the input's, and of the input's outside the solid from it.
     soup : Soup
@@ -132,14 +132,14 @@ class State:
             self._asked = self.solid, query_of(self.solid, self.surface.threads)
         return self._asked[1]
 
-    def note(self, bodies: IntArray, step: str) -> None:
+    def note(self, bodies: Int64Array, step: str) -> None:
         """Record a step; a body keeps the one that changes it most."""
         noted = marked(bodies, self.bodies)
-        self.step[noted] = np.maximum(self.step[noted], STEPS.index(step))
+        self.step[noted] = np.maximum(self.step[noted], OUTCOMES.index(step))
 
     def has(self, step: str) -> BoolArray:
         """Return ``[bodies]`` whether this is the step of a body."""
-        return np.asarray(self.step == STEPS.index(step))
+        return np.asarray(self.step == OUTCOMES.index(step))
 
     @property
     def volume(self) -> float:
@@ -163,7 +163,7 @@ class State:
             self.solid,
             (self.surface.vertices, self.surface.faces.astype(np.int32)),
             self._frame,
-            tuple(BodyRepair(i, STEPS[step], *row) for i, (step, *row) in enumerate(rows)),
+            tuple(BodyRepair(i, OUTCOMES[step], *row) for i, (step, *row) in enumerate(rows)),
             (*warnings, *self.warnings),
             holes=tuple(self.holes),
             body_of=self.body_of_input,
@@ -199,10 +199,10 @@ class State:
         return self._frame.place(point, body if self.bodies > 1 else None)
 
 
-def measure(state: State) -> IntArray:
+def measure(state: State) -> Int64Array:
     """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
     surface, solid = state.surface, state.query()
-    if state.step.max() < STEPS.index("outer skin"):
+    if state.step.max() < OUTCOMES.index("outer skin"):
         return np.empty(0, dtype=np.int64)
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
@@ -213,7 +213,7 @@ def measure(state: State) -> IntArray:
     closest, face = surface.closest(points)
     np.maximum.at(state.beyond, state.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
-    replaced = np.flatnonzero((state.step[state.body_of_input] >= STEPS.index("outer skin")) & ~taken_over)
+    replaced = np.flatnonzero((state.step[state.body_of_input] >= OUTCOMES.index("outer skin")) & ~taken_over)
     faces = surface.faces[replaced]
     spacing = affordable(DEFAULT_GAP, float(face_areas(surface.vertices, faces).sum()))
     points, on = points_covering(surface.vertices, faces, spacing)

@@ -11,13 +11,12 @@ from manifold3d import Manifold, OpType
 from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.repair.soup import FLAT, MOST_UNITED
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.arrays import IntArray as Indices
+from rlacd.solid.arrays import FloatArray, Int64Array, IntArray
 from rlacd.solid.component import concatenated
 from rlacd.solid.frame import thickened
 from rlacd.solid.manifold import require_time_for, to_manifold
 from rlacd.solid.solid import Shape, mesh_of, surface_of
-from rlacd.solid.topology import IntArray, compacted
+from rlacd.solid.topology import compacted
 
 # manifold3d collapses edges shorter than 1e-12, and swaps those of faces that are no higher, or folded back onto a
 # neighbour in a plane within 1e-12.
@@ -36,13 +35,13 @@ class CrossingsError(Exception):
     """Solids cross each other so often that uniting them would take too long."""
 
 
-def to_arrays(solid: Shape) -> tuple[FloatArray, IntArray]:
+def to_arrays(solid: Shape) -> tuple[FloatArray, Int64Array]:
     """Return vertices float64 ``[V, 3]`` and faces int64 ``[F, 3]`` of a solid."""
     vertices, faces = mesh_of(solid)
     return vertices, faces.astype(np.int64)
 
 
-def one_body(vertices: FloatArray, faces: Indices) -> tuple[tuple[FloatArray, Indices], bool] | None:
+def one_body(vertices: FloatArray, faces: IntArray) -> tuple[tuple[FloatArray, IntArray], bool] | None:
     """One closed and oriented body as it is, and whether it was wound inside out; None for anything else.
 
     The vertices and faces are those that manifold3d would make of it, in its order, as long as it would leave all edges
@@ -92,12 +91,12 @@ def hull_of_points(points: FloatArray) -> Manifold:
     return Manifold.hull_points(thickened(np.unique(points, axis=0)))
 
 
-def slab_of_faces(vertices: FloatArray, faces: IntArray) -> Manifold:
+def slab_of_faces(vertices: FloatArray, faces: Int64Array) -> Manifold:
     """Return the union of triangles, each of them thickened."""
     return as_manifold(unite([hull_of_points(vertices[face]) for face in faces]))
 
 
-def split_labels(vertices: FloatArray, faces: IntArray, label: IntArray) -> list[tuple[FloatArray, IntArray]]:
+def split_labels(vertices: FloatArray, faces: Int64Array, label: Int64Array) -> list[tuple[FloatArray, Int64Array]]:
     """Split a mesh into the faces of each label, in ascending order of the labels."""
     if len(label) and (label == label[0]).all():
         return [compacted(vertices, faces)]

@@ -15,9 +15,8 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import label_cells, nearest_labels, poll_stop
 from rlacd.repair.distance import SurfaceQuery
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.frame import ROUNDING
-from rlacd.solid.topology import BoolArray, IntArray
 
 DEFAULT_GAP = 0.03
 """Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units, by
@@ -49,10 +48,10 @@ class Reach:
     radius: float
     reached: BoolArray
     occupied: BoolArray
-    room: IntArray
+    room: Int64Array
 
     @classmethod
-    def of(cls, vertices: FloatArray, faces: IntArray, radius: float, resolution: int) -> Reach:
+    def of(cls, vertices: FloatArray, faces: Int64Array, radius: float, resolution: int) -> Reach:
         """Roll a ball around a surface; the longest side of the frame has `resolution` cells."""
         pitch = 2.0 / resolution
         margin = int(np.ceil(radius / pitch)) + 3
@@ -69,20 +68,20 @@ class Reach:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
         return np.asarray(self.reached[tuple(self._cells(points).T)])
 
-    def _cells(self, points: FloatArray) -> IntArray:
+    def _cells(self, points: FloatArray) -> Int64Array:
         """The cells ``[N, 3]`` of points, nearest ones for those off the grid."""
         cells = np.rint((points - self.origin) / self.pitch).astype(np.int64)
         return np.clip(cells, 0, np.array(self.room.shape) - 1)
 
-    def rooms_outside(self, rooms: IntArray, solid: SurfaceQuery) -> IntArray:
+    def rooms_outside(self, rooms: Int64Array, solid: SurfaceQuery) -> Int64Array:
         """Return the cells ``[N]`` of some rooms that lie outside a solid: of every fourth one along each axis."""
         cells = np.flatnonzero(np.isin(self.room, rooms))
         at = np.stack(np.unravel_index(cells, self.room.shape), axis=1)
         some = at.sum(axis=1) % 4 == 0  # some in each layer of cells
-        outside: IntArray = cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
+        outside: Int64Array = cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
         return outside
 
-    def volumes(self, rooms: IntArray) -> FloatArray:
+    def volumes(self, rooms: Int64Array) -> FloatArray:
         """Return the volume of the cells of each of some rooms: where the ball's centre may be."""
         return np.asarray(np.bincount(self.room.ravel())[rooms] * self.pitch**3)
 
@@ -91,11 +90,11 @@ class Reach:
         reached = self.reached.astype(self.room.dtype)
         return np.asarray(nearest_labels(reached, self._cells(points), depth / self.pitch + ROUNDING) == 0)
 
-    def rooms_near(self, points: FloatArray) -> IntArray:
+    def rooms_near(self, points: FloatArray) -> Int64Array:
         """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
         return nearest_labels(self.room, self._cells(points), self.radius / self.pitch + 2 + ROUNDING)
 
-    def around_cells(self, cells: IntArray) -> BoolArray:
+    def around_cells(self, cells: Int64Array) -> BoolArray:
         """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
         mark = np.zeros(self.room.shape, dtype=bool)
         mark.ravel()[cells] = True
@@ -110,7 +109,7 @@ class Reach:
 
     def wrap(
         self, cells: BoolArray, surface: SurfaceQuery, thickness: float, solid: SurfaceQuery | None = None
-    ) -> tuple[FloatArray, IntArray]:
+    ) -> tuple[FloatArray, Int64Array]:
         """Return the closed surface of a set of cells, projected onto a surface where it is near.
 
         Corners of cells move to `thickness` in front of the closest point of the surface as seen from their place,
@@ -152,7 +151,7 @@ def _grown(cells: BoolArray, radius: float) -> BoolArray:
     return result
 
 
-def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:
+def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, Int64Array]:
     """Return corner coordinates ``[N, 3]`` (cell (0, 0, 0) spans 0 to 1), outward squares ``[Q, 4]`` of a cell set."""
     shape = tuple(np.array(solid.shape) + 1)
     steps = shape[1] * shape[2], shape[2], 1
@@ -170,7 +169,7 @@ def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, IntArray]:
     return corners, index.reshape(-1, 4)
 
 
-def _smooth(points: FloatArray, quads: IntArray, free: BoolArray, rounds: int = 20) -> None:
+def _smooth(points: FloatArray, quads: Int64Array, free: BoolArray, rounds: int = 20) -> None:
     """Pull the free points to the mean of their neighbours, in place; the others stay."""
     if not free.any():
         return

@@ -17,11 +17,11 @@ from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.solid.arrays import FloatArray, angles, dots
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, angles, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape
-from rlacd.solid.topology import BoolArray, IntArray, marked, nondegenerate
+from rlacd.solid.topology import marked, nondegenerate
 
 
 def build_walls(state: State) -> None:
@@ -99,7 +99,7 @@ def skins(soup: Soup) -> list[Piece]:
     ]
 
 
-def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int64Array, Int64Array]:
     """Build side components; those that pass an edge twice from their insides.
 
     Where parts touch along an edge, their common outer skin passes the edge twice. Their insides are simple: those are
@@ -122,7 +122,7 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     return vertices, faces, label
 
 
-def _solid(soup: Soup, mesh: tuple[FloatArray, IntArray], side: int, is_thin: bool) -> Shape:
+def _solid(soup: Soup, mesh: tuple[FloatArray, Int64Array], side: int, is_thin: bool) -> Shape:
     """A side component as a solid; sheets narrower than they become thick can cross themselves and be inside out."""
     solid = to_manifold(*mesh)
     if is_thin and volume_of(solid) <= 0:
@@ -135,7 +135,7 @@ def _solid(soup: Soup, mesh: tuple[FloatArray, IntArray], side: int, is_thin: bo
 _LONGEST_MITER = 2.0
 
 
-def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int64Array, Int64Array]:
     """Build the surfaces of chosen side components ``[C]``; sheets and flat ones get thickness: sides move outward.
 
     Returns
@@ -181,7 +181,7 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
     )
 
 
-def _corners_at(faces: IntArray, halfedge: IntArray, slot: IntArray) -> tuple[IntArray, IntArray]:
+def _corners_at(faces: Int64Array, halfedge: Int64Array, slot: Int64Array) -> tuple[Int64Array, Int64Array]:
     """Slots of the corners of sides at the smaller and the larger end of halfedges, given where those of each begin."""
     face, here = np.divmod(halfedge, 3)
     there = (here + 1) % 3
@@ -189,7 +189,9 @@ def _corners_at(faces: IntArray, halfedge: IntArray, slot: IntArray) -> tuple[In
     return slot + np.where(forward, here, there), slot + np.where(forward, there, here)
 
 
-def _rims(low: IntArray, high: IntArray, label: IntArray, number: int) -> tuple[IntArray, IntArray, IntArray]:
+def _rims(
+    low: Int64Array, high: Int64Array, label: Int64Array, number: int
+) -> tuple[Int64Array, Int64Array, Int64Array]:
     """Close rims: the faces ``[M, 3]``, their labels, and for every new vertex (from `number` on) a fan at its place.
 
     A rim edge runs from low to high; its face shows one side to the wedge's beginning, fans ``low[0]`` and ``high[0]``,
@@ -206,7 +208,7 @@ def _rims(low: IntArray, high: IntArray, label: IntArray, number: int) -> tuple[
 
 
 def _fan_offsets(
-    vertices: FloatArray, corners: IntArray, back: BoolArray, thin: BoolArray, fan: IntArray, number: int
+    vertices: FloatArray, corners: Int64Array, back: BoolArray, thin: BoolArray, fan: Int64Array, number: int
 ) -> FloatArray:
     """Direction ``[number, 3]`` that leaves every face of a fan at speed 1; zero for fans without a sheet."""
     a, b, c = (vertices[corners[:, i]] for i in range(3))
@@ -237,7 +239,9 @@ def _fan_offsets(
     return offsets
 
 
-def _rim_caps(tail: IntArray, head: IntArray, label: IntArray, number: int) -> tuple[IntArray, IntArray, IntArray]:
+def _rim_caps(
+    tail: Int64Array, head: Int64Array, label: Int64Array, number: int
+) -> tuple[Int64Array, Int64Array, Int64Array]:
     """Close the ends of rims where three or more free edges meet in a vertex.
 
     Each rim quad leaves a link between two fans at both of its ends. Two links between the same two fans match each

@@ -17,10 +17,10 @@ from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_face
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import area_of, as_manifold, size_of, slab_of_faces, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
+from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.topology import BoolArray, IntArray
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
 # A room of an outer skin is filled from this share of the solid's volume on, slits up to it: rooms in furniture have
@@ -137,7 +137,7 @@ def fill_rooms(state: State) -> None:
     state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
 
 
-def _rooms_near(state: State, walls: Soup) -> tuple[IntArray, IntArray]:
+def _rooms_near(state: State, walls: Soup) -> tuple[Int64Array, Int64Array]:
     """The rooms that points of faces may be walls of, 0 for none, and the body of each point."""
     if not state.reach.room.any() or not _is_large(state, walls):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -201,7 +201,7 @@ def _wrap(state: State, cells: BoolArray, error: float, solid: SurfaceQuery | No
     return to_manifold(*state.reach.wrap(cells, state.surface, HALF_THICKNESS, solid)).simplify(error)
 
 
-def _crossings(soup: Soup, patch: IntArray) -> int:
+def _crossings(soup: Soup, patch: Int64Array) -> int:
     """Count the pairs of patches of faces whose boxes meet."""
     lower, upper = boxes_of(soup.vertices[soup.faces], patch)
     count = 0

@@ -23,7 +23,7 @@ from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
 from rlacd.planes.sweep import SweepCache
-from rlacd.policies import Greedy
+from rlacd.policies import Greedy, Policy
 from rlacd.run import Begun, Run
 from rlacd.search.operators import Exchange, recut, redistribute
 from rlacd.search.part_graph import Cluster, PartGraph
@@ -36,9 +36,8 @@ CONCAVE_EDGES = EDGES_PER_COMPONENT // 2
 """Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
 
 FEW_PARTS = 20
-"""With more parts than this, searching around the first pass gains more per unit of work than another pass, and trials
-begin without waiting for the least number of parts."""
-
+"""With more parts than this, trials begin at once: they gain more per unit of work than another pass over the solid,
+and do not wait for the least number of parts."""
 
 PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
 """Scores of the greedy policy for further passes over the whole solid, best first."""
@@ -59,6 +58,8 @@ class SearchContext:
         Sweeps of the solid's components, including those of the first pass.
     scores : sequence of str
         Of the greedy policies that cut neighbourhoods and, if time allows, make further passes over the whole solid.
+    first_policy : str or Policy
+        The policy of the first pass, which is not repeated: ``greedy`` has the first of the scores.
     enough : callable
         Returns the least number of parts of any decomposition: the search ends there. May wait for that.
     near_sweeps : SweepCache
@@ -70,6 +71,7 @@ class SearchContext:
     seed: int = 0
     sweeps: SweepCache = field(default_factory=SweepCache)
     scores: Sequence[str] = PORTFOLIO
+    first_policy: str | Policy = "greedy"
     enough: Callable[[], int] = lambda: 1
     near_sweeps: SweepCache = field(default_factory=lambda: SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES))
 
@@ -227,17 +229,17 @@ class Neighbourhood:
             if (cluster, policy) not in self._recut:
                 self._recut.add((cluster, policy))
                 parts, around = self._graph.of(cluster), self._graph.of(self._graph.around(cluster))
-                context, chosen = self._context, self._policies[policy]
-                return partial(recut, parts, around, chosen, context.criterion, whole=context.root)
+                context = self._context
+                return partial(recut, parts, around, context.criterion, self._policies[policy], context.root)
         return None
 
     def _redistributing(self, which: int) -> _Trial | None:
         if which not in self._graph.parts:
             return None
-        around = self._graph.near(which, self._near)
-        seed = int(self._random.integers(2**32))
-        part, takers, context = self._graph.parts[which], self._graph.of(around), self._context
-        return lambda run: redistribute(part, takers, context.criterion, np.random.default_rng(seed), context.root, run)
+        around = self._graph.of(self._graph.near(which, self._near))
+        random = np.random.default_rng(int(self._random.integers(2**32)))
+        context = self._context
+        return partial(redistribute, self._graph.parts[which], around, context.criterion, random, context.root)
 
     def _make(self, trials: Iterator[_Trial]) -> None:
         """Make trials, `LAG` at a time, and apply what they find."""

@@ -52,10 +52,10 @@ class Exchange:
 def recut(
     parts: Sequence[Part],
     around: Sequence[Part],
-    policy: Policy,
     criterion: Criterion,
+    policy: Policy,
+    solid: Component,
     run: Run,
-    whole: Component | None = None,
 ) -> Exchange | None:
     """Reunite some parts, cut them again, and merge the pieces with each other and with the parts around.
 
@@ -65,14 +65,14 @@ def recut(
         A connected cluster.
     around : sequence of Part
         Parts that touch the cluster.
-    policy : Policy
-        Chooses the planes.
     criterion : Criterion
         Every new part meets it.
+    policy : Policy
+        Chooses the planes.
+    solid : Component
+        The solid that was decomposed.
     run : Run
         Give up when it is over.
-    whole : Component, optional
-        The solid; if given, pieces may be merged across other parts between them.
 
     Returns
     -------
@@ -82,15 +82,15 @@ def recut(
     members = [member for part in parts for member in part.members]
     if not run.work.pay(work.reuniting(sum(member.size for member in members), len(members))):
         return None
-    solid = reunite(members)
-    if solid is None:
+    whole = reunite(members)
+    if whole is None:
         return None
-    pieces, left = CutTree(solid, policy, run).cut_until(criterion, len(parts) + EXTRA_PIECES)
-    if left or sum(piece.volume for piece in pieces) < (1 - LOST_VOLUME) * solid.volume:
+    pieces, left = CutTree(whole, policy, run).cut_until(criterion, len(parts) + EXTRA_PIECES)
+    if left or sum(piece.volume for piece in pieces) < (1 - LOST_VOLUME) * whole.volume:
         return None
     if _volumes(pieces) == _volumes(parts):  # cut as before: merging these has already been tried
         return None
-    merged = merge_parts(pieces, criterion, run, beside=around, solid=whole)
+    merged = merge_parts(pieces, criterion, run, beside=around, solid=solid)
     if run.is_over:
         return None
     exchange = Exchange.between([*parts, *around], merged)
@@ -128,7 +128,7 @@ def redistribute(
     criterion: Criterion,
     random: np.random.Generator,
     solid: Component,
-    run: Run | None = None,
+    run: Run,
 ) -> Exchange | None:
     """Divide a part among the parts around it.
 
@@ -143,7 +143,7 @@ def redistribute(
         Draws where pieces are halved.
     solid : Component
         The solid that was decomposed.
-    run : Run, optional
+    run : Run
         Give up when it is over.
 
     Returns
@@ -151,7 +151,6 @@ def redistribute(
     Exchange or None
         An exchange that saves one part; None if some piece cannot be taken.
     """
-    run = run or Run(1)
     uniter = Uniter(criterion, solid, run.work)
     now = list(around)
 

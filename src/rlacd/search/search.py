@@ -93,7 +93,6 @@ def search(
     quality: str,
     seconds: float | None = None,
     steps: int | None = None,
-    first: str = "greedy",
 ) -> tuple[list[Part], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
@@ -112,8 +111,6 @@ def search(
         Wall time of the search, in place of that bound.
     steps : int, optional
         Recuts of clusters, in place of that bound.
-    first : str
-        The policy of the first pass, which is not repeated.
 
     Returns
     -------
@@ -133,7 +130,7 @@ def search(
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
     elif steps is not None and seconds is None:
         allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
-    others = context.scores[1:] if first == "greedy" else context.scores  # greedy is the first of them
+    others = context.scores[1:] if context.first_policy == "greedy" else context.scores
     state = _Search(context, others, run, first_pass, a_pass, HOPELESS * len(parts))
     if bounded:
         with run.limited(allowed):

@@ -16,6 +16,8 @@ FloatArray: TypeAlias = NDArray[np.float64]
 """Points [N, 3] or values [N], C-contiguous."""
 IntArray: TypeAlias = NDArray[np.int32]
 """Triangles [F, 3], counter-clockwise seen from outside, or indices [N]."""
+Int64Array: TypeAlias = NDArray[np.int64]
+"""The same while a mesh is read and repaired: keys made of two indices need 64 bits."""
 BoolArray: TypeAlias = NDArray[np.bool_]
 Float32Array: TypeAlias = NDArray[np.float32]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.options.output import Axis
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import IntArray, compacted
+from rlacd.solid.arrays import FloatArray, Int64Array
+from rlacd.solid.topology import compacted
 
 _UNITS = {1e-6: "µm", 1e-3: "mm", 1e-2: "cm", 1.0: "m", 0.0254: "in", 0.3048: "ft"}
 
@@ -87,13 +87,13 @@ class InputMesh:
     """
 
     vertices: FloatArray
-    faces: IntArray
+    faces: Int64Array
     name: str
     warnings: tuple[str, ...]
     up: Axis = "z"
     metres: float | None = None
     nodes: tuple[SourceNode, ...] = ()
-    node_of: IntArray | None = None
+    node_of: Int64Array | None = None
     asset: Asset | None = None
     factor: float = 1.0
     left_out: tuple[SourceNode, ...] = ()

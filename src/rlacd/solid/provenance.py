@@ -9,10 +9,9 @@ import trimesh
 from numpy.typing import NDArray
 
 from rlacd._native import HullUnion, poll_stop, sample_surface
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import Frame
-from rlacd.solid.topology import IntArray
 
 SURFACE_SAMPLES = 5 * PLACES
 LEAST_OF_LABEL = 32
@@ -23,7 +22,7 @@ OUTSIDE_HULL = 1e-3
 
 
 def owners(
-    hulls: Sequence[trimesh.Trimesh], vertices: FloatArray, faces: NDArray[np.integer], label_of: IntArray
+    hulls: Sequence[trimesh.Trimesh], vertices: FloatArray, faces: NDArray[np.integer], label_of: Int64Array
 ) -> list[int]:
     """Find for each hull the label of most of the surface inside it.
 
@@ -60,7 +59,7 @@ def owners(
     return found
 
 
-def _spread(vertices: FloatArray, faces: NDArray[np.integer], label_of: IntArray) -> tuple[FloatArray, IntArray]:
+def _spread(vertices: FloatArray, faces: NDArray[np.integer], label_of: Int64Array) -> tuple[FloatArray, Int64Array]:
     """Points spread over the surface in proportion to its area, with their labels; the same for the same surface."""
     area = trimesh.triangles.area(vertices[faces])
     order = np.argsort(label_of, kind="stable")

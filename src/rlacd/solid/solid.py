@@ -27,7 +27,7 @@ class BodyRepair:
     body
         Number of the body, by its first face in the input.
     step
-        The step that changed it most, one of `rlacd.repair.state.STEPS`.
+        The step that changed it most, one of `rlacd.repair.state.OUTCOMES`.
     faces_in, faces_out
         Triangles before and after; a body joined to others counts its share before the union.
     deviation

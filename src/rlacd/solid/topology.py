@@ -21,31 +21,28 @@ from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.hull import TOLERANCE
 
 Index = TypeVar("Index", bound=np.signedinteger)
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
-
 _NEXT = np.array([1, 2, 0])
 
 
-def nondegenerate(faces: IntArray) -> BoolArray:
+def nondegenerate(faces: Int64Array) -> BoolArray:
     """Return ``[F]`` whether a face has three different corners."""
     a, b, c = faces.T
     result: BoolArray = (a != b) & (b != c) & (c != a)
     return result
 
 
-def marked(items: IntArray, count: int) -> BoolArray:
+def marked(items: Int64Array, count: int) -> BoolArray:
     """Return ``[count]`` which numbers are among the items."""
     found = np.zeros(count, dtype=bool)
     found[items] = True
     return found
 
 
-def has_marked(mark: BoolArray, corners: IntArray) -> BoolArray:
+def has_marked(mark: BoolArray, corners: Int64Array) -> BoolArray:
     """Return ``[N]`` whether any of three corners (edges, ...) ``[N, 3]`` is marked."""
     a, b, c = corners.T
     result: BoolArray = mark[a] | mark[b] | mark[c]
@@ -61,12 +58,12 @@ def compacted(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, 
     return vertices[used], (np.cumsum(used, dtype=faces.dtype) - 1).astype(faces.dtype)[faces]
 
 
-def first_of_doubled(faces: IntArray, count: int) -> BoolArray:
+def first_of_doubled(faces: Int64Array, count: int) -> BoolArray:
     """Return ``[F]`` whether a face is the first with its three corners, in any order; ``count`` vertices exist."""
     return _native.first_of_doubled(np.ascontiguousarray(faces), count)
 
 
-def point_bodies(vertices: FloatArray, faces: NDArray[np.integer]) -> IntArray:
+def point_bodies(vertices: FloatArray, faces: NDArray[np.integer]) -> Int64Array:
     """The body ``[V]`` of each vertex: faces are connected by corners they share, or that are in one place."""
     first = _native.first_in_place(vertices)
     a, b, c = first[faces].T
@@ -87,17 +84,17 @@ class Edges:
         ``[E]``, how many faces use the edge.
     """
 
-    of_halfedge: IntArray
-    vertices: IntArray
-    valence: IntArray
+    of_halfedge: Int64Array
+    vertices: Int64Array
+    valence: Int64Array
 
     @classmethod
-    def of(cls, faces: IntArray, count: int) -> Edges:
+    def of(cls, faces: Int64Array, count: int) -> Edges:
         """Collect the edges of faces ``[F, 3]`` over ``count`` vertices."""
         return cls(*_native.edges(faces, count))
 
     @property
-    def halfedges(self) -> IntArray:
+    def halfedges(self) -> Int64Array:
         """The first and the last halfedge of each edge, ``[2, E]``."""
         number = np.arange(len(self.of_halfedge))
         first, last = ends = np.empty((2, len(self.valence)), dtype=np.int64)
@@ -105,7 +102,7 @@ class Edges:
         return ends
 
 
-def bodies_of(faces: IntArray, edges: Edges) -> tuple[int, IntArray]:
+def bodies_of(faces: Int64Array, edges: Edges) -> tuple[int, Int64Array]:
     """Group faces that share edges: the number of bodies, and ``[F]`` the body of each face."""
     face = np.repeat(np.arange(len(faces)), 3)
     first = np.empty(len(edges.valence), dtype=np.int64)
@@ -113,7 +110,7 @@ def bodies_of(faces: IntArray, edges: Edges) -> tuple[int, IntArray]:
     return components(len(faces), face, first[edges.of_halfedge])
 
 
-def is_balanced(faces: IntArray, edges: Edges) -> BoolArray:
+def is_balanced(faces: Int64Array, edges: Edges) -> BoolArray:
     """Return ``[E]`` whether as many faces run along an edge in one direction as in the other."""
     forward = np.bincount(edges.of_halfedge, (faces < faces[:, _NEXT]).ravel(), len(edges.valence))
     return np.asarray(2 * forward == edges.valence)
@@ -123,7 +120,7 @@ NO_FILM = TOLERANCE**2
 """Films of less area than this are folds that rounding has closed."""
 
 
-def detach_films(vertices: FloatArray, faces: IntArray, is_film: BoolArray) -> tuple[FloatArray, IntArray]:
+def detach_films(vertices: FloatArray, faces: Int64Array, is_film: BoolArray) -> tuple[FloatArray, Int64Array]:
     """Give films vertices of their own if the bodies they hang on are closed without them; drop those without an area.
 
     A film stands for as many faces wound one way as the other: a sheet with two sides, or a pocket closed by rounding.
@@ -186,19 +183,19 @@ class Sides:
         ``[F]``, whether both sides of the face lie in one component.
     """
 
-    wedges: IntArray
-    facing: IntArray
-    label: IntArray
+    wedges: Int64Array
+    facing: Int64Array
+    label: Int64Array
     volume: FloatArray
     area: FloatArray
     sheet: BoolArray
 
 
-def _sums(group: IntArray, values: FloatArray, number: int) -> FloatArray:
+def _sums(group: Int64Array, values: FloatArray, number: int) -> FloatArray:
     return np.bincount(group, values, number).astype(np.float64)
 
 
-def sides_of(vertices: FloatArray, faces: IntArray, edges: Edges, trusted: BoolArray | None = None) -> Sides:
+def sides_of(vertices: FloatArray, faces: Int64Array, edges: Edges, trusted: BoolArray | None = None) -> Sides:
     """Join the sides of all faces across their wedges, except where ``trusted`` ``[F]`` faces meet by their angles."""
     wedges, facing = _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence), trusted)
     number, label = components(2 * len(faces), *np.ascontiguousarray(facing.T))

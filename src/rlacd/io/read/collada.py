@@ -21,9 +21,8 @@ from rlacd.io.read.polygons import fan_triangles, places_of, strip_triangles
 from rlacd.io.read.text import rows_of, whole
 from rlacd.io.read.xml import open_archive, parse_xml
 from rlacd.options.output import Axis
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.input_mesh import Asset, SourceNode
-from rlacd.solid.topology import IntArray
 
 _UNREAD = {
     "lines": "lines of {} were left out",
@@ -39,7 +38,7 @@ class _Primitive(NamedTuple):
     """Triangles of one material: the rows of their corners ``[F, 3]`` in each of the arrays, by semantic."""
 
     material: str
-    arrays: dict[str, tuple[FloatArray, IntArray]]
+    arrays: dict[str, tuple[FloatArray, Int64Array]]
 
 
 class _Placed(NamedTuple):
@@ -223,7 +222,7 @@ def _first(effect: Any, tag: str, otherwise: FloatArray, kind: str = "color") ->
 _RINGS = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 
 
-def _corners(primitive: Any, points: FloatArray, offset: int, width: int) -> IntArray:
+def _corners(primitive: Any, points: FloatArray, offset: int, width: int) -> Int64Array:
     """The rows that a primitive's triangles use of its inputs ``[F, 3, inputs]``."""
     tag = etree.QName(primitive).localname
     rings = [_integers(p.text, width) for p in primitive.iterchildren("{*}p")]
@@ -250,7 +249,7 @@ def _numbers(text: str | None) -> FloatArray:
     return rows_of((text or "").encode() + b"\n")[0]
 
 
-def _integers(text: str | None, width: int) -> IntArray:
+def _integers(text: str | None, width: int) -> Int64Array:
     return whole(_numbers(text)).reshape(-1, width)
 
 

@@ -17,9 +17,8 @@ import numpy.typing as npt
 
 from rlacd.errors import MeshDataError, MeshFileError
 from rlacd.options.output import Axis
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.input_mesh import Asset, InputMesh, SourceNode
-from rlacd.solid.topology import IntArray
 
 MOST_TRIANGLES = 20_000_000
 """Of a mesh, counting every instance of a geometry. They take about 4 GB."""
@@ -63,7 +62,7 @@ class Contents(NamedTuple):
     asset: Asset | None = None
 
 
-def one_shape(name: str, vertices: FloatArray, faces: IntArray | None = None) -> list[tuple[SourceNode, Triangles]]:
+def one_shape(name: str, vertices: FloatArray, faces: Int64Array | None = None) -> list[tuple[SourceNode, Triangles]]:
     """The geometry of a file without a scene."""
     faces = np.empty((0, 3), dtype=np.int64) if faces is None else faces
     return [(SourceNode(name, name, np.eye(4)), Triangles(vertices, faces))]

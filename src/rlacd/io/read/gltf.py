@@ -18,9 +18,8 @@ from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
 from rlacd.io.read.open_file import JSON_CHUNK, MAGIC
 from rlacd.io.read.polygons import fan_triangles, strip_triangles
-from rlacd.solid.arrays import FloatArray, dots, heights
+from rlacd.solid.arrays import FloatArray, Int64Array, dots, heights
 from rlacd.solid.input_mesh import Asset, SourceNode
-from rlacd.solid.topology import IntArray
 
 INSTANCES = "EXT_mesh_gpu_instancing"
 
@@ -180,7 +179,7 @@ class _Scene:
         weights = weights if any(weights) else ()
         bones = None if skin is None else self._bones(item(self._header["skins"], skin))
         vertices: list[FloatArray] = [np.empty((0, 3))]
-        faces: list[IntArray] = [np.empty((0, 3), dtype=np.int64)]
+        faces: list[Int64Array] = [np.empty((0, 3), dtype=np.int64)]
         first = 0
         for part in parts:
             if "POSITION" not in part["attributes"]:
@@ -203,7 +202,7 @@ class _Scene:
             first += len(points)
         return Triangles(np.concatenate(vertices), np.concatenate(faces))
 
-    def _corners(self, part: Json, count: int) -> IntArray:
+    def _corners(self, part: Json, count: int) -> Int64Array:
         mode = part.get("mode", TRIANGLES)
         if mode in POINTS:
             return np.empty((0, 3), dtype=np.int64)

@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rlacd.io.read.contents import MOST_PLACES
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 
 Json: TypeAlias = dict[str, Any]
 
@@ -78,7 +77,7 @@ class Arrays:
         """What the file says of an array."""
         return dict(item(self._accessors, index))
 
-    def integers(self, index: int, kind: str = "SCALAR") -> IntArray:
+    def integers(self, index: int, kind: str = "SCALAR") -> Int64Array:
         """An array of indices, ``[N, K]``."""
         rows = self._rows(index, kind)
         if rows.dtype.kind != "u" and index not in self._added:

@@ -21,9 +21,8 @@ from rlacd.io.read import function_of
 from rlacd.io.read.contents import Contents, damaged, one_shape, require_few, without_engine_hulls
 from rlacd.io.read.open_file import CONVERTERS, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
-from rlacd.solid.arrays import FloatArray, heights
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, heights
 from rlacd.solid.input_mesh import Asset, InputMesh
-from rlacd.solid.topology import BoolArray, IntArray
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
@@ -148,7 +147,7 @@ def _baked(name: str, contents: Contents) -> InputMesh:
     return replace(mesh, up=contents.up, metres=contents.metres, asset=contents.asset)
 
 
-def _finite(name: str, vertices: FloatArray, faces: IntArray, node_of: IntArray | None) -> InputMesh:
+def _finite(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Array | None) -> InputMesh:
     """Drop faces and vertices that are not finite."""
     require_memory(len(faces), BYTES_READ, name)
     warnings = []

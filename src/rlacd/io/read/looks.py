@@ -17,8 +17,7 @@ import trimesh
 
 from rlacd.io.read import function_of
 from rlacd.io.read.beside import FolderFiles
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 
 _WITH_LOOKS = {
     "obj": "read.obj:scene_of_obj",
@@ -51,7 +50,7 @@ def looks_of(path: Path, content: bytes, extension: str) -> Any:
         return None
 
 
-def painted(arrays: Mapping[str, tuple[FloatArray, IntArray]], material: Any) -> trimesh.Trimesh:
+def painted(arrays: Mapping[str, tuple[FloatArray, Int64Array]], material: Any) -> trimesh.Trimesh:
     """A mesh with looks.
 
     Parameters

@@ -22,9 +22,8 @@ from rlacd.io.read.looks import BETWEEN, opened_picture, painted
 from rlacd.io.read.polygons import places_of
 from rlacd.io.read.text import check_text, numbers_in, plain_text, rows_of
 from rlacd.memory import BYTES_READ, require_memory
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.input_mesh import Asset, SourceNode
-from rlacd.solid.topology import BoolArray, IntArray
 
 _UNREAD = {
     **dict.fromkeys((b"curv", b"curv2", b"surf", b"bzp", b"bsp", b"cdc", b"cdp"), "free-form curves and surfaces"),
@@ -90,28 +89,28 @@ class _File:
         places = places_of(self.points, self._counts, points)
         self.faces = [one[places] for one in index]
 
-    def _index(self, numbers: IntArray, word: bytes) -> IntArray:
+    def _index(self, numbers: Int64Array, word: bytes) -> Int64Array:
         """Indices from 0; those of the file count from 1, or from the end of what stands before their line."""
         if not (numbers < 0).any():
             return numbers - 1
         before = np.repeat(np.cumsum(self._are(word))[self._lines], self._counts)
         return np.where(numbers < 0, before + numbers, numbers - 1)
 
-    def named(self, word: bytes) -> tuple[list[str], IntArray]:
+    def named(self, word: bytes) -> tuple[list[str], Int64Array]:
         """The names behind a word, the first empty, and the number of that which each triangle stands behind."""
         names: dict[str, int] = {"": 0}
         number = np.array([0, *(names.setdefault(name, len(names)) for _, name in self._named[word])])
         of_line = number[np.searchsorted([line for line, _ in self._named[word]], self._lines)]
         return list(names), np.repeat(of_line, np.maximum(self._counts - 2, 0))
 
-    def objects(self) -> tuple[list[str], IntArray]:
+    def objects(self) -> tuple[list[str], Int64Array]:
         """The objects, or groups if there are no objects, and the number of that of each triangle."""
         names, owner = self.named(b"o" if self._named[b"o"] else b"g")
         one = len(np.unique(owner)) < 2 or len(names) > MOST_PLACES
         return (names, np.zeros_like(owner)) if one else (names, owner)
 
 
-def _fields(text: bytes) -> tuple[IntArray, list[IntArray]]:
+def _fields(text: bytes) -> tuple[Int64Array, list[Int64Array]]:
     """The number of words on each line, and the three numbers of each word, ``point/texture/normal``; 0 for none."""
     letters = np.frombuffer(text, np.uint8)
     blank = letters <= ord(" ")
@@ -200,7 +199,7 @@ def _paints(beside: FolderFiles, libraries: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def _split(rows: IntArray, owner: IntArray) -> Iterator[tuple[int, npt.NDArray[np.int64]]]:
+def _split(rows: Int64Array, owner: Int64Array) -> Iterator[tuple[int, npt.NDArray[np.int64]]]:
     """The rows of each owner, ascending, in their order."""
     order = np.argsort(owner, kind="stable")
     found = np.flatnonzero(np.diff(owner[order], prepend=-1))

@@ -17,9 +17,8 @@ from rlacd.io.read.contents import Contents, one_shape
 from rlacd.io.read.polygons import strip_triangles, triangles_of
 from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, whole
 from rlacd.memory import BYTES_READ, require_memory
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.input_mesh import Asset
-from rlacd.solid.topology import IntArray
 
 _KINDS = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -61,7 +60,7 @@ class _Element:
         self.properties[f"{name} {len(self.properties)}" if name in self.properties else name] = kind, length
 
 
-def _rows(body: bytes, at: int, element: _Element) -> tuple[IntArray, dict[str, Any]]:
+def _rows(body: bytes, at: int, element: _Element) -> tuple[Int64Array, dict[str, Any]]:
     """Where each row begins and the last one ends; by property its numbers, or the lengths and the items of its lists.
 
     If not all lists are as long as those of the first row, they are found one by one, and numbers are passed over.
@@ -89,7 +88,7 @@ def _rows(body: bytes, at: int, element: _Element) -> tuple[IntArray, dict[str, 
     }
 
 
-def _walked(body: bytes, at: int, element: _Element, rows: int) -> tuple[IntArray, dict[str, list[npt.NDArray[Any]]]]:
+def _walked(body: bytes, at: int, element: _Element, rows: int) -> tuple[Int64Array, dict[str, list[npt.NDArray[Any]]]]:
     """Where each of some rows begins and the last one ends, and the lists of each name."""
     begins = [at]
     lists: dict[str, list[npt.NDArray[Any]]] = {
@@ -192,7 +191,7 @@ def _elements(header: bytes, is_text: bool) -> dict[str, _Element]:
     return found
 
 
-def _triangles(values: dict[str, Any], are_strips: bool, points: FloatArray) -> IntArray:
+def _triangles(values: dict[str, Any], are_strips: bool, points: FloatArray) -> Int64Array:
     lists = [values[name] for name in _CORNERS if isinstance(values.get(name), tuple)]
     if not lists:
         raise ValueError("its faces have no list vertex_indices")

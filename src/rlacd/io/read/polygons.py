@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import triangulate
 
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 
 TURNED_SHARE = 1e-9
 """A triangle of a fan is folded over if it is turned against its polygon by more than this share of its area."""
@@ -15,7 +14,7 @@ MOST_CORNERS = 10_000
 """Of a polygon that is taken apart without a fan, which may take time quadratic in its corners."""
 
 
-def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArray:
+def triangles_of(points: FloatArray, counts: Int64Array, corners: Int64Array) -> Int64Array:
     """Take polygons apart into triangles, in their order.
 
     Parameters
@@ -29,14 +28,14 @@ def triangles_of(points: FloatArray, counts: IntArray, corners: IntArray) -> Int
 
     Returns
     -------
-    IntArray
+    Int64Array
         ``[F, 3]``: of each polygon a fan around its first corner, or, where that folds over, as many triangles that do
         not overlap.
     """
     return np.asarray(corners[places_of(points, counts, corners)])
 
 
-def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArray:
+def places_of(points: FloatArray, counts: Int64Array, corners: Int64Array) -> Int64Array:
     """The triangles of `triangles_of` as places in ``corners``. Raises ValueError if a corner refers to no point."""
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise ValueError(f"a face uses vertex {corners.max()} of {len(points)}, or one below 0")
@@ -53,7 +52,7 @@ def places_of(points: FloatArray, counts: IntArray, corners: IntArray) -> IntArr
     return places
 
 
-def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) -> IntArray:
+def _folded(points: FloatArray, fans: Int64Array, owner: Int64Array, polygons: int) -> Int64Array:
     """The polygons of four and more corners some of whose triangles are turned against the whole."""
     with np.errstate(all="ignore"):
         a, b, c = points[fans[:, 0]], points[fans[:, 1]], points[fans[:, 2]]
@@ -64,7 +63,7 @@ def _folded(points: FloatArray, fans: IntArray, owner: IntArray, polygons: int) 
     return np.unique(owner[turned])
 
 
-def triangles_within(ring: FloatArray) -> IntArray | None:
+def triangles_within(ring: FloatArray) -> Int64Array | None:
     """Triangles ``[N - 2, 3]`` of one polygon ``[N, 3]`` that do not fold over; None if there are none."""
     if len(ring) > MOST_CORNERS or not np.isfinite(ring).all():
         return None
@@ -85,14 +84,14 @@ def triangles_within(ring: FloatArray) -> IntArray | None:
     return found if areas.min() >= -TURNED_SHARE * length else None
 
 
-def strip_triangles(corners: IntArray) -> IntArray:
+def strip_triangles(corners: Int64Array) -> Int64Array:
     """The triangles of a strip of corners: every other one is turned."""
     first = np.arange(max(len(corners) - 2, 0))
     odd = first % 2
     return np.asarray(corners[np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)])
 
 
-def fan_triangles(corners: IntArray) -> IntArray:
+def fan_triangles(corners: Int64Array) -> Int64Array:
     """The triangles of a fan of corners."""
     middle = np.full(max(len(corners) - 2, 0), corners[0] if len(corners) else 0)
     return np.stack([middle, corners[1:-1], corners[2:]], axis=1)

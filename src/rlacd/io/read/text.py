@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import MOST_TRIANGLES
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 
 
 def check_text(path: Path, content: bytes) -> None:
@@ -46,7 +45,7 @@ def numbers_in(text: bytes, kind: type = np.float64) -> npt.NDArray[Any]:
         return np.fromstring(text.decode("latin-1"), kind, sep=" ")
 
 
-def rows_of(text: bytes) -> tuple[FloatArray, IntArray]:
+def rows_of(text: bytes) -> tuple[FloatArray, Int64Array]:
     """All numbers in a text, and how many there are on each line. Raises ValueError where a word is no number."""
     letters = np.frombuffer(b"\n" + text, np.uint8)
     blank = letters <= ord(" ")
@@ -67,7 +66,7 @@ def vectors_of(text: bytes) -> FloatArray:
     return np.ascontiguousarray(numbers[(np.cumsum(counts) - counts)[:, None] + np.arange(3)])
 
 
-def whole(numbers: npt.NDArray[Any]) -> IntArray:
+def whole(numbers: npt.NDArray[Any]) -> Int64Array:
     """Numbers as integers. Raises ValueError where they are none."""
     with np.errstate(invalid="ignore"):  # of NaN
         integers = numbers.astype(np.int64)

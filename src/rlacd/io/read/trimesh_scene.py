@@ -12,9 +12,8 @@ import trimesh
 from rlacd.errors import MeshDataError
 from rlacd.io.read.contents import Contents, Triangles, require_few
 from rlacd.pool import Answer
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.input_mesh import Asset, SourceNode
-from rlacd.solid.topology import IntArray
 
 
 def geometry_of(source: Any, name: str) -> list[tuple[SourceNode, Triangles]]:
@@ -44,7 +43,7 @@ def _instances(source: Any, name: str) -> Iterator[tuple[SourceNode, Any]]:
         yield SourceNode(str(node), node, np.asarray(transform, dtype=np.float64)), source.geometry[shape]
 
 
-def arrays_of(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
+def arrays_of(vertices: Any, faces: Any) -> tuple[FloatArray, Int64Array]:
     """Check the shapes and dtypes of arrays; quads become two triangles each."""
     try:
         if np.iscomplexobj(vertices) or np.ma.is_masked(vertices) or np.ma.is_masked(faces):

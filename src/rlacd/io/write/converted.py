@@ -16,9 +16,8 @@ from rlacd.io.write.encode import VISUAL_COLOR
 from rlacd.io.write.glb import ROUGHNESS
 from rlacd.io.write.model import Look, Painted
 from rlacd.io.write.palette import linear_from_srgb
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.input_mesh import InputMesh, SourceNode
-from rlacd.solid.topology import IntArray
 
 
 def converted(mesh: InputMesh, name: str) -> tuple[dict[str, Any], bytes | None]:
@@ -69,7 +68,7 @@ def _scene(mesh: InputMesh, name: str) -> trimesh.Scene:
     return scene if mesh.factor == 1.0 else _scaled(scene, mesh.factor)
 
 
-_Shape: TypeAlias = tuple[FloatArray, IntArray, FloatArray | None]
+_Shape: TypeAlias = tuple[FloatArray, Int64Array, FloatArray | None]
 """Vertices, faces, and where the vertices are in a picture."""
 
 

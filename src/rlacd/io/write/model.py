@@ -138,13 +138,13 @@ def implausible(model: RigidBody) -> str | None:
     bounds = np.array([hull.bounds for hull in model.hulls])
     size = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
     mass = model.mass.volume_abs
-    if LENGTHS[0] <= size <= LENGTHS[1] and MASSES[0] <= mass <= MASSES[1]:
+    if SIZES[0] <= size <= SIZES[1] and MASSES[0] <= mass <= MASSES[1]:
         return None
     said = f"the body of {model.name} is {size:.3g} m long and weighs {mass:.3g} kg"
     if PREFERRED[0] <= size <= PREFERRED[1]:
         return f"{said}: --density or --mass sets its mass (density=, mass= in Python)."
     units = [f"--unit {unit}" for unit in ("mm", "cm") if PREFERRED[0] <= size * UNITS[unit] <= PREFERRED[1]]
-    way = f"{' or '.join(units)} converts" if units and size > LENGTHS[0] else "--scale multiplies"
+    way = f"{' or '.join(units)} converts" if units and size > SIZES[0] else "--scale multiplies"
     how = f"{way} them, --mass sets its mass (unit=, scale=, mass= in Python)"
     return f"{said}, since simulators take lengths to be in metres: {how}."
 
@@ -165,7 +165,7 @@ SHEET = "slab"
 PREFERRED = (5e-3, 5.0)
 """Metres: a unit is suggested if the body is as long in it."""
 
-LENGTHS, MASSES = (1e-3, 50.0), (1e-6, 1e6)
+SIZES, MASSES = (1e-3, 50.0), (1e-6, 1e6)
 """What is plausible for a body: metres, and kilograms."""
 
 

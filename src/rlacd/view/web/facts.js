@@ -2,7 +2,7 @@
 import { term } from "page/hints";
 import { digits, make, measure, plural } from "page/widgets";
 
-const STEPS = {
+const OUTCOMES = {
   closed: "Closed as it was",
   reoriented: "Faces turned outward",
   "outer skin": "Reduced to its outer skin",
@@ -112,7 +112,7 @@ export function repairTable(report, scene) {
     groups.set(step, group);
   }
   const rows = [...groups].map(([step, { bodies, before, after, moved }]) => [
-    STEPS[step] ?? step,
+    OUTCOMES[step] ?? step,
     bodies.toLocaleString("en"),
     `${before.toLocaleString("en")} → ${after.toLocaleString("en")}`,
     moved < 1e-9 ? "0" : measure(moved, scene),
