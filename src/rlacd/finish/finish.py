@@ -33,6 +33,7 @@ from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps, limit_
 from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
+from rlacd.solid.topology import Edges
 
 LARGEST = float(np.finfo(np.float64).max)
 """The largest coordinate."""
@@ -244,11 +245,14 @@ def limit_roughly(part: Part, limits: HullLimits) -> Part:
 
 
 SIDE_AREA = 0.02
-"""A side has at least this share of the area of the convex hull: the facets of curved surfaces have less."""
+"""From at least this share of the area of the convex hull, the solid rolls onto a side: the facets of curved surfaces
+have less."""
 
 
 def resting_sides(solid: Component) -> FloatArray:
-    """Find the sides of a solid's convex hull over which its centre of mass lies.
+    """Find the sides of a solid's convex hull on which it comes to rest.
+
+    On a facet that its centre of mass is not above, it rolls on over the edge that the centre is farthest beyond.
 
     Returns
     -------
@@ -261,18 +265,22 @@ def resting_sides(solid: Component) -> FloatArray:
     edges = np.roll(corners, -1, axis=1) - corners
     normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.sqrt(dots(normals, normals))
-    outwards = np.cross(edges, normals[:, None])
-    below = (dots(outwards, centre - corners) <= 0).all(axis=1)  # whether the centre is in each facet's prism
-    sides, seen = [], areas == 0
-    for face in np.flatnonzero(below):
-        if seen[face]:
-            continue
-        normal = normals[face] / areas[face]
-        offset = dots(corners[face], normal).max()
+    beyond = dots(np.cross(edges, normals[:, None]), centre - corners) / np.sqrt(dots(edges, edges))
+    first, last = Edges.of(hull.faces, len(hull.vertices)).halfedges
+    face, across = np.arange(len(areas)), np.empty(beyond.shape, dtype=np.int64)
+    across.flat[first], across.flat[last] = last // 3, first // 3
+    rests_on = np.where((beyond <= 0).all(axis=1), face, across[face, beyond.argmax(axis=1)])
+    for _ in range(len(face).bit_length()):  # each time, twice as far
+        rests_on = rests_on[rests_on]
+    share = np.bincount(rests_on, areas / areas.sum(), len(face))
+    sides = []
+    for side in np.flatnonzero((share >= SIDE_AREA / 2) & (areas > 0)):  # two facets if the centre is above an edge
+        normal = normals[side] / areas[side]
+        offset = dots(corners[side], normal).max()
         coplanar = (dots(corners, normal) > offset - TOLERANCE).all(axis=1)
-        seen |= coplanar
-        if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
+        if share[coplanar].sum() >= SIDE_AREA:
             sides.append([*normal, offset + TOLERANCE])
+            share[coplanar] = 0
     return np.array(sides).reshape(-1, 4)
 
 
