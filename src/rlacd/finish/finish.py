@@ -163,9 +163,7 @@ def in_input(hull: Hull, frame: Frame, limits: HullLimits = NO_LIMITS) -> trimes
     """
     with np.errstate(over="ignore"):  # a limited hull can reach beyond the input, and so beyond the largest number
         points = np.clip(frame.to_input(hull.vertices), -LARGEST, LARGEST)
-    there = Hull.of(points)
-    if there is None:
-        there = _thickened(points, limits)
+    there = Hull.of(points) or _thickened(points, limits)
     metadata = {} if hull.primitive is None else {PRIMITIVE: hull.primitive.in_input(frame).as_plain()}
     return trimesh.Trimesh(there.vertices, there.faces, process=False, metadata=metadata)
 
@@ -186,8 +184,7 @@ def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
 
 def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
     """A hull of flat points [N, 3] that has a volume and is within the limits."""
-    step = step_of(points)
-    lower, upper = np.maximum(points, step - LARGEST) - step, np.minimum(points, LARGEST - step) + step
+    lower, upper = padded(points)
     corners = itertools.product(*zip(lower.T, upper.T, strict=True))
     hull = Hull.of(np.concatenate([np.stack(corner, axis=1) for corner in corners]))
     return hull if hull is not None and keeps(hull, limits) else plain_hull(points, limits)
@@ -266,9 +263,9 @@ def resting_sides(solid: Component) -> FloatArray:
     normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.sqrt(dots(normals, normals))
     beyond = dots(np.cross(edges, normals[:, None]), centre - corners) / np.sqrt(dots(edges, edges))
-    first, last = Edges.of(hull.faces, len(hull.vertices)).halfedges
+    halfedges = Edges.of(hull.faces.astype(np.int64), len(hull.vertices)).halfedges
     face, across = np.arange(len(areas)), np.empty(beyond.shape, dtype=np.int64)
-    across.flat[first], across.flat[last] = last // 3, first // 3
+    np.put(across, halfedges, halfedges[::-1] // 3)
     rests_on = np.where((beyond <= 0).all(axis=1), face, across[face, beyond.argmax(axis=1)])
     for _ in range(len(face).bit_length()):  # each time, twice as far
         rests_on = rests_on[rests_on]
@@ -334,9 +331,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     for i in np.unique(taker):
         part = parts[i]
         hull = Hull.of(np.concatenate([part.hull.vertices, points[taker == i]]))
-        if hull is None:
-            continue
-        larger = part.with_hull(hull)
+        larger = part.with_hull(hull) if hull is not None else part
         if criterion.is_met(larger) or not criterion.is_met(part):
             grown[i] = larger
     return grown
@@ -350,20 +345,19 @@ def plain_hull(points: FloatArray, limits: HullLimits) -> Hull:
 
 
 def _box_around(points: FloatArray) -> FloatArray:
-    """Corners [8, 3] of a box around the points, padded on every side by the resolution of their largest coordinate.
+    """Corners [8, 3] of a box around the points, padded on every side."""
+    lower, upper = padded(points)
+    return np.array(list(itertools.product(*zip(lower.min(axis=0), upper.max(axis=0), strict=True))))
+
+
+def padded(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The points [N, 3] less, and plus, the resolution of their largest coordinate on every axis.
 
     One floating-point step along an axis may vanish next to a large coordinate on another axis.
     """
-    step = step_of(points)
-    lower = np.maximum(points.min(axis=0), step - LARGEST) - step
-    upper = np.minimum(points.max(axis=0), LARGEST - step) + step
-    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
-
-
-def step_of(points: FloatArray) -> float:
-    """The resolution of the points' largest coordinate."""
     limits = np.finfo(np.float64)
-    return float(np.abs(points).max() * limits.eps + limits.smallest_subnormal)
+    step = float(np.abs(points).max() * limits.eps + limits.smallest_subnormal)
+    return np.maximum(points, step - LARGEST) - step, np.minimum(points, LARGEST - step) + step
 
 
 def _tetrahedron_around(points: FloatArray) -> FloatArray:
