@@ -198,10 +198,11 @@ def _depths_in_mujoco(result: Result, starts: FloatArray, axis: int, sign: float
         for start in starts:
             ball = spec.worldbody.add_body(pos=start.tolist())
             ball.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way.tolist(), damping=9.81 / FALL_SPEED)
-            # They meet the body, not each other.
-            ball.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[BALL * SIZE, 0, 0], mass=1.0, contype=2, conaffinity=1
-            )
+            geom = ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[BALL * SIZE, 0, 0], mass=1.0)
+            geom.contype, geom.conaffinity = 2, 1  # they meet the body, not each other
+            # As hard as the step allows, without friction: with MuJoCo's defaults, a ball that lands beside the top of
+            # an edge creeps past it, even past that of a single box.
+            geom.priority, geom.solref, geom.friction = 1, [2 * DROP_STEP, 1.0], [0.0, 0.0, 0.0]
         model = spec.compile()
     data = mujoco.MjData(model)
     starting = 1.5 * FALL_SPEED / 9.81  # what it takes to come to that speed; more lets balls creep down steep walls

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import trimesh
 
 from rlacd import _native
@@ -164,9 +163,7 @@ def in_input(hull: Hull, frame: Frame, limits: HullLimits = NO_LIMITS) -> trimes
     """
     with np.errstate(over="ignore"):  # a limited hull can reach beyond the input, and so beyond the largest number
         points = np.clip(frame.to_input(hull.vertices), -LARGEST, LARGEST)
-    there = Hull.of(points)
-    if there is None:
-        there = _thickened(points, limits)
+    there = Hull.of(points) or _thickened(points, limits)
     metadata = {} if hull.primitive is None else {PRIMITIVE: hull.primitive.in_input(frame).as_plain()}
     return trimesh.Trimesh(there.vertices, there.faces, process=False, metadata=metadata)
 
@@ -188,8 +185,7 @@ def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
 
 def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
     """A hull of flat points [N, 3] that has a volume and is within the limits."""
-    step = step_of(points)
-    lower, upper = np.maximum(points, step - LARGEST) - step, np.minimum(points, LARGEST - step) + step
+    lower, upper = padded(points)
     corners = itertools.product(*zip(lower.T, upper.T, strict=True))
     hull = Hull.of(np.concatenate([np.stack(corner, axis=1) for corner in corners]))
     return hull if hull is not None and keeps(hull, limits) else plain_hull(points, limits)
@@ -247,11 +243,14 @@ def limit_roughly(part: Part, limits: HullLimits) -> Part:
 
 
 SIDE_AREA = 0.02
-"""A side has at least this share of the area of the convex hull: the facets of curved surfaces have less."""
+"""From at least this share of the area of the convex hull, the solid rolls onto a side: the facets of curved surfaces
+have less."""
 
 
 def resting_sides(solid: Component) -> FloatArray:
-    """Find the sides of a solid's convex hull over which its centre of mass lies.
+    """Find the sides of a solid's convex hull on which it comes to rest.
+
+    On a facet that its centre of mass is not above, it rolls on over the edge that the centre is farthest beyond.
 
     Returns
     -------
@@ -264,36 +263,23 @@ def resting_sides(solid: Component) -> FloatArray:
     edges = np.roll(corners, -1, axis=1) - corners
     normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.sqrt(dots(normals, normals))
-    outwards = np.cross(edges, normals[:, None])
-    below = (dots(outwards, centre - corners) <= 0).all(axis=1)  # whether the centre is in each facet's prism
-    patch = _flat_patches(hull, normals, areas)
-    is_large = np.bincount(patch, areas)[patch] >= SIDE_AREA * areas.sum()
-    sides, seen = [], areas == 0
-    for face in np.flatnonzero(below & is_large):
-        _native.poll_stop()
-        if seen[face]:
-            continue
-        normal = normals[face] / areas[face]
-        offset = dots(corners[face], normal).max()
+    beyond = dots(np.cross(edges, normals[:, None]), centre - corners) / np.sqrt(dots(edges, edges))
+    halfedges = Edges.of(hull.faces.astype(np.int64), len(hull.vertices)).halfedges
+    face, across = np.arange(len(areas)), np.empty(beyond.shape, dtype=np.int64)
+    np.put(across, halfedges, halfedges[::-1] // 3)
+    rests_on = np.where((beyond <= 0).all(axis=1), face, across[face, beyond.argmax(axis=1)])
+    for _ in range(len(face).bit_length()):  # each time, twice as far
+        rests_on = rests_on[rests_on]
+    share = np.bincount(rests_on, areas / areas.sum(), len(face))
+    sides = []
+    for side in np.flatnonzero((share >= SIDE_AREA / 2) & (areas > 0)):  # two facets if the centre is above an edge
+        normal = normals[side] / areas[side]
+        offset = dots(corners[side], normal).max()
         coplanar = (dots(corners, normal) > offset - TOLERANCE).all(axis=1)
-        seen |= coplanar
-        if areas[coplanar].sum() >= SIDE_AREA * areas.sum():
+        if share[coplanar].sum() >= SIDE_AREA:
             sides.append([*normal, offset + TOLERANCE])
+            share[coplanar] = 0
     return np.array(sides).reshape(-1, 4)
-
-
-def _flat_patches(hull: Hull, normals: FloatArray, areas: FloatArray) -> npt.NDArray[np.int64]:
-    """Number the patches [F] of facets across whose edges the hull is flat, whichever of the two facets is asked."""
-    faces = hull.faces.astype(np.int64)
-    halfedges = Edges.of(faces, len(hull.vertices)).halfedges
-    face, opposite = halfedges // 3, faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]
-    depth = [
-        dots(hull.vertices[far] - hull.vertices[faces[near, 0]], normals[near]) + TOLERANCE * areas[near]
-        for near, far in zip(face, opposite[::-1], strict=True)
-    ]
-    is_flat = np.maximum(*depth) >= 0
-    _, patch = _native.components(len(faces), *(np.ascontiguousarray(each[is_flat]) for each in face))
-    return patch
 
 
 def within_reach(sides: FloatArray, hull: Hull, growth: float) -> FloatArray:
@@ -346,9 +332,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     for i in np.unique(taker):
         part = parts[i]
         hull = Hull.of(np.concatenate([part.hull.vertices, points[taker == i]]))
-        if hull is None:
-            continue
-        larger = part.with_hull(hull)
+        larger = part.with_hull(hull) if hull is not None else part
         if criterion.is_met(larger) or not criterion.is_met(part):
             grown[i] = larger
     return grown
@@ -362,20 +346,19 @@ def plain_hull(points: FloatArray, limits: HullLimits) -> Hull:
 
 
 def _box_around(points: FloatArray) -> FloatArray:
-    """Corners [8, 3] of a box around the points, padded on every side by the resolution of their largest coordinate.
+    """Corners [8, 3] of a box around the points, padded on every side."""
+    lower, upper = padded(points)
+    return np.array(list(itertools.product(*zip(lower.min(axis=0), upper.max(axis=0), strict=True))))
+
+
+def padded(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The points [N, 3] less, and plus, the resolution of their largest coordinate on every axis.
 
     One floating-point step along an axis may vanish next to a large coordinate on another axis.
     """
-    step = step_of(points)
-    lower = np.maximum(points.min(axis=0), step - LARGEST) - step
-    upper = np.minimum(points.max(axis=0), LARGEST - step) + step
-    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
-
-
-def step_of(points: FloatArray) -> float:
-    """The resolution of the points' largest coordinate."""
     limits = np.finfo(np.float64)
-    return float(np.abs(points).max() * limits.eps + limits.smallest_subnormal)
+    step = float(np.abs(points).max() * limits.eps + limits.smallest_subnormal)
+    return np.maximum(points, step - LARGEST) - step, np.minimum(points, LARGEST - step) + step
 
 
 def _tetrahedron_around(points: FloatArray) -> FloatArray:
