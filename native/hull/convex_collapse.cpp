@@ -25,6 +25,10 @@ constexpr double kSliver = 1e-6;
 // Safety factor on the tolerance, since normals and depths are rounded.
 constexpr double kSafely = 1.1;
 
+// From so many corners around a new one on, lines across flat sides are no longer tried as edges: a flat side of n
+// corners has n of them after each collapse, and each takes time in n.
+constexpr std::size_t kManyCorners = 64;
+
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -247,7 +251,11 @@ void ConvexCollapse::apply(const Collapse& collapse) {
     ++version_[edge.from];
     reach_[edge.from] = kUnknown;
   }
-  for (const HorizonEdge& edge : ring) schedule(edge.from, apex);
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Facet& before = facets_[fan[(i + ring.size() - 1) % ring.size()]];
+    const bool is_across_flat = dot(before.normal, points_[ring[i].to]) - before.offset >= -kFlat;
+    if (ring.size() < kManyCorners || !is_across_flat) schedule(ring[i].from, apex);
+  }
 }
 
 }  // namespace rlacd

@@ -38,12 +38,25 @@ def plain_text(content: bytes) -> bytes:
 
 
 def numbers_in(text: bytes, kind: type = np.float64) -> npt.NDArray[Any]:
-    """The numbers in a text; ValueError, or only those up to the first word that is none, by the version of numpy."""
+    """The numbers in a text. Raises ValueError that names the first word that is none."""
     if not text.strip():
         return np.empty(0, kind)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of text that ends in something else than numbers
-        return np.fromstring(text.decode("latin-1"), kind, sep=" ")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # of older versions of numpy
+            return np.fromstring(text.decode("latin-1"), kind, sep=" ")
+    except (ValueError, DeprecationWarning) as error:
+        wrong = next((word for word in text.split() if not _is_number(word, kind)), b"a word")
+        what = "number" if kind is np.float64 else "whole number"
+        raise ValueError(f"{wrong[:20].decode(errors='replace')!r} is no {what}") from error
+
+
+def _is_number(word: bytes, kind: type) -> bool:
+    try:
+        kind(word)
+    except (ValueError, OverflowError):
+        return False
+    return b"_" not in word  # which Python takes
 
 
 def rows_of(text: bytes) -> tuple[FloatArray, IntArray]:
@@ -52,10 +65,7 @@ def rows_of(text: bytes) -> tuple[FloatArray, IntArray]:
     blank = letters <= ord(" ")
     words = np.flatnonzero(~blank[1:] & blank[:-1])
     counts = np.diff(np.searchsorted(words, np.flatnonzero(letters[1:] == ord("\n"))), prepend=0)
-    numbers = numbers_in(text)
-    if len(numbers) != len(words):
-        raise ValueError(f"{text.split()[len(numbers)][:20].decode(errors='replace')!r} is no number")
-    return numbers, counts
+    return numbers_in(text), counts
 
 
 def vectors_of(text: bytes) -> FloatArray:
