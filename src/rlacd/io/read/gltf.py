@@ -75,8 +75,6 @@ def split(content: bytes) -> tuple[Json, bytes | None]:
         length, chunk = struct.unpack_from("<II", content, 8)
         if max(length, 20 + chunk) > len(content):
             raise ValueError(f"its header declares {length} bytes")
-        if content[4:8] != b"\2\0\0\0":
-            raise ValueError("it is of another version than glTF 2")
         text, rest = content[20 : 20 + chunk], content[20 + chunk :]
     try:
         header = json.loads(text.decode())

@@ -15,6 +15,11 @@ from rlacd.io.read.contents import MOST_TRIANGLES
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.topology import IntArray
 
+_NUMBERS: dict[type, tuple[str, re.Pattern[bytes]]] = {
+    np.float64: ("number", re.compile(rb"[-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|(nan|inf)\S*)", re.IGNORECASE)),
+    np.int64: ("whole number", re.compile(rb"[-+]?\d+")),
+}
+
 
 def check_text(path: Path, content: bytes) -> None:
     """Refuse text in UTF-16, and text of more lines than any mesh has."""
@@ -46,17 +51,9 @@ def numbers_in(text: bytes, kind: type = np.float64) -> npt.NDArray[Any]:
             warnings.simplefilter("error", DeprecationWarning)  # of older versions of numpy
             return np.fromstring(text.decode("latin-1"), kind, sep=" ")
     except (ValueError, DeprecationWarning) as error:
-        wrong = next((word for word in text.split() if not _is_number(word, kind)), b"a word")
-        what = "number" if kind is np.float64 else "whole number"
+        what, form = _NUMBERS[kind]
+        wrong = next((word for word in text.split() if form.fullmatch(word) is None), b"a word")
         raise ValueError(f"{wrong[:20].decode(errors='replace')!r} is no {what}") from error
-
-
-def _is_number(word: bytes, kind: type) -> bool:
-    try:
-        kind(word)
-    except (ValueError, OverflowError):
-        return False
-    return b"_" not in word  # which Python takes
 
 
 def rows_of(text: bytes) -> tuple[FloatArray, IntArray]:

@@ -91,17 +91,13 @@ class _Archive:
                     case "build" if len(self._models) == 1:
                         self._build = _items(element, "item", model)
                     case "model":
-                        self._check_understood(element)
+                        for prefix in element.get("requiredextensions", "").split():
+                            if UNDERSTOOD.fullmatch(name := element.nsmap.get(prefix, prefix)) is None:
+                                raise MeshFileError(f"{self._path} requires {name!r:.99}, which is not read: mesh it")
                         self.unit = self.unit or element.get("unit", "millimeter")
                     case _:
                         groups[element.get("id", "")] = [_color(one) for one in element.iter("{*}base", "{*}color")]
         return self._models[model]
-
-    def _check_understood(self, model: Any) -> None:
-        for prefix in model.get("requiredextensions", "").split():
-            if UNDERSTOOD.fullmatch(name := model.nsmap.get(prefix, prefix)) is None:
-                how = "export it as triangles"
-                raise MeshFileError(f"{self._path} requires the extension {name!r:.100}, which is not read: {how}")
 
     def _place(self, items: Sequence[_Item], transform: FloatArray, depth: int = 0) -> None:
         for item in items:
