@@ -19,15 +19,15 @@ constexpr double kFlat = 1e-9;
 // A collapse whose point is farther away than this (the hull is about 2 wide) adds too much volume to be useful.
 constexpr double kReach = 50;
 
-// Beside a corner with more facets than this, diagonals of flat sides are not collapsed: each of the many would have to
-// be planned anew, for all of these facets, whenever one edge of such a side is.
-constexpr std::size_t kManyFacets = 200;
-
 // A facet with less area than this share of a square on its longest side has no usable normal.
 constexpr double kSliver = 1e-6;
 
 // Safety factor on the tolerance, since normals and depths are rounded.
 constexpr double kSafely = 1.1;
+
+// From so many corners around a new one on, lines across flat sides are no longer tried as edges: a flat side of n
+// corners has n of them after each collapse, and each takes time in n.
+constexpr std::size_t kManyCorners = 64;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -252,8 +252,9 @@ void ConvexCollapse::apply(const Collapse& collapse) {
     reach_[edge.from] = kUnknown;
   }
   for (std::size_t i = 0; i < ring.size(); ++i) {
-    const Facet &left = facets_[fan[i]], &right = facets_[fan[(i + ring.size() - 1) % ring.size()]];
-    if (ring.size() <= kManyFacets || dot(left.normal, right.normal) < 1 - kFlat) schedule(ring[i].from, apex);
+    const Facet& before = facets_[fan[(i + ring.size() - 1) % ring.size()]];
+    const bool is_across_flat = dot(before.normal, points_[ring[i].to]) - before.offset >= -kFlat;
+    if (ring.size() < kManyCorners || !is_across_flat) schedule(ring[i].from, apex);
   }
 }
 

@@ -20,6 +20,7 @@ from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report
 from rlacd.io.read.load import load_mesh
 from rlacd.options import (
+    LENGTHS,
     OPTION_NAMES,
     SIMPLE,
     DetailName,
@@ -221,6 +222,9 @@ def _without_effect(options: Options, source: InputMesh, apart: bool) -> list[st
         said.append(f"per_node had no effect: {source.name} was read as one node")
     if options.relative_to == "node" and not apart:
         said.append("relative_to had no effect: nodes were not decomposed separately")
+    for name in LENGTHS:
+        if getattr(options, f"{name}_abs") is not None and getattr(options, name) != getattr(Options, name):
+            said.append(f"{name} had no effect: {name}_abs was given too")
     return said
 
 

@@ -415,6 +415,8 @@ def test_lengths_in_the_meshs_own_unit() -> None:
     by_length = rlacd.decompose(mesh, criterion=rlacd.NavigableSpace(radius_abs=100.0, tolerance_abs=40.0))
     assert len(by_share) == len(by_length) == 2
     assert np.allclose(by_share.balls.centres * 1000, by_length.balls.centres, atol=1e-3)
+    with pytest.raises(rlacd.OptionError, match="it has to be left out with radius_abs"):
+        rlacd.NavigableSpace(0.1, radius_abs=1.0)
 
 
 def bumpy_ball() -> trimesh.Trimesh:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -52,6 +54,16 @@ def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = N
     assert len(again.vertices) == len(limited.vertices)
     assert limited.volume == pytest.approx(again.volume, rel=1e-12)
     return limited
+
+
+def test_a_flat_side_of_many_corners_takes_no_cubic_time() -> None:
+    """The ends of a cylinder of 1,200 sides: a minute where every line across them counts as an edge."""
+    hull, begun = Hull.of(trimesh.creation.cylinder(1, 1, sections=1200).vertices), time.process_time()
+    simple = limit_hull(hull, tolerance=0.01)
+    assert time.process_time() - begun < 10
+    assert len(simple.vertices) < 100
+    assert Polytope(simple.vertices, simple.faces).height(hull.vertices).max() < 1e-12
+    assert simple.volume < 1.02 * hull.volume
 
 
 points = hnp.arrays(np.float64, st.tuples(st.integers(5, 40), st.just(3)), elements=st.floats(-1, 1, width=32))

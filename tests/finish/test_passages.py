@@ -97,6 +97,8 @@ def test_each_hole_that_narrows_is_listed_with_its_place_and_what_is_left_of_it(
     (warning,) = (said for said in result.report["warnings"] if "passages" in said)
     assert f"{sum(share < 2 / 3 for share in shares)} passages narrow by over a third" in warning
     assert warning.endswith("--keep-open with a length, or a smaller threshold, keeps more open.")
+    (warning,) = rlacd.decompose(mesh, criterion="volume", volume_tolerance=1.0, threads=1).report["warnings"]
+    assert warning.endswith("--keep-open with a length, or a smaller tolerance, keeps more open.")
 
 
 @pytest.mark.promise("passages")

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 import socket
 import zipfile
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.errors import MeshDataError, MeshError, MeshFileError
+from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError
 from rlacd.io.read.load import load_mesh
 from tests.assets import write_mesh
 from tests.io.hostile.archives import zipped
@@ -127,7 +128,13 @@ def test_counts_of_every_variant_of_off_are_held_against_the_file(tmp_path, lett
         ("a.off", b"NOFF", "lacks the counts"),
         ("a.off", b"# OFF", "lacks the counts"),
         ("a.stl", BOX.export(file_type="stl_ascii").rpartition("endsolid")[0].encode(), "damaged or cut off"),
+        ("a.stl", BOX.export(file_type="stl_ascii").replace(".", ",").encode(), "'-?.,.*' is no number"),
         ("a.xyz", b"0 0 0\n1 0 0 1\n0 1 0\n", "damaged or cut off"),
+        ("a.obj", OBJ.replace("0.5", "0,5").encode(), "'-?0,50*' is no number"),
+        ("a.obj", f"{OBJ}f 1 2 3.0\n".encode(), "'3.0' is no whole number"),
+        ("a.obj", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "run  git lfs pull"),
+        ("a.glb", b"<!DOCTYPE html><html>", "is a web page"),
+        ("a.ply", BOX.export(file_type="ply").replace(b" z\n", b" w\n"), "'z' is missing"),
         ("a.obj", b"v 1 2\n" + OBJ.encode(), "a vertex of 2 coordinates"),
         *(("a.obj", f"{OBJ}f 1 2 {corner}\n".encode(), "counts from 1") for corner in ("0", "0/1", "-0", "0//1 # 1")),
         ("a.dae", DAE.replace(b"<library_geometries>", b"<library_geometries>\0", 1), "damaged or cut off"),
@@ -193,6 +200,8 @@ def test_faces_with_vertices_that_are_not_finite_are_left_out(bad):
             "below two others",
         ),
         ({"nodes": [{"children": [True]}, {"mesh": 0}]}, "True is no index"),
+        ({"asset": {"version": "1.0"}}, "another version than glTF 2"),
+        ({"buffers": [{"byteLength": 9, "uri": "a.dat"}]}, "refers to 'a.dat', which has to be in its folder"),
         *(
             ({key: [one | change for one in gltf_tree()[key]]}, r"it declares \d+ rows but has no room for them")
             for key, change in (
@@ -301,8 +310,8 @@ def test_what_an_obj_holds_beside_faces_is_told(tmp_path):
     mesh = load_mesh(tmp_path / "box.obj")
     assert len(mesh.faces) == 12
     assert mesh.warnings == tuple(
-        f"{what} of box.obj were left out"
-        for what in ("points and lines", "free-form curves and surfaces", "other files that it calls")
+        f"{what} in box.obj were left out"
+        for what in ("points and lines", "free-form curves and surfaces", "calls to other files")
     )
 
 
@@ -348,6 +357,24 @@ def test_objects_of_an_obj_are_nodes_or_else_its_groups(tmp_path, word):
     assert areas == pytest.approx([1.5, 1.05])
     path.write_text(text.replace("frame left", "door"), encoding="utf-8")
     assert len(load_mesh(path).nodes) == 1
+
+
+def test_supports_of_a_3mf_file_are_left_out_and_what_it_requires_and_is_not_read_refused(tmp_path):
+    trimesh.Scene([BOX, BOX.copy().apply_translation((9, 0, 0))]).export(tmp_path / "usual.3mf")
+    with zipfile.ZipFile(tmp_path / "usual.3mf") as usual:
+        model = usual.read("3D/3dmodel.model")
+    path = tmp_path / "other.3mf"
+    path.write_bytes(zipped({"3D/3dmodel.model": model.replace(b'type="model"', b'type="support"', 1)}))
+    mesh = load_mesh(path)
+    assert len(mesh.faces) == len(BOX.faces)
+    assert mesh.warnings == ("support structures of other.3mf were left out: 1",)
+    needs = model.replace(b"<model ", b'<model requiredextensions="p b" ', 1)
+    path.write_bytes(zipped({"3D/3dmodel.model": needs}))
+    with pytest.raises(MeshFileError, match="beamlattice/2017/02', which is not read"):
+        load_mesh(path)
+    path.write_bytes(zipped({"3D/3dmodel.model": re.sub(rb"<item .*?/>", b"", model)}))
+    with pytest.raises(EmptyMeshError, match="its build places no object"):
+        load_mesh(path)
 
 
 def test_the_model_of_a_3mf_file_may_have_any_name(tmp_path):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import rlacd
 from rlacd.errors import MeshFileError
 from rlacd.io.read.load import load_mesh
 from rlacd.solid.input_mesh import InputMesh
@@ -151,6 +152,20 @@ def test_instances_of_a_node_are_placed_within_it(rig: Rig, tmp_path: Path) -> N
     )
     assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume == pytest.approx(8 * (1 + 6 + 1))
     assert len(mesh.nodes) == 1
+
+
+def test_nodes_that_a_file_hides_neither_count_nor_stretch_the_others(rig: Rig, tmp_path: Path) -> None:
+    name = "KHR_node_visibility"
+    hidden = {"translation": [50, 0, 0], "children": [2], "extensions": {name: {"visible": False}}}
+    rig.header["extensionsRequired"] = [name]
+    rig.header["nodes"] = [{"mesh": 0}, hidden, {"mesh": 0}, {"mesh": 0, "translation": [0, 70, 0], "scale": [0] * 3}]
+    rig.header["scenes"] = [{"nodes": [0, 1, 3]}]
+    mesh = load_mesh(rig.glb(tmp_path / "box.glb"))
+    assert mesh.warnings == ("hidden nodes were left out, with those below them: 1",)
+    assert mesh.faces.shape == BOX.faces.shape
+    np.testing.assert_array_equal(np.sort(mesh.vertices[mesh.faces], axis=0), np.sort(BOX.triangles, axis=0))
+    result = rlacd.decompose(tmp_path / "box.glb", quality="fast", threads=1, per_node=True)
+    assert (len(result), result.report["scale"]) == (1, 2.0)
 
 
 def test_what_a_gltf_adds_to_its_triangles_is_read_refused_or_named(tmp_path: Path) -> None:

@@ -100,11 +100,20 @@ def dae(solid: Prism, one_list: bool = True) -> bytes:
         </library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>""".encode()
 
 
+def stl(solid: Prism) -> bytes:
+    """Facets of as many corners as the polygons have, which no rule of the format allows, but some programs write."""
+    points, polygons = solid
+    loops = ("".join(f"vertex {' '.join(map(repr, points[corner].tolist()))}\n" for corner in p) for p in polygons)
+    facets = "".join(f"facet normal 0 0 0\nouter loop\n{loop}endloop\nendfacet\n" for loop in loops)
+    return f"solid a\n{facets}endsolid\n".encode()
+
+
 WRITERS = {
     "dae": dae,
     "polygons.dae": lambda solid: dae(solid, one_list=False),
     "obj": obj,
     "off": off,
+    "stl": stl,
     "ascii.ply": lambda solid: ply(solid, ""),
     "little.ply": lambda solid: ply(solid, "<"),
     "big.ply": lambda solid: ply(solid, ">"),

@@ -145,12 +145,13 @@ def too_narrow(found: Sequence[dict[str, Any]], reached: Reached, is_stopped: bo
         elif left < told * radius:
             others.append((at, radius, left))
     reason = "the work was stopped before" if is_stopped else "limits on the hulls leave no other way"
+    smaller = "threshold" if "threshold" in options.numbers else "tolerance"
     share = "over a third" if ball is None else f"over a tenth, too narrow for a ball of radius {ball:.4g}"
     return [
         _narrows(lost, by, cure)
         for lost, by, cure in (
             (asked, "more than --keep-open allows", reason),
-            (others, share, "--keep-open with a length, or a smaller threshold, keeps more open"),
+            (others, share, f"--keep-open with a length, or a smaller {smaller}, keeps more open"),
         )
         if lost
     ]

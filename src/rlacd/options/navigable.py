@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from rlacd.errors import OptionError
 from rlacd.options.fields import LENGTH, check_fields, custom, number, option, relative, stated
 
 Point: TypeAlias = tuple[float, float, float]
@@ -102,6 +103,10 @@ class NavigableSpace:
     def __post_init__(self) -> None:
         absolute = [name for name in ("radius", "tolerance") if getattr(self, f"{name}_abs") is not None]
         for name in absolute:
+            if getattr(self, name) not in (None, getattr(type(self), name)):
+                raise OptionError(
+                    f"{name} is {getattr(self, name)!r}; it has to be left out with {name}_abs, its length."
+                )
             object.__setattr__(self, name, SHARES[1])  # anything in range, for the check
         check_fields(self)
         for name in absolute:

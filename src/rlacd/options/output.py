@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from rlacd.errors import OptionError
 from rlacd.options.fields import check_fields, custom, flag, number, one_of, option, path_like, stated
 
 Axis = Literal["x", "y", "z"]
@@ -102,3 +103,5 @@ class OutputOptions:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.mass is not None and self.density not in (None, DENSITY):
+            raise OptionError(f"density is {self.density}; it has to be left out with mass, that of the whole body.")

@@ -53,7 +53,8 @@ class FolderFiles:
             except (OSError, ValueError, RuntimeError):  # a name with a NUL, circular links
                 continue
             return self._read[path]
-        raise FileNotFoundError(f"{name!r:.200} is not a data file beside the mesh")
+        endings = " or ".join(sorted(self._endings))
+        raise FileNotFoundError(f"{name!r:.200}, which has to be in its folder or below it, and to end in {endings}")
 
 
 def mesh_files(path: Path, name: str | None = None) -> dict[str, bytes]:

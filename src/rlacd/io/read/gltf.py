@@ -21,11 +21,11 @@ from rlacd.io.read.polygons import fan_triangles, strip_triangles
 from rlacd.solid.arrays import FloatArray, Int64Array, dots, heights
 from rlacd.solid.input_mesh import Asset, SourceNode
 
-INSTANCES = "EXT_mesh_gpu_instancing"
+INSTANCES, VISIBILITY = "EXT_mesh_gpu_instancing", "KHR_node_visibility"
 
 READ = re.compile(
     r"(KHR|EXT|MSFT)_(materials|texture|lights|xmp|animation)_\w+|KHR_(mesh_quantization|xmp|draco_mesh_compression)"
-    rf"|EXT_(mesh_features|instance_features|structural_metadata)|VRM\w*|{INSTANCES}"
+    rf"|EXT_(mesh_features|instance_features|structural_metadata)|VRM\w*|{INSTANCES}|{VISIBILITY}"
 )
 """Extensions that leave the triangles as they are, or that are read."""
 
@@ -74,8 +74,6 @@ def split(content: bytes) -> tuple[Json, bytes | None]:
         length, chunk = struct.unpack_from("<II", content, 8)
         if max(length, 20 + chunk) > len(content):
             raise ValueError(f"its header declares {length} bytes")
-        if content[4:8] != b"\2\0\0\0":
-            raise ValueError("it is of another version than glTF 2")
         text, rest = content[20 : 20 + chunk], content[20 + chunk :]
     try:
         header = json.loads(text.decode())
@@ -83,6 +81,8 @@ def split(content: bytes) -> tuple[Json, bytes | None]:
         raise ValueError("its JSON nests too deeply") from error
     if not isinstance(header, dict):
         raise ValueError("its JSON is no object")
+    if str(header.get("asset", {}).get("version", 2)).split(".")[0] != "2":
+        raise ValueError("it is of another version than glTF 2")
     return header, rest
 
 
@@ -119,6 +119,7 @@ class _Scene:
         self._worlds = _worlds(self._nodes)
         self._shapes: dict[Any, Triangles] = {}
         self._unjointed: set[int] = set()
+        self._hidden = 0
         self._instances = 0
 
     def read(self) -> tuple[list[tuple[SourceNode, Triangles]], list[str]]:
@@ -135,6 +136,7 @@ class _Scene:
         unread = (*LINES, *POINTS) if solid else LINES
         said = {
             "primitives that are points or lines were left out": sum(mode in unread for mode in modes),
+            "hidden nodes were left out, with those below them": self._hidden,
             "meshes with a skin but without joints were placed by their nodes": len(self._unjointed),
         }
         warnings = [f"{what}: {count}" for what, count in said.items() if count]
@@ -146,12 +148,17 @@ class _Scene:
         if not scenes:
             return list(range(len(self._nodes)))
         order = list(item(scenes, self._header.get("scene", 0)).get("nodes", ()))
-        found = set(order)
+        found, shown = set(order), set()
         for index in order:
-            below = [child for child in item(self._nodes, index).get("children", ()) if child not in found]
+            node = item(self._nodes, index)
+            if not node.get("extensions", {}).get(VISIBILITY, {}).get("visible", True):
+                self._hidden += 1
+                continue
+            shown.add(index)
+            below = [child for child in node.get("children", ()) if child not in found]
             found.update(below)
             order.extend(below)
-        return sorted(found)
+        return sorted(shown)
 
     def _placed(self, index: int, modes: Sequence[int]) -> tuple[SourceNode, Triangles]:
         """What a node places: by the joints of its skin, in the coordinates of the scene, or else by itself."""

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
 from rlacd.io.read.contents import Contents, damaged, one_shape, require_few, without_engine_hulls
-from rlacd.io.read.open_file import CONVERTERS, format_of, read_named
+from rlacd.io.read.open_file import CONVERTERS, NO_MESHES, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, heights
 from rlacd.solid.input_mesh import Asset, InputMesh
@@ -95,6 +95,9 @@ def _read(path: Path) -> Contents:
     content = read_named(path)  # here, not by name in a parser: a name like a URL must not be fetched
     if not content.strip(b"\0 \t\r\n"):
         raise MeshFileError(f"{path} is empty: export the mesh again")
+    for mark, said in NO_MESHES.items():
+        if content[:99].lower().startswith(mark):
+            raise MeshFileError(f"{path} {said}")
     holds, extension = format_of(content), path.suffix.lower().lstrip(".")
     if extension == "usdz" and holds == "3mf":  # both are archives
         holds = extension
@@ -112,8 +115,11 @@ def _read(path: Path) -> Contents:
             raise
         if isinstance(error, MemoryError):
             raise MeshFileError(f"{path} takes more memory than there is: simplify the mesh first") from error
+        if isinstance(error, FileNotFoundError):
+            raise MeshFileError(f"{path} refers to {error}") from error
         # A missing module means that the parser tried an encoding no mesh has: that says nothing about the file.
-        raise damaged(path, extension, "" if isinstance(error, ImportError) else str(error)) from error
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise damaged(path, extension, "" if isinstance(error, ImportError) else why) from error
     if renamed and not any(len(shape.vertices) for _, shape in contents.geometry):
         raise MeshFileError(f"{path} is not {extension} but {holds}: {renamed}")
     return contents
@@ -142,13 +148,16 @@ def _baked(name: str, contents: Contents) -> InputMesh:
         nodes += [node] * solid
         count += len(v)
     node_of = np.repeat(np.arange(len(nodes)), [len(f) for f in faces[1:]]) if solid else None
-    mesh = _finite(name, np.concatenate(vertices), np.concatenate(faces), node_of)
+    mesh = _usable(name, np.concatenate(vertices), np.concatenate(faces), node_of)
+    if len(mesh.vertices) == 0:
+        why = f" ({'; '.join(contents.warnings)})" if contents.warnings else ""
+        raise EmptyMeshError(f"{name} holds no triangles and no points{why}: there is nothing to decompose")
     mesh = replace(mesh, warnings=(*mesh.warnings, *contents.warnings), nodes=tuple(nodes))
     return replace(mesh, up=contents.up, metres=contents.metres, asset=contents.asset)
 
 
-def _finite(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Array | None) -> InputMesh:
-    """Drop faces and vertices that are not finite."""
+def _usable(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Array | None) -> InputMesh:
+    """Drop faces and vertices that are not finite, and faces that are a single point, unless all are."""
     require_memory(len(faces), BYTES_READ, name)
     warnings = []
     finite: BoolArray = np.asarray(np.isfinite(vertices).all(axis=1))
@@ -161,7 +170,9 @@ def _finite(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Ar
         faces = (np.cumsum(finite) - 1)[faces[usable]]
         node_of = None if node_of is None else node_of[usable]
         vertices = vertices[finite]
-    if len(vertices) == 0:
-        raise EmptyMeshError(f"{name} holds no points, so there is nothing to decompose: check the export")
+    first = vertices[faces[:, 0]]  # a node of scale 0, a way to hide it, must not stretch the box of the others
+    speck = (first == vertices[faces[:, 1]]).all(axis=1) & (first == vertices[faces[:, 2]]).all(axis=1)
+    if speck.any() and not speck.all():
+        faces, node_of = faces[~speck], None if node_of is None else node_of[~speck]
     arrays = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
     return InputMesh(*arrays, name, tuple(warnings), node_of=node_of)

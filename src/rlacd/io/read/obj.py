@@ -28,7 +28,7 @@ from rlacd.solid.input_mesh import Asset, SourceNode
 _UNREAD = {
     **dict.fromkeys((b"curv", b"curv2", b"surf", b"bzp", b"bsp", b"cdc", b"cdp"), "free-form curves and surfaces"),
     **dict.fromkeys((b"p", b"l"), "points and lines"),
-    b"call": "other files that it calls",
+    b"call": "calls to other files",
 }
 
 _COMMON = np.array([b"v ", b"vt", b"vn", b"f ", b"s ", b""])
@@ -140,7 +140,7 @@ def read_obj(path: Path, content: bytes) -> Contents:
         The file is damaged.
     """
     file = _File(path, content)
-    warnings = [f"{what} of {path.name} were left out" for what in file.unread]
+    warnings = [f"{what} in {path.name} were left out" for what in file.unread]
     if not len(file.faces[0]):
         return Contents(one_shape(path.stem, file.points), warnings)
     names, owner = file.objects()

@@ -79,6 +79,13 @@ CONVERTERS = {
 }
 """What to do with files that people have and that are not read."""
 
+NO_MESHES = {
+    b"version https://git-lfs": "only names a file that Git LFS keeps: run  git lfs pull",
+    b"<!doctype html": "is a web page: download the mesh itself",
+    b"<html": "is a web page: download the mesh itself",
+}
+"""How files begin that people have in place of a mesh, and what to do."""
+
 OFF_KEYWORD = re.compile(rb"((?:ST|[CN4n])*)OFF(?![A-Za-z])|off(?![A-Za-z])")
 
 _OBJ_WORDS = {b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"g", b"o", b"s", b"mtllib", b"usemtl"}

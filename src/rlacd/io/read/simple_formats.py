@@ -17,9 +17,10 @@ from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import Contents, one_shape
 from rlacd.io.read.open_file import OFF_KEYWORD
 from rlacd.io.read.polygons import triangles_of
-from rlacd.io.read.text import check_text, count_in, plain_text, rows_of, vectors_of, whole
+from rlacd.io.read.text import check_text, count_in, numbers_in, plain_text, rows_of, vectors_of, whole
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.topology import IntArray
 
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -41,18 +42,23 @@ def read_stl(path: Path, content: bytes) -> Contents:
         require_memory(count, BYTES_READ, path.name)
         points = np.frombuffer(content, _STL, count, 84)["corners"].reshape(-1, 3).astype(np.float64)
         warnings = [f"{more} bytes after the last triangle of {path.name} were left out"] if more else []
+        faces = np.arange(len(points)).reshape(-1, 3)
     else:
         check_text(path, content)
-        points = _text_stl(path, plain_text(content))
-    return Contents(one_shape(path.stem, points, np.arange(len(points)).reshape(-1, 3)), warnings)
+        points, faces = _text_stl(path, plain_text(content))
+    return Contents(one_shape(path.stem, points, faces), warnings)
 
 
-def _text_stl(path: Path, text: bytes) -> FloatArray:
-    require_memory(max(text.count(b"vertex"), text.count(b"VERTEX")) // 3, BYTES_READ, path.name)
-    corners = _VERTEX.findall(text)
-    if len(corners) % 3 or (corners and b"endsolid" not in text[text.lower().rfind(b"vertex") :].lower()):
-        raise ValueError(f"a triangle ends after {len(corners) % 3} vertices")
-    return np.array(corners, dtype=np.float64).reshape(-1, 3)
+def _text_stl(path: Path, text: bytes) -> tuple[FloatArray, IntArray]:
+    """The points and triangles of a text, in which some programs write other polygons as well."""
+    lower = text.lower()
+    require_memory(lower.count(b"vertex") // 3, BYTES_READ, path.name)
+    points = numbers_in(b" ".join(b" ".join(corner) for corner in _VERTEX.findall(text))).reshape(-1, 3)
+    *loops, rest = lower.split(b"endloop")
+    counts = np.array([loop.rpartition(b"loop")[2].count(b"vertex") for loop in loops], dtype=np.int64)
+    if counts.sum() != len(points) or counts.min(initial=3) < 3 or b"endsolid" not in rest:
+        raise ValueError("a facet has fewer than three vertices, or the last endsolid is missing")
+    return points, triangles_of(points, counts, np.arange(len(points)))
 
 
 def read_xyz(path: Path, content: bytes) -> Contents:

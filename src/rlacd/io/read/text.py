@@ -14,6 +14,11 @@ from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import MOST_TRIANGLES
 from rlacd.solid.arrays import FloatArray, Int64Array
 
+_NUMBERS: dict[type, tuple[str, re.Pattern[bytes]]] = {
+    np.float64: ("number", re.compile(rb"[-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|(nan|inf)\S*)", re.IGNORECASE)),
+    np.int64: ("whole number", re.compile(rb"[-+]?\d+")),
+}
+
 
 def check_text(path: Path, content: bytes) -> None:
     """Refuse text in UTF-16, and text of more lines than any mesh has."""
@@ -37,12 +42,17 @@ def plain_text(content: bytes) -> bytes:
 
 
 def numbers_in(text: bytes, kind: type = np.float64) -> npt.NDArray[Any]:
-    """The numbers in a text; ValueError, or only those up to the first word that is none, by the version of numpy."""
+    """The numbers in a text. Raises ValueError that names the first word that is none."""
     if not text.strip():
         return np.empty(0, kind)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of text that ends in something else than numbers
-        return np.fromstring(text.decode("latin-1"), kind, sep=" ")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # of older versions of numpy
+            return np.fromstring(text.decode("latin-1"), kind, sep=" ")
+    except (ValueError, DeprecationWarning) as error:
+        what, form = _NUMBERS[kind]
+        wrong = next((word for word in text.split() if form.fullmatch(word) is None), b"a word")
+        raise ValueError(f"{wrong[:20].decode(errors='replace')!r} is no {what}") from error
 
 
 def rows_of(text: bytes) -> tuple[FloatArray, Int64Array]:
@@ -51,10 +61,7 @@ def rows_of(text: bytes) -> tuple[FloatArray, Int64Array]:
     blank = letters <= ord(" ")
     words = np.flatnonzero(~blank[1:] & blank[:-1])
     counts = np.diff(np.searchsorted(words, np.flatnonzero(letters[1:] == ord("\n"))), prepend=0)
-    numbers = numbers_in(text)
-    if len(numbers) != len(words):
-        raise ValueError(f"{text.split()[len(numbers)][:20].decode(errors='replace')!r} is no number")
-    return numbers, counts
+    return numbers_in(text), counts
 
 
 def vectors_of(text: bytes) -> FloatArray:

@@ -24,6 +24,12 @@ Color = tuple[float, float, float, float]
 
 METRES = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "meter": 1.0, "inch": 0.0254, "foot": 0.3048}
 
+UNDERSTOOD = re.compile(r".*/(core|material|production|trianglesets|slice)/\d{4}/\d{2}")
+"""Namespaces of what leaves the triangles as they are, or is read."""
+
+SUPPORTS = ("support", "solidsupport")
+"""Types of objects that a printer adds to hold the others."""
+
 _HEX = re.compile(r"#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?$")
 
 
@@ -39,6 +45,7 @@ class _Object(NamedTuple):
     """An object has one colour here: its own, or the one that most of its triangles name."""
 
     name: str
+    kind: str
     shape: Triangles
     color: Color | None
     parts: list[_Item]
@@ -52,7 +59,7 @@ class _Archive:
         self._models: dict[str, dict[str, _Object]] = {}
         self._keys: Counter[str | None] = Counter()
         self._build: list[_Item] = []
-        self.unit = ""
+        self.unit, self.supports = "", 0
         self.placed: dict[str, tuple[SourceNode, _Object]] = {}
         self._objects_of(self._main())
         self._place(self._build, np.eye(4))
@@ -83,8 +90,11 @@ class _Archive:
                         element.clear()
                     case "build" if len(self._models) == 1:
                         self._build = _items(element, "item", model)
-                    case "model" if len(self._models) == 1:
-                        self.unit = element.get("unit", "millimeter")
+                    case "model":
+                        for prefix in element.get("requiredextensions", "").split():
+                            if UNDERSTOOD.fullmatch(name := element.nsmap.get(prefix, prefix)) is None:
+                                raise MeshFileError(f"{self._path} requires {name!r:.99}, which is not read: mesh it")
+                        self.unit = self.unit or element.get("unit", "millimeter")
                     case _:
                         groups[element.get("id", "")] = [_color(one) for one in element.iter("{*}base", "{*}color")]
         return self._models[model]
@@ -93,6 +103,9 @@ class _Archive:
         for item in items:
             check_places(self._path, len(self.placed), depth)
             thing = self._objects_of(item.model)[item.number]
+            if thing.kind in SUPPORTS:
+                self.supports += 1
+                continue
             here = transform @ item.transform
             key = trimesh.util.unique_name(thing.name, self.placed, self._keys)
             if len(thing.shape.vertices) or not thing.parts:
@@ -112,7 +125,9 @@ def read_3mf(path: Path, content: bytes) -> Contents:
     geometry = [(node, thing.shape) for node, thing in archive.placed.values()]
     colored = any(thing.color is not None for _, thing in archive.placed.values())
     asset = Asset(content, path, "3mf") if colored or len(geometry) > 1 else None
-    return Contents(geometry, metres=METRES.get(archive.unit, METRES["millimeter"]), asset=asset)
+    said = [f"support structures of {path.name} were left out: {archive.supports}"] if archive.supports else []
+    said += [] if geometry else ["its build places no object"]
+    return Contents(geometry, said, metres=METRES.get(archive.unit, METRES["millimeter"]), asset=asset)
 
 
 def scene_of_3mf(path: Path, content: bytes) -> trimesh.Scene:
@@ -144,7 +159,7 @@ def _object(element: Any, groups: dict[str, list[Color | None]], model: str) -> 
     colors = groups.get(group, [])
     color = colors[int(index)] if index.isdecimal() and int(index) < len(colors) else None
     name = element.get("name", element.get("id", ""))[:LONGEST_NAME]
-    return _Object(name, shape, color, _items(element, "component", model))
+    return _Object(name, element.get("type", "model"), shape, color, _items(element, "component", model))
 
 
 def _items(element: Any, tag: str, model: str) -> list[_Item]:
