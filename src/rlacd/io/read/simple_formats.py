@@ -19,8 +19,7 @@ from rlacd.io.read.open_file import OFF_KEYWORD
 from rlacd.io.read.polygons import triangles_of
 from rlacd.io.read.text import check_text, count_in, numbers_in, plain_text, rows_of, vectors_of, whole
 from rlacd.memory import BYTES_READ, require_memory
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.topology import IntArray
+from rlacd.solid.arrays import FloatArray, Int64Array
 
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -49,7 +48,7 @@ def read_stl(path: Path, content: bytes) -> Contents:
     return Contents(one_shape(path.stem, points, faces), warnings)
 
 
-def _text_stl(path: Path, text: bytes) -> tuple[FloatArray, IntArray]:
+def _text_stl(path: Path, text: bytes) -> tuple[FloatArray, Int64Array]:
     """The points and triangles of a text, in which some programs write other polygons as well."""
     lower = text.lower()
     require_memory(lower.count(b"vertex") // 3, BYTES_READ, path.name)
