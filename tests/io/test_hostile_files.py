@@ -222,8 +222,7 @@ def array_of(count: int) -> bytes:
 
 
 def npy(array: np.ndarray[Any, Any]) -> bytes:
-    file = io.BytesIO()
-    np.save(file, array)
+    np.save(file := io.BytesIO(), array)
     return file.getvalue()
 
 
