@@ -237,8 +237,7 @@ CROSSING += ["train/kaykit_cc0/restaurant__crate_ham.ply"]
 """Noisy copies of these have skins that cross themselves."""
 
 ACROSS_A_GAP = CROSSING[0]
-"""A face here has its corners in the solid and its middle outside: repair looks only at the corners of faces with edges
-up to `DEFAULT_GAP`, which are at most that over √3 away. A warning tells."""
+"""Of faces with edges up to `DEFAULT_GAP`, repair looks at corners only: middles may lie outside. A warning tells."""
 
 
 @pytest.mark.nightly
