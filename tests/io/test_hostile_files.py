@@ -214,17 +214,6 @@ def test_a_manifest_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
 # --- weights and checkpoints ------------------------------------------------------------------------------------------
 
 
-def checkpoint(folder: Path) -> Path:
-    pytest.importorskip("torch", reason="the extra train is not installed")
-    from rlacd.learn.checkpoint import load_checkpoint, save_checkpoint
-
-    place = folder / "checkpoint.npz"
-    save_checkpoint(place, {"a": np.arange(4)}, {"step": 1})
-    found = load_checkpoint(place)
-    assert found[1]["step"] == 1
-    return place
-
-
 def array_of(count: int) -> bytes:
     """The header of an array of so many numbers."""
     header = io.BytesIO()
@@ -232,25 +221,35 @@ def array_of(count: int) -> bytes:
     return header.getvalue()
 
 
-def restore(place: Path) -> None:
+def npy(array: np.ndarray[Any, Any]) -> bytes:
+    np.save(file := io.BytesIO(), array)
+    return file.getvalue()
+
+
+def restore(place: Path) -> Any:
     from rlacd.learn.checkpoint import load_checkpoint
 
-    load_checkpoint(place)
+    return load_checkpoint(place)
+
+
+TRAPS = {
+    "bomb": (zipfile.ZIP_DEFLATED, "it.npy", lambda: array_of(2**25) + bytes(2**28), "it is compressed"),
+    "shape": (zipfile.ZIP_STORED, "it.npy", lambda: array_of(10**12) + bytes(80), "Unable to allocate"),
+    "objects": (zipfile.ZIP_STORED, "it.npy", lambda: npy(np.array([{}])), "Object arrays cannot be loaded"),
+    "depth": (zipfile.ZIP_STORED, "state.npy", lambda: npy(np.frombuffer(b"[" * 10**6, np.uint8)), "recursion"),
+}
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("trap", ["bomb", "shape", "objects", "depth"])
+@pytest.mark.parametrize("trap", TRAPS)
 @pytest.mark.promise("hostile-weights")
 def test_a_hostile_checkpoint_is_refused(trap: str, tmp_path: Path) -> None:
-    place = checkpoint(tmp_path)
-    if trap == "bomb":
-        with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("a.npy", array_of(2**25) + bytes(2**28))
-    elif trap == "shape":
-        with zipfile.ZipFile(place, "w") as archive:
-            archive.writestr("a.npy", array_of(10**12) + bytes(80))
-    elif trap == "objects":
-        np.savez(place, a=np.array([{}], dtype=object))
-    else:
-        np.savez(place, state=np.frombuffer(b"[" * 10**6, np.uint8))
-    check_refused(TrainingError, "is damaged", restore, place, needs="rlacd.learn.checkpoint")
+    pytest.importorskip("torch", reason="the extra train is not installed")
+    from rlacd.learn.checkpoint import save_checkpoint
+
+    place, (kind, member, content, says) = tmp_path / "checkpoint.npz", TRAPS[trap]
+    save_checkpoint(place, {"net": {"weight": np.arange(4)}}, {"step": 1})
+    assert bounded(restore, place, needs="rlacd.learn.checkpoint")[1]["step"] == 1
+    with zipfile.ZipFile(place, "w" if member == "state.npy" else "a", kind) as archive:
+        archive.writestr(member, content())
+    check_refused(TrainingError, f"is damaged.*{says}", restore, place, needs="rlacd.learn.checkpoint")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import trimesh
@@ -235,7 +237,7 @@ CROSSING += ["train/kaykit_cc0/restaurant__crate_ham.ply"]
 """Noisy copies of these have skins that cross themselves."""
 
 ACROSS_A_GAP = CROSSING[0]
-"""A face here has its corners in the solid and its middle outside, by less than repair looks for: a warning tells."""
+"""Of faces with edges up to `DEFAULT_GAP`, repair looks at corners only: middles may lie outside. A warning tells."""
 
 
 @pytest.mark.nightly
@@ -243,9 +245,12 @@ ACROSS_A_GAP = CROSSING[0]
 @pytest.mark.promise("covered")
 def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name):
     report = rlacd.decompose(noisy_copy(corpus, name)[1] if name in CROSSING else corpus / name, quality="fast").report
+    under = report["hausdorff"]["under"]
     if name == ACROSS_A_GAP:
-        assert any("outside the hulls" in warning for warning in report["warnings"])
+        assert under <= DEFAULT_GAP / math.sqrt(3)
+        assert any(f"up to {under:.4g} outside the hulls" in warning for warning in report["warnings"])
     else:
-        assert report["hausdorff"]["under"] <= 1e-3
+        assert under <= 1e-3
     assert report["concavity"]["max"] <= 0.0501
-    assert max(body["deviation"] for body in report["repair"]) < (0.05 if "class5" in name else 0.03)
+    radii = math.sqrt(2) if "class5" in name else 1  # a wrap ends at balls, a right angle at most from where they touch
+    assert max(body["deviation"] for body in report["repair"]) < radii * DEFAULT_GAP
