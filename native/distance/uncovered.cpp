@@ -114,7 +114,7 @@ class Cover {
   }
 
   void take(const Corners& corner, Range candidates) {
-    const Near* best = nullptr;
+    std::size_t best = candidates.first;
     double least = std::numeric_limits<double>::infinity();  // growth of the hull that takes the whole triangle
     Vec3 needed = {least, least, least};                     // growth for each corner, by whichever hull
     for (std::size_t i = candidates.first; i < candidates.last; ++i) {
@@ -124,16 +124,22 @@ class Cover {
         needed[k] = std::min(needed[k], growth);
         most = std::max(most, growth);
       }
-      if (most < least) least = most, best = &near_[i];
+      if (most < least) least = most, best = i;
       if (least <= kRounding) return;
     }
     if (least <= std::max({needed.x, needed.y, needed.z}) + grain_) {
       for (const Vec3 p : corner)
-        if (beyond(*best, p) > 0) taken_[best->body].push_back(p);
+        if (beyond(near_[best], p) > 0) taken_[near_[best].body].push_back(p);
       return;
     }
     poll_stop();
-    for (const Corners& half : halves(corner)) take(half, candidates);
+    for (const Corners& half : halves(corner)) {
+      const std::size_t planes_before = planes_.size(), first = near_.size();
+      if (!is_held(Box::of(half), candidates))
+        take(half, near_.size() > first ? Range{first, near_.size()} : candidates);
+      near_.resize(first);
+      planes_.resize(planes_before);
+    }
   }
 
   const Mesh& solid_;
