@@ -187,7 +187,7 @@ for style, uri in {
         path.write_bytes(reference(uri.format(outside=folder)))
         return path
 
-    REFUSED[f"a buffer {style}.gltf"] = (_build, "beside the mesh")
+    REFUSED[f"a buffer {style}.gltf"] = (_build, "in its folder or below it")
 
 
 def named_often(folder: Path) -> Path:

@@ -151,7 +151,7 @@ def _baked(name: str, contents: Contents) -> InputMesh:
     mesh = _usable(name, np.concatenate(vertices), np.concatenate(faces), node_of)
     if len(mesh.vertices) == 0:
         why = f" ({'; '.join(contents.warnings)})" if contents.warnings else ""
-        raise EmptyMeshError(f"{name} holds no triangles and no points{why}: there is nothing to decompose")
+        raise EmptyMeshError(f"{name} holds no triangles and no points{why}: check the export")
     mesh = replace(mesh, warnings=(*mesh.warnings, *contents.warnings), nodes=tuple(nodes))
     return replace(mesh, up=contents.up, metres=contents.metres, asset=contents.asset)
 
