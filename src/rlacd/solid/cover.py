@@ -16,7 +16,7 @@ from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import LATE, to_manifold
 from rlacd.solid.solid import Solid, surface_of
-from rlacd.solid.topology import compacted, point_bodies
+from rlacd.solid.topology import compacted, marked, point_bodies
 
 MOST_HULLS = 2000
 """If there are more bodies, neighbours in the columns of a grid share a hull."""
@@ -66,9 +66,10 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
 
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
     """The points [N, 3] of each body, or of several bodies near each other."""
-    used = np.unique(faces)
-    _, body = np.unique(point_bodies(vertices, faces)[used], return_inverse=True)
-    count = int(body.max()) + 1
+    used = np.flatnonzero(marked(faces, len(vertices)))
+    label = point_bodies(vertices, faces)[used]
+    is_there = marked(label, len(vertices))
+    count, body = np.count_nonzero(is_there), (np.cumsum(is_there) - 1)[label]
     order = np.argsort(body, kind="stable")
     vertices, first = vertices[used], np.searchsorted(body[order], np.arange(count))
     if count > MOST_HULLS:

@@ -35,7 +35,7 @@ def nondegenerate(faces: Int64Array) -> BoolArray:
     return result
 
 
-def marked(items: Int64Array, count: int) -> BoolArray:
+def marked(items: NDArray[np.integer], count: int) -> BoolArray:
     """Return ``[count]`` which numbers are among the items."""
     found = np.zeros(count, dtype=bool)
     found[items] = True
