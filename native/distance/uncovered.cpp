@@ -146,7 +146,8 @@ class Cover {
   const Bvh& bvh_;
   const std::vector<Body>& bodies_;
   const double reach_, grain_;
-  // First all bodies with all their planes, then those near each node on the way to the one that is looked at.
+  // First all bodies with all their planes, then those near each node, and each half of a triangle, on the way to what
+  // is looked at.
   std::vector<Near> near_;
   std::vector<std::int32_t> planes_;
   std::vector<std::vector<Vec3>> taken_;

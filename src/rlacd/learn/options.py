@@ -76,7 +76,7 @@ class TrainOptions:
     threads
         Threads of the training process.
     device
-        cpu, cuda, or auto: a GPU for i2p-mae, if there is one; sweep learns as fast on the CPU, and always the same.
+        cpu, cuda, or auto: a GPU for i2p-mae, if there is one; sweep learns as fast on the CPU, to the same weights.
     log_every
         Cuts between points of the curves.
     validate_every

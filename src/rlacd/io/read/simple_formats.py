@@ -55,7 +55,7 @@ def _text_stl(path: Path, text: bytes) -> tuple[FloatArray, Int64Array]:
     points = numbers_in(b" ".join(b" ".join(corner) for corner in _VERTEX.findall(text))).reshape(-1, 3)
     *loops, rest = lower.split(b"endloop")
     counts = np.array([loop.rpartition(b"loop")[2].count(b"vertex") for loop in loops], dtype=np.int64)
-    if not loops:
+    if not loops:  # the keyword is missing: triangles
         counts = np.full(len(points) // 3, 3)
     if counts.sum() != len(points) or counts.min(initial=3) < 3 or b"endsolid" not in rest:
         raise ValueError("a facet has fewer than three vertices, or the last endsolid is missing")
