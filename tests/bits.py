@@ -23,6 +23,7 @@ Shape = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]
 BOX = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4]]
 BOX += [[2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]]
 """Triangles of a box whose corner i is at its upper end along x, y, z where bit 0, 1, 2 of i is set."""
+POLICIES = ("learned", "rl-acd", "greedy-max-excess", "navacd", "random-10")
 TURN = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
 """A rotation of rational entries."""
 
@@ -79,13 +80,32 @@ def hills(side: int = 9, seed: int = 5) -> Shape:
     return turned(np.array(top + [[x, y, 0] for x, y, _ in top]) / side), np.array(faces)
 
 
+def torn() -> Shape:
+    """The torus with holes."""
+    vertices, faces = ring()
+    return vertices, np.array([face for i, face in enumerate(faces) if i % 9])
+
+
+FAST: dict[str, Any] = {"quality": "fast"}
 CASES: dict[str, tuple[Callable[[], Shape], dict[str, Any]]] = {
     "chair": (chair, {}),
-    "chair, overlapping": (chair, {"quality": "fast", "overlap": 0.01}),
+    "chair, overlapping": (chair, {**FAST, "overlap": 0.01}),
+    "chair, primitives": (chair, {**FAST, "primitives": True}),
+    "chair, not merged": (chair, {**FAST, "merge": False}),
+    "chair, few": (chair, {**FAST, "max_hulls": 5}),
     "ring": (ring, {}),
-    "ring, passages": (ring, {"quality": "fast", "criterion": rlacd.NavigableSpace(radius=0.1)}),
-    "hills": (hills, {"quality": "fast"}),
-    "hills, volume": (hills, {"quality": "fast", "criterion": "volume"}),
+    "ring, best": (ring, {"quality": "best", "search_steps": 20}),
+    "ring, passages": (ring, {**FAST, "criterion": rlacd.NavigableSpace(radius=0.1)}),
+    "ring, kept open": (ring, {**FAST, "keep_open": 0.9}),
+    "ring, round": (ring, {**FAST, "primitives": ["sphere", "capsule", "cylinder"], "threshold": 0.3}),
+    "ring, limited": (ring, {**FAST, "max_vertices": 12}),
+    "hills": (hills, FAST),
+    "hills, volume": (hills, {**FAST, "criterion": "volume"}),
+    "hills, distance in full": (hills, {**FAST, "criterion": "distance", "detail": "full"}),
+    "torn": (torn, FAST),
+    "torn, thin": (torn, {**FAST, "open": "thin"}),
+    "torn, solid": (torn, {**FAST, "open": "solid", "resolution": 60, "gap": 0.03}),
+    **{f"hills, {policy}": (hills, {**FAST, "policy": policy}) for policy in POLICIES},
 }
 
 

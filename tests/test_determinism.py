@@ -7,14 +7,16 @@ import platform
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import pytest
 
-from rlacd import decompose
+from rlacd import _native, decompose
 from rlacd.batch import Batch, JobSpec
+from rlacd.policies.network import Network
 from rlacd.pool.local import InProcessPool
 from tests import bits
 from tests.batch.test_batch import TIMES
@@ -93,6 +95,33 @@ def test_an_older_processor_makes_the_same_hulls() -> None:
     assert runs[1].returncode == 0, runs[1].stderr
     assert runs[0].stdout == runs[1].stdout
     assert len(runs[0].stdout.splitlines()) == len(bits.CASES)
+
+
+def test_elementary_functions_are_those_of_numpy() -> None:
+    """Up to rounding: they are our own so that they are the same bits everywhere."""
+    draw = np.random.default_rng(0)
+    turn, long = draw.uniform(-np.pi, np.pi, 10_000), 10 ** draw.uniform(-200, 200, 10_000)
+    sines, cosines = long * np.sin(turn), long * np.cos(turn)
+    assert np.abs(_native.angles(sines, cosines) - np.arctan2(sines, cosines)).max() < 1e-14
+    quarters = _native.angles(np.array([0.0, 1, 0, -1, 0]), np.array([1.0, 0, -1, 0, 0]))
+    assert quarters == pytest.approx([0, np.pi / 2, np.pi, -np.pi / 2, 0], rel=1e-15)
+    assert _native.logarithms(long) == pytest.approx(np.log(long), rel=1e-15)
+    assert _native.cube_roots(long) == pytest.approx(np.cbrt(long), rel=1e-15)
+    few = 10 ** draw.uniform(-12, 3, 10_000)
+    assert _native.powers(few, 1.3) == pytest.approx(few**1.3, rel=1e-13)
+    assert _native.powers(np.array([0.0, 1.0]), 1.3).tolist() == [0, 1]
+
+
+def test_networks_are_evaluated_as_numpy_would() -> None:
+    draw = np.random.default_rng(0)
+    widths = (38, 64, 32, 2)
+    layers = [(draw.normal(size=(o, i)), draw.normal(size=o)) for i, o in pairwise(widths)]
+    features = draw.normal(size=(5, 40, 38)).astype(np.float32)
+    expected = features.astype(np.float64)
+    for weight, bias in layers[:-1]:
+        expected = np.maximum(expected @ weight.T + bias, 0)
+    expected = expected @ layers[-1][0].T + layers[-1][1]
+    assert Network(layers, {"threshold": 0.05})(features) == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
 def test_axes_are_eigenvectors_of_the_moments() -> None:

@@ -125,6 +125,8 @@ void bind_concavity(nb::module_& m) {
         "Whether the concavity of a closed part with this hull is certainly <= threshold.\n\n"
         "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part. "
         "`tree` is that of the part's surface; without it, one is made and forgotten.");
+  m.def("volume_radius", released(volume_radius), "part_volume"_a, "hull_volume"_a,
+        "R_v: the radius of a ball with the volume between a part and its hull.");
   m.def("concavity",
         released([](const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
                     double floor, const TreeCache* tree) {

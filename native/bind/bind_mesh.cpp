@@ -188,6 +188,11 @@ void bind_mesh(nb::module_& m) {
         }),
         "vertices"_a, "faces"_a,
         "Principal axes [3, 3] of a surface, one per row, longest first, the largest entry of each positive.");
+  m.def("principal_axes_of_points", released([](const std::vector<Vec3>& points) {
+          const std::array<Vec3, 3> axes = principal_axes(points);
+          return std::vector<Vec3>(axes.begin(), axes.end());
+        }),
+        "points"_a, "Principal axes [3, 3] of points [N, 3], likewise.");
   m.def("mesh_mass", released([](const AnyMesh& mesh) {
           const Mass mass = mesh_mass(mesh);
           return std::tuple(mass.volume, std::vector{mass.centre.x, mass.centre.y, mass.centre.z},

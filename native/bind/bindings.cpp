@@ -7,6 +7,7 @@ void bind_distance(nanobind::module_& m);
 void bind_hull(nanobind::module_& m);
 void bind_mesh(nanobind::module_& m);
 void bind_navigable(nanobind::module_& m);
+void bind_numbers(nanobind::module_& m);
 void bind_stop(nanobind::module_& m);
 }  // namespace rlacd
 
@@ -18,6 +19,6 @@ NB_MODULE(_native, m) {
   nanobind::set_leak_warnings(false);
 #endif
   for (const auto bind : {rlacd::bind_cut, rlacd::bind_distance, rlacd::bind_hull, rlacd::bind_mesh,
-                          rlacd::bind_navigable, rlacd::bind_stop})
+                          rlacd::bind_navigable, rlacd::bind_numbers, rlacd::bind_stop})
     bind(m);
 }

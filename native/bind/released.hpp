@@ -168,6 +168,7 @@ struct Tag {};
 // The scalars of a row that becomes a row of an array; of other types nothing.
 bool scalar(Tag<char>);
 double scalar(Tag<double>);
+float scalar(Tag<float>);
 std::int32_t scalar(Tag<std::int32_t>);
 std::int64_t scalar(Tag<std::int64_t>);
 double scalar(Tag<Vec3>);

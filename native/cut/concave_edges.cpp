@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/elementary.hpp"
 #include "base/mesh_measures.hpp"
 #include "base/stop.hpp"
 #include "mesh/edges.hpp"
@@ -55,7 +56,7 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
     const double turn = dot(cross(normals[g], normals[f]), along);
     if (!(turn > 0)) return;
     const double length = norm(along);
-    const double angle = std::atan2(turn, length * dot(normals[f], normals[g]));
+    const double angle = angle_of(turn, length * dot(normals[f], normals[g]));
     if (angle > kReflex && angle < kPi - kFold && std::min(doubled_area[f], doubled_area[g]) > kThinnestFace * length)
       found.push_back({{low, high}, {f, g}, {normals[f], normals[g]}, angle});
   };

@@ -6,6 +6,7 @@
 #include <queue>
 #include <stdexcept>
 
+#include "base/elementary.hpp"
 #include "base/invariant.hpp"
 #include "base/parallel.hpp"
 #include "cut/sections.hpp"
@@ -245,7 +246,7 @@ class Search {
   double cost(double below, double above) const {
     if (wanted_.exponent == 1) return below + above;
     if (wanted_.exponent == kInfinity) return std::max(below, above);
-    return std::pow(below, wanted_.exponent) + std::pow(above, wanted_.exponent);
+    return power(below, wanted_.exponent) + power(above, wanted_.exponent);
   }
 
   double bound(const Direction& direction, std::size_t j) const {

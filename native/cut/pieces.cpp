@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/elementary.hpp"
 #include "base/mesh_measures.hpp"
 #include "base/stop.hpp"
 #include "cut/caps.hpp"
@@ -34,7 +35,7 @@ bool sort_around(const Mesh& mesh, std::int32_t low, Run* begin, Run* end) {
     return mesh.vertices[mesh.faces[run.halfedge / 3][(run.halfedge + 2) % 3]] - origin;
   };
   const Vec3 u = normalized(cross(along, apex(*begin))), v = cross(along, u);
-  const auto angle = [&](const Run& run) { return std::atan2(dot(v, apex(run)), dot(u, apex(run))); };
+  const auto angle = [&](const Run& run) { return angle_of(dot(v, apex(run)), dot(u, apex(run))); };
   std::sort(begin, end, [&](const Run& a, const Run& b) { return angle(a) < angle(b); });
   for (const Run* r = begin; r != end; ++r)
     if (ascends(mesh, low, *r) == ascends(mesh, low, r + 1 == end ? *begin : r[1])) return false;

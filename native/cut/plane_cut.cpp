@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "base/elementary.hpp"
 #include "base/invariant.hpp"
 #include "base/stop.hpp"
 
@@ -128,7 +129,7 @@ class Cutter {
   double angle_inside(const Edge& before, const Edge& edge, int up) const {
     const auto at = on_plane({points_[before[0]], points_[edge[0]], points_[edge[1]]}, up > 0 ? normal_ : -normal_);
     const double bx = at[0][0] - at[1][0], by = at[0][1] - at[1][1], ex = at[2][0] - at[1][0], ey = at[2][1] - at[1][1];
-    const double angle = std::atan2(ex * by - ey * bx, ex * bx + ey * by);
+    const double angle = angle_of(ex * by - ey * bx, ex * bx + ey * by);
     return angle > 0 ? angle : angle + 2 * kPi;
   }
 

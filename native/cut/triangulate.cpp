@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/elementary.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -276,7 +277,7 @@ std::vector<Loop> untangled(const std::vector<std::vector<PlanePoint>>& loops, c
       const auto angle = [&](std::int32_t p) {
         const PlanePoint to = points[after[p]];
         const double bx = back[0] - at[0], by = back[1] - at[1], ex = to[0] - at[0], ey = to[1] - at[1];
-        const double turn = std::atan2(ex * by - ey * bx, ex * bx + ey * by);
+        const double turn = angle_of(ex * by - ey * bx, ex * bx + ey * by);
         return turn > 0 ? turn : turn + 2 * kPi;
       };
       const auto best = std::min_element(left.begin(), left.end(),

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "base/elementary.hpp"
 #include "distance/surface_field.hpp"
 #include "hull/convex_planes.hpp"
 
@@ -61,20 +62,6 @@ class DepthField {
 void check(const Mesh& part, const Mesh& hull) {
   if (part.faces.empty()) throw std::invalid_argument("the part has no faces");
   if (hull.faces.empty()) throw std::invalid_argument("the hull has no faces");
-}
-
-// Newton's method: std::cbrt has other last bits in every C library, and the search compares these numbers.
-double cube_root(double x) {
-  if (!(x > 0) || std::isinf(x)) return x;
-  int exponent = 0;
-  double mantissa = std::frexp(x, &exponent);
-  while (exponent % 3 != 0) {
-    mantissa *= 2;
-    --exponent;
-  }
-  double root = 1;
-  for (int i = 0; i < 8; ++i) root -= (root * root * root - mantissa) / (3 * root * root);
-  return std::ldexp(root, exponent / 3);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <limits>
 #include <optional>
 
+#include "base/elementary.hpp"
+
 namespace rlacd {
 namespace {
 
@@ -10,7 +12,7 @@ namespace {
 double solid_angle(const TriangleFrame& t, Vec3 p) {
   const Vec3 a = t.a - p, b = t.a + t.ab - p, c = t.a + t.ac - p;
   const double la = norm(a), lb = norm(b), lc = norm(c);
-  return 2 * std::atan2(dot(a, cross(t.ab, t.ac)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  return 2 * angle_of(dot(a, cross(t.ab, t.ac)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
 }
 
 double radius_around(Vec3 centre, const Box& box) {

@@ -201,7 +201,7 @@ Above touching_plane(Vec3 a, Vec3 b, Vec3 w, const Mesh& inner) {
     const double px = dot(across, p - a), py = std::max(0.0, -dot(normal, p - a));
     if (px * y - py * x > 0 || (py == 0 && px > 0)) x = px, y = py;
   }
-  const double length = std::hypot(x, y);
+  const double length = std::sqrt(x * x + y * y);
   const Vec3 turned = (x / length) * normal + (y / length) * across;
   return {turned, dot(turned, a)};
 }

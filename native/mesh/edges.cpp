@@ -6,6 +6,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "base/elementary.hpp"
 #include "base/invariant.hpp"
 #include "base/stop.hpp"
 
@@ -80,7 +81,7 @@ void measure_angles(const Mesh& mesh, std::int32_t low, std::int32_t high, std::
   for (Spoke& spoke : ring) {
     const Triangle& face = mesh.faces[spoke.halfedge / 3];
     const Vec3 across = mesh.vertices[face[(spoke.halfedge + 2) % 3]] - tail;
-    spoke.angle = std::atan2(dot(across, quarter), dot(across, zero));
+    spoke.angle = angle_of(dot(across, quarter), dot(across, zero));
   }
 }
 

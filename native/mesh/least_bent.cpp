@@ -1,5 +1,6 @@
 #include "mesh/least_bent.hpp"
 
+#include "base/elementary.hpp"
 #include "base/stop.hpp"
 
 namespace rlacd {
@@ -11,7 +12,10 @@ constexpr double kArea = 0.1;
 constexpr double kTaken = 1e3;
 
 // Between unit vectors; a right angle for one that is zero.
-double angle(Vec3 a, Vec3 b) { return std::acos(std::min(std::max(dot(a, b), -1.0), 1.0)); }
+double angle(Vec3 a, Vec3 b) {
+  const double cosine = std::min(std::max(dot(a, b), -1.0), 1.0);
+  return angle_of(std::sqrt(1 - cosine * cosine), cosine);
+}
 
 }  // namespace
 

@@ -30,11 +30,6 @@ VOLUME_WEIGHT = 0.3
 """The weight of ``R_v``, as in the original definition."""
 
 
-def volume_radius(volume: float, hull_volume: float) -> float:
-    """Return ``R_v``, the radius of a ball with the volume between a part and its hull."""
-    return math.pow(max(0.0, 3 * (hull_volume - volume) / (4 * math.pi)), 1 / 3)
-
-
 @dataclass(frozen=True)
 class ConcavityValue:
     """A measured concavity or distance; every length is a certified interval ``(lower, upper)``.
@@ -83,11 +78,12 @@ class DistanceScreen(Screen):
 
     def least_error(self, volume: float, hull_volume: float) -> float:
         """``0.3 R_v``, a lower bound of the concavity."""
-        return self.weight * volume_radius(volume, hull_volume)
+        return self.weight * _native.volume_radius(volume, hull_volume)
 
     def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
         """Whether ``0.3 R_v`` alone exceeds the threshold."""
-        ball = 4 / 3 * math.pi * (self.threshold / self.weight) ** 3 if self.weight else math.inf
+        radius = self.threshold / self.weight if self.weight else math.inf
+        ball = 4 / 3 * math.pi * radius * radius * radius
         return np.asarray(hull_volume - volume > ball)
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:

@@ -15,7 +15,6 @@ surface.
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -32,7 +31,7 @@ from rlacd.errors import OptionError
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray, IntArray, dots, heights
+from rlacd.solid.arrays import FloatArray, IntArray, dots, heights, length
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.hull import Hull
@@ -318,9 +317,8 @@ def _planes_in_frame(planes: Sequence[tuple[Point, float]], frame: Frame) -> Flo
     """Rows of unit normal and offset [P, 4]."""
     rows = np.empty((len(planes), 4))
     for row, (normal, offset) in zip(rows, planes, strict=True):
-        length = math.hypot(*normal)
-        row[:3] = np.array(normal) / length
-        row[3] = (offset / length - dots(row[:3], frame.center)) * frame.scale
+        row[:3] = np.array(normal) / (long := length(np.array(normal, dtype=np.float64)))
+        row[3] = (offset / long - dots(row[:3], frame.center)) * frame.scale
     return rows
 
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, heights, length
 from rlacd.solid.component import LOST_VOLUME, Component, Part
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, Hull, keeps
@@ -29,6 +30,9 @@ SAME_DIRECTION = 0.9998
 
 ROUND_AXES = DIRECTIONS // 3
 """Axes about which capsules and cylinders are fitted: those with the least volume by a lower bound."""
+
+SINGULAR = 1e-12
+"""Share of a squared length at which a point lies in the affine hull of others."""
 
 RADII = np.linspace(1.0, 1.4, 21)
 """Radii of capsules that are tried, over the least one: a wider capsule may be shorter."""
@@ -157,14 +161,28 @@ def _least_support(points: FloatArray) -> tuple[FloatArray, tuple[FloatArray, fl
         for rest in itertools.combinations(range(1, len(points)), size - 1):
             subset = points[[0, *rest]]
             offsets = subset[1:] - subset[0]
-            # In the subset's affine hull, equally far from all of it.
-            towards = np.linalg.lstsq(2 * offsets, (offsets**2).sum(axis=1), rcond=None)[0] if size > 1 else 0.0
-            centre = subset[0] + towards
+            products = (offsets[:, None] * offsets).sum(axis=2)
+            shares = _solved(products, products.diagonal() / 2)
+            if shares is None:
+                continue  # a smaller subset has the same affine hull
+            centre = subset[0] + (np.array(shares)[:, None] * offsets).sum(axis=0)
             distances = np.linalg.norm(points - centre, axis=1)
             radius = float(distances[[0, *rest]].max())
             if distances.max() <= radius * (1 + 1e-10):
                 balls.append((subset, (centre, float(distances.max()))))
     return min(balls, key=lambda ball: ball[1][1])
+
+
+def _solved(matrix: FloatArray, right: FloatArray) -> list[float] | None:
+    """Solve positive definite equations [N, N], [N] by Gauss's elimination; None if singular up to rounding."""
+    rows = [[*row, value] for row, value in zip(matrix.tolist(), right.tolist(), strict=True)]
+    for k, pivot in enumerate(rows):
+        if not pivot[k] > SINGULAR * float(matrix[k, k]):
+            return None
+        pivot[:] = [value / pivot[k] for value in pivot]
+        for row in rows[:k] + rows[k + 1 :]:
+            row[:] = [value - row[k] * other for value, other in zip(row, pivot, strict=True)]
+    return [row[-1] for row in rows]
 
 
 class _Shadow:
@@ -179,11 +197,11 @@ class _Shadow:
 
     def __init__(self, points: FloatArray, axes: FloatArray) -> None:
         self._axes = axes
-        self._points = points @ axes
+        self._points = heights(points, np.ascontiguousarray(axes.T))
         seen = np.ascontiguousarray(self._points[:, :2])
         self.outline = outline(seen)
         x, y = (self.outline - seen[0]).T
-        self.area = float(np.roll(y, -1) @ x - np.roll(x, -1) @ y) / 2
+        self.area = float((np.roll(y, -1) * x - np.roll(x, -1) * y).sum()) / 2
         along = self._points[:, 2]
         self._middle = float(along.min() + along.max()) / 2
         self.length = float(np.ptp(along))
@@ -199,19 +217,20 @@ class _Shadow:
         sides = np.roll(self.outline, -1, axis=0) - self.outline
         sides /= np.linalg.norm(sides, axis=1)[:, None]
         across = np.stack([-sides[:, 1], sides[:, 0]], axis=1)
-        extents = [self.outline @ directions.T for directions in (sides, across)]
+        u, v = self.outline.T[:, :, None]
+        extents = [u * directions[:, 0] + v * directions[:, 1] for directions in (sides, across)]
         widths = [np.ptp(extent, axis=0) for extent in extents]
         best = int((widths[0] * widths[1]).argmin())
         base = np.eye(3)
         base[:2, 0], base[:2, 1] = sides[best], across[best]
         middle = [float(extent[:, best].min() + extent[:, best].max()) / 2 for extent in extents]
-        axes = self._axes @ base
+        axes = heights(self._axes, np.ascontiguousarray(base.T))
         size = float(widths[0][best]), float(widths[1][best]), self.length
-        return Primitive("box", axes @ [*middle, self._middle], axes, size)
+        return Primitive("box", heights(axes, np.array([*middle, self._middle])), axes, size)
 
     def cylinder(self, centre: FloatArray, radius: float) -> Primitive:
         """The smallest cylinder along the axis, given the smallest circle around the outline."""
-        place = self._axes @ [*centre, self._middle]
+        place = heights(self._axes, np.array([*centre, self._middle]))
         return Primitive("cylinder", place, self._axes, (radius, self.length))
 
     def capsule(self, centre: FloatArray, radius: float) -> Primitive:
@@ -221,7 +240,7 @@ class _Shadow:
         def of_radius(wider: float) -> Primitive:
             reach = np.sqrt(np.maximum(wider**2 - away, 0.0))  # of the ends' spheres beyond their centres
             first, last = float((self._points[:, 2] + reach).min()), float((self._points[:, 2] - reach).max())
-            place = self._axes @ [*centre, (first + last) / 2]
+            place = heights(self._axes, np.array([*centre, (first + last) / 2]))
             return Primitive("capsule", place, self._axes, (wider, max(last - first, 0.0)))
 
         return _least(map(of_radius, (radius * RADII).tolist()))
@@ -234,7 +253,7 @@ def outline(points: FloatArray) -> FloatArray:
         return points[:0]
     corners = prism.vertices[prism.vertices[:, 2] == 0, :2]
     x, y = (corners - corners.mean(axis=0)).T
-    return corners[np.argsort(np.arctan2(y, x))]
+    return corners[np.argsort(_native.angles(np.ascontiguousarray(y), np.ascontiguousarray(x)))]
 
 
 def _candidate_axes(hull: Hull) -> FloatArray:
@@ -242,8 +261,7 @@ def _candidate_axes(hull: Hull) -> FloatArray:
     corners = hull.vertices[hull.faces]
     edges = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 3)
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    centred = hull.vertices - hull.vertices.mean(axis=0)
-    principal = np.linalg.eigh(centred.T @ centred)[1].T
+    principal = _native.principal_axes_of_points(hull.vertices)[::-1]  # the shortest first
     groups = (
         _distinct(crosses, DIRECTIONS, together=True),
         _distinct(edges, DIRECTIONS // 2),
@@ -276,8 +294,8 @@ def _new_directions(vectors: Iterator[FloatArray]) -> Iterator[FloatArray]:
     """Unit vectors, without those nearly parallel to an earlier one."""
     seen = np.zeros((0, 3))
     for vector in vectors:
-        unit = vector / np.linalg.norm(vector)
-        if not (np.abs(seen @ unit) > SAME_DIRECTION).any():
+        unit = vector / length(vector)
+        if not (np.abs(heights(seen, unit)) > SAME_DIRECTION).any():
             seen = np.vstack([seen, unit])
             yield unit
 
@@ -287,7 +305,7 @@ def _axes_along(axis: FloatArray) -> FloatArray:
     across = np.zeros(3)
     across[int(np.abs(axis).argmin())] = 1.0
     x = np.cross(across, axis)
-    x /= np.linalg.norm(x)
+    x /= length(x)
     return np.stack([x, np.cross(axis, x), axis], axis=1)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS, Candidates, all_planes, axis_and_principal
-from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, heights
 from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import SLIVER_RADIUS
@@ -139,7 +139,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
         candidates.directions,
         candidates.offsets,
         exponent,
-        ROUNDING * (most if math.isinf(exponent) else most**exponent),
+        ROUNDING * (most if math.isinf(exponent) else float(_native.powers(np.array([most]), exponent)[0])),
         LEAST_SIDE,
         SLIVERS,
         threads,
@@ -155,7 +155,7 @@ def paper_planes(component: Component) -> Candidates:
     lower, upper = component.box
     directions = axis_and_principal(component).directions
     steps = (np.arange(OFFSETS_PER_AXIS) - OFFSETS_PER_AXIS // 2) / OFFSETS_PER_AXIS * float((upper - lower).max())
-    return Candidates(directions, (directions @ ((lower + upper) / 2))[:, None] + steps)
+    return Candidates(directions, heights(directions, (lower + upper) / 2)[:, None] + steps)
 
 
 def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
@@ -165,8 +165,8 @@ def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
     distance from that end: no sweep is needed. This is slightly stricter than `Sweep.valid`, which compares a side with
     its own extent. If no plane is valid, as in a thin sheet, the limit is lowered to a hundredth.
     """
-    heights = component.hull.vertices @ candidates.directions.T
-    lower, upper = heights.min(axis=0), heights.max(axis=0)
+    along = heights(component.hull.vertices, candidates.directions)
+    lower, upper = along.min(axis=0), along.max(axis=0)
     extent = float((upper - lower).max())
     thinner = np.minimum(candidates.offsets - lower[:, None], upper[:, None] - candidates.offsets).ravel()
     for sliver in SLIVERS:

@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from rlacd import _native
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, axis_and_principal, concave_edge_planes
 from rlacd.planes.sweep import Sweep, SweepCache, least_excess, valid_planes
 from rlacd.solid.arrays import FloatArray
@@ -29,8 +30,7 @@ def hull_sum(s: Sweep) -> FloatArray:
 def excess_norm(s: Sweep) -> FloatArray:
     """p-th power of the p-norm of the two sides' |CH(m_i)| - |m_i|, p = `EXPONENT`: between the sum and the maximum."""
     below, above = np.maximum(s.hull_below - s.solid_below, 0), np.maximum(s.hull_above - s.solid_above, 0)
-    norm: FloatArray = below**EXPONENT + above**EXPONENT
-    return norm
+    return _native.powers(below, EXPONENT) + _native.powers(above, EXPONENT)
 
 
 SCORES: Mapping[str, float] = MappingProxyType({"hull-sum": 1.0, "max-excess": math.inf, "excess-norm": EXPONENT})

@@ -6,7 +6,6 @@ greedy ends in after each of several planes (`learned.md` beside the weights).
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from importlib.resources import as_file, files
 
@@ -60,7 +59,8 @@ class Learned:
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
         excess = max(component.hull.volume - component.volume, 0.0)
-        if math.cbrt(excess) < SIMPLE * (self._scale or TYPICAL_LENGTH):
+        wide = SIMPLE * (self._scale or TYPICAL_LENGTH)
+        if excess < wide * wide * wide:
             return self._greedy.choose(component, threads)
         scored = self._sweeps.of(component, threads)
         valid = next(filter(np.any, map(scored.valid, SLIVERS)), None)

@@ -1,4 +1,4 @@
-"""Networks as files: weights of linear layers in an uncompressed .npz without pickle, evaluated by numpy.
+"""Networks as files: weights of linear layers in an uncompressed .npz without pickle, evaluated by a kernel.
 
 The paper's Q network chooses the best of the 150 planes, or a plane by the paper's deployment rule (4.2).
 """
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rlacd import _native
 from rlacd.errors import WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.planes.candidates import EDGES_PER_COMPONENT
@@ -52,16 +53,16 @@ class Network:
         self, layers: Sequence[tuple[NDArray[np.generic], NDArray[np.generic]]], about: Mapping[str, Any]
     ) -> None:
         self.layers = [(w.astype(np.float32), b.astype(np.float32)) for w, b in layers]
+        self._by_input = [np.ascontiguousarray(weight.T) for weight, _ in self.layers]
+        self._biases = [bias for _, bias in self.layers]
         self.about = about
         self.threshold = float(about["threshold"])
 
     def __call__(self, features: Float32Array) -> Float32Array:
         """Outputs [..., outputs] of features [..., inputs]."""
-        for weight, bias in self.layers[:-1]:
-            features = np.maximum(features @ weight.T + bias, 0)
-        weight, bias = self.layers[-1]
-        found: Float32Array = features @ weight.T + bias
-        return found
+        *rows, inputs = features.shape
+        flat = np.ascontiguousarray(features.reshape(-1, inputs))
+        return _native.network_outputs(flat, self._by_input, self._biases).reshape(*rows, len(self._biases[-1]))
 
     def to_bytes(self) -> bytes:
         """Make the content of a file."""

@@ -42,7 +42,7 @@ def plane_features(
     longest, excess = float(box.max()), max(hull - volume, TINY)
     below, above = np.maximum(s.hull_below - s.solid_below, 0), np.maximum(s.hull_above - s.solid_above, 0)
     small, large = np.minimum(below, above), np.maximum(below, above)
-    cost = excess_norm(s) / excess**EXPONENT
+    cost = excess_norm(s) / _native.powers(np.array([excess]), EXPONENT)
     saved = (s.hull_below + s.hull_above - volume) / excess
     lowest = cost[valid].min() if valid.any() else 0.0
     area, round_ = s.section_area / longest**2, 4 * np.pi * s.section_area / np.maximum(s.section_perimeter, TINY) ** 2
@@ -51,21 +51,22 @@ def plane_features(
     planes, along = np.arange(len(cost)), 6 * OFFSETS_PER_AXIS
     axes = np.where(planes < along, planes // OFFSETS_PER_AXIS, planes)
     columns = [
-        *(small / excess, large / excess, saved, cost, np.log(cost + 1e-3) - np.log(lowest + 1e-3)),
+        *(small / excess, large / excess, saved, cost, _native.logarithms((cost + 1e-3) / (lowest + 1e-3))),
         _rank(np.where(valid, cost, np.inf)),
         _rank(np.where(valid, saved, np.inf)),
         _rank(np.where(valid, large, np.inf)),
         *(np.minimum(s.solid_below, s.solid_above) / max(volume, TINY), np.minimum(s.hull_below, s.hull_above) / hull),
         *(area, s.section_perimeter / longest, round_, fill.min(axis=0), fill.max(axis=0)),
         np.minimum(s.thickness_below, s.thickness_above) / np.maximum(s.thickness_below + s.thickness_above, TINY),
-        np.log(np.cbrt(small) / scale + 0.01),
-        np.log(np.cbrt(large) / scale + 0.01),
+        _native.logarithms(_native.cube_roots(small) / scale + 0.01),
+        _native.logarithms(_native.cube_roots(large) / scale + 0.01),
         *_neighbours(cost, axes),
         *_neighbours(area, axes),
         *_neighbours(np.minimum(fill[0], fill[1]), axes),
     ]
+    wide, long = _native.logarithms(np.array([_native.cube_roots(np.array([excess]))[0], longest]) / scale)
     own = [
-        *(np.log(np.cbrt(excess) / scale), volume / hull, *(np.sort(box)[:2] / longest), np.log(longest / scale)),
+        *(wide, volume / hull, *(np.sort(box)[:2] / longest), long),
         *(float(length is None), valid.mean(), lowest),
     ]
     return np.column_stack([*columns, np.tile(own, (len(cost), 1))]).clip(-GREATEST_FEATURE, GREATEST_FEATURE)

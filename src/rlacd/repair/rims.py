@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import mapbox_earcut
 import numpy as np
 
-from rlacd._native import components, least_bent, long_normals, poll_stop
+from rlacd._native import angles, components, least_bent, long_normals, poll_stop, principal_axes_of_points
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
-from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots, heights, length
 from rlacd.solid.topology import marked, nondegenerate
 
 _NEXT = np.array([1, 2, 0])
@@ -208,10 +208,10 @@ def _followers(
 
 def _turns(came_from: FloatArray, here: FloatArray, goes_to: FloatArray, axis: FloatArray) -> FloatArray:
     """Angles [N] around an axis, from 0 to 2 pi, from where edges came to where others go."""
-    axis = axis / max(float(np.linalg.norm(axis)), np.finfo(float).tiny)
+    axis = axis / max(length(axis), np.finfo(float).tiny)
     came, goes = came_from - here, goes_to - here
-    flat = came - (came @ axis)[:, None] * axis
-    return np.asarray(np.arctan2(dots(np.cross(axis, flat), goes), dots(flat, goes)) % (2 * np.pi))
+    flat = came - heights(came, axis)[:, None] * axis
+    return angles(dots(np.cross(axis, flat), goes), dots(flat, goes)) % (2 * np.pi)
 
 
 def _cycles(follower: Int64Array) -> list[Int64Array]:
@@ -289,9 +289,7 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) 
         return np.array([[0, 2, 1]])
     if len(points) <= _EXACT_LOOP:
         return least_bent(points, beside, taken)[:, ::-1].astype(np.int64)
-    middle = points.mean(axis=0)
-    _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
-    flat = np.ascontiguousarray((points - middle) @ axes[:2].T)
+    flat = heights(points - points.mean(axis=0), principal_axes_of_points(points)[:2])
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
     if len(ears) != len(points) - 2:  # the loop's projection crosses itself: no plane fits
         return np.array([(0, i + 1, i) for i in range(1, len(points) - 1)], dtype=np.int64)
@@ -315,6 +313,6 @@ def smooth_share(soup: Soup, rims: Rims, caps: Int64Array, owner: Int64Array) ->
     at = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
     cosine = dots(rims.normals[np.concatenate(rims.beside)], normal[order[at] // 3])
     smooth = (cosine > _SMOOTH_RIM) & (key[order][at] == wanted)
-    length = np.linalg.norm(soup.vertices[head] - soup.vertices[tail], axis=1)
-    share: FloatArray = np.bincount(loop_of, length * smooth) / np.bincount(loop_of, length)
+    lengths = np.linalg.norm(soup.vertices[head] - soup.vertices[tail], axis=1)
+    share: FloatArray = np.bincount(loop_of, lengths * smooth) / np.bincount(loop_of, lengths)
     return share

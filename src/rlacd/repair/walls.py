@@ -11,13 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rlacd._native import components, poll_stop
+from rlacd._native import angles, components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, angles, dots
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import Shape

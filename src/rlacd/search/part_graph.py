@@ -70,8 +70,8 @@ class PartGraph:
         do_touch = run.map(lambda pair: touch(parts[pair[0]], parts[pair[1]]), near.tolist())
         touching = near[np.array(do_touch, dtype=bool)]
         added = _native.joint_hull_volumes(numbered.corners, touching, run.threads) - numbered.sums(touching)[2]
-        for (i, j), volume in zip(touching.tolist(), added.tolist(), strict=True):
-            self._gaps[i][j] = self._gaps[j][i] = max(volume, 0.0) ** (1 / 3)
+        for (i, j), gap in zip(touching.tolist(), _native.cube_roots(np.maximum(added, 0.0)).tolist(), strict=True):
+            self._gaps[i][j] = self._gaps[j][i] = gap
 
     def apply(self, exchange: Exchange) -> bool:
         """Apply an exchange; False if some of the parts it takes out are already gone."""

@@ -1,8 +1,9 @@
-"""Array types, and products of vectors and angles that are the same bits on every machine.
+"""Array types, and products of vectors that are the same bits on every machine.
 
-``@`` and ``einsum`` add in an order, and round or do not round between, as the processor and the library built for it
-allow; so do the series behind ``arctan2``. A plane whose offset comes from them differs in the last bit from machine
-to machine, and with it every hull. Sums, products, quotients and square roots alone are rounded alike everywhere.
+``@``, ``einsum`` and ``np.linalg`` add in an order, and round or do not round between, as the processor and the library
+built for it allow; so do the series behind ``arctan2``, ``log`` and fractional powers. A plane whose offset comes from
+them differs in the last bit from machine to machine, and with it every hull. Sums, products, quotients and square roots
+alone are rounded alike everywhere; other functions made of them are kernels (`native/base/elementary.hpp`).
 """
 
 from __future__ import annotations
@@ -22,10 +23,6 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 Float32Array: TypeAlias = NDArray[np.float32]
 
 
-_TERMS = 23
-"""The last odd power of the series of the arc tangent that is summed."""
-
-
 def heights(points: FloatArray, directions: FloatArray) -> FloatArray:
     """Heights of points [N, 3] along directions: [N] for one [3], [N, K] for several [K, 3]."""
     x, y, z = (points[:, axis] if directions.ndim == 1 else points[:, axis, None] for axis in range(3))
@@ -42,17 +39,3 @@ def dots(a: FloatArray, b: FloatArray) -> FloatArray:
 def length(vector: FloatArray) -> float:
     """Length of one vector [3]."""
     return float(np.sqrt(dots(vector, vector)))
-
-
-def angles(sines: FloatArray, cosines: FloatArray) -> FloatArray:
-    """Angles from 0 to pi whose sines, none negative, and cosines are in these proportions; 0 where both are 0."""
-    long = np.sqrt(sines * sines + cosines * cosines) + np.abs(cosines)
-    tangent = sines / np.where(long > 0, long, 1.0)  # of half the angle, which is at most pi / 4
-    for _ in range(2):
-        tangent = tangent / (1 + np.sqrt(1 + tangent * tangent))
-    square = tangent * tangent  # at most 0.04: ten terms of the series are exact to the last bits
-    series = np.zeros_like(square)
-    for odd in range(_TERMS, 0, -2):
-        series = 1 / odd - square * series
-    acute: FloatArray = 8 * (tangent * series)
-    return np.where(cosines < 0, np.pi - acute, acute)

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rlacd.solid.arrays import FloatArray
+from rlacd import _native
+from rlacd.solid.arrays import FloatArray, heights
 
 SMALLEST = 1e-300
 """Half the longest side of the smallest box that is scaled to fill the frame; a smaller one becomes a speck in it."""
@@ -83,9 +84,8 @@ class Frame:
 
 def thickened(points: FloatArray) -> FloatArray:
     """Return points ``[N, 3]``, with copies to both sides along the axes in which they have no extent."""
-    middle = points.mean(axis=0)
-    _, _, axes = np.linalg.svd(np.concatenate([points - middle, np.zeros((3, 3))]), full_matrices=False)
-    extent = np.ptp((points - middle) @ axes.T, axis=0)
+    axes = _native.principal_axes_of_points(points)
+    extent = np.ptp(heights(points - points.mean(axis=0), axes), axis=0)
     for axis in axes[extent < HALF_THICKNESS]:
         points = np.concatenate([points - HALF_THICKNESS * axis, points + HALF_THICKNESS * axis])
     return np.ascontiguousarray(points)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rlacd import _native
-from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray, IntArray, dots
 from rlacd.solid.frame import Frame
 
 _GREATEST = np.finfo(np.float64).max
@@ -70,7 +70,7 @@ def joint_mass(masses: Sequence[Mass]) -> Mass:
     inertia = np.zeros((3, 3))
     for mass in masses:
         away = mass.centre_abs - centre
-        inertia += mass.inertia_abs + mass.volume_abs * (away @ away * np.eye(3) - np.outer(away, away))
+        inertia += mass.inertia_abs + mass.volume_abs * (dots(away, away) * np.eye(3) - np.outer(away, away))
     return Mass(float(volume), centre, inertia)
 
 

@@ -17,7 +17,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from rlacd.options.names import PrimitiveKind
-from rlacd.solid.arrays import BoolArray, FloatArray
+from rlacd.solid.arrays import BoolArray, FloatArray, dots, heights
 from rlacd.solid.frame import Frame
 
 PRIMITIVE = "primitive"
@@ -57,8 +57,8 @@ class Primitive:
         if self.kind == "box":
             return math.prod(self.size)
         radius, *length = self.size
-        ball = 4 / 3 * math.pi * radius**3
-        disc = math.pi * radius**2
+        disc = math.pi * radius * radius
+        ball = 4 / 3 * disc * radius
         return {"sphere": ball, "capsule": ball + disc * sum(length), "cylinder": disc * sum(length)}[self.kind]
 
     @property
@@ -75,12 +75,12 @@ class Primitive:
 
     def beyond(self, points: FloatArray) -> float:
         """How far the farthest of points [N, 3] lies outside; 0 if none does, at most sqrt(3) too little."""
-        own = (points - self.centre) @ self.axes
+        own = heights(points - self.centre, np.ascontiguousarray(self.axes.T))
         if self.kind == "box":
             outside = np.abs(own) - np.array(self.size) / 2
         elif self.kind == "cylinder":
             radius, length = self.size
-            outside = np.stack([np.hypot(own[:, 0], own[:, 1]) - radius, np.abs(own[:, 2]) - length / 2])
+            outside = np.stack([np.sqrt(own[:, 0] ** 2 + own[:, 1] ** 2) - radius, np.abs(own[:, 2]) - length / 2])
         else:
             radius, length = (*self.size, 0.0)[:2]
             along = np.maximum(np.abs(own[:, 2]) - length / 2, 0.0)
@@ -104,7 +104,7 @@ class Primitive:
     def polyhedra(self) -> Iterator[FloatArray]:
         """Corners [N, 3] of convex polyhedra that contain it and touch all of its sides: coarser ones first."""
         for corners in _polyhedra(self.kind, self.size):
-            yield corners @ self.axes.T + self.centre
+            yield heights(corners, self.axes) + self.centre
 
     def as_plain(self) -> dict[str, Any]:
         """Plain values that ``json`` can write."""
@@ -130,9 +130,7 @@ def _polyhedra(kind: PrimitiveKind, size: tuple[float, ...]) -> Iterator[FloatAr
     ends = np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]])
     if kind == "cylinder":
         for sides in SIDES:
-            angles = 2 * np.pi / sides * np.arange(sides)
-            ring = radius / math.cos(math.pi / sides) * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-            yield (ends[:, None] + ring).reshape(-1, 3)
+            yield (ends[:, None] + radius * _around_unit_circle(sides)).reshape(-1, 3)
         return
     for subdivisions in SUBDIVISIONS:
         ball = radius * _around_unit_ball(subdivisions)
@@ -140,12 +138,31 @@ def _polyhedra(kind: PrimitiveKind, size: tuple[float, ...]) -> Iterator[FloatAr
 
 
 @cache
+def _around_unit_circle(sides: int) -> FloatArray:
+    """Corners [N, 3] of a polygon whose sides are all at least 1 from its centre."""
+    angles = 2 * np.pi / sides * np.arange(sides)
+    ring = np.round(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), _DECIMALS)
+    middles = (ring + np.roll(ring, 1, axis=0)) / 2
+    return _at_least_one(ring, np.sqrt(dots(middles, middles)))
+
+
+@cache
 def _around_unit_ball(subdivisions: int) -> FloatArray:
     """Vertices [N, 3] of a polyhedron whose facets are all at least 1 from its centre."""
     ball = trimesh.creation.icosphere(subdivisions=subdivisions)
-    least = np.einsum("fi,fi->f", ball.face_normals, ball.triangles[:, 0]).min()
-    around: FloatArray = np.asarray(ball.vertices) / (least * (1 - 1e-12))
-    return around
+    points = np.round(ball.vertices, _DECIMALS)
+    a, b, c = points[ball.faces.T]
+    normals = np.cross(b - a, c - a)
+    return _at_least_one(points, dots(normals, a) / np.sqrt(dots(normals, normals)))
+
+
+def _at_least_one(points: FloatArray, distances: FloatArray) -> FloatArray:
+    """Corners [N, 3] scaled so that facets at these distances [F] are all at least 1 away."""
+    return points / (float(distances.min()) * (1 - 1e-9))
+
+
+_DECIMALS = 12
+"""What libraries compute in their own ways is rounded to so many, so that it is the same bits everywhere."""
 
 
 @dataclass(frozen=True, eq=False)
