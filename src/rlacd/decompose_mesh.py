@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import IO, Literal, TypeAlias
 
 import numpy as np
 import trimesh
@@ -42,13 +42,18 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
 
-MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
+MeshLike: TypeAlias = (
+    "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
+    " | ArrayLike | IO[bytes]"
+)
 
 
 @suggesting(*ELSEWHERE)
 def decompose(
     mesh: MeshLike,
+    faces: ArrayLike | None = None,
     *,
+    file_type: str | None = None,
     criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = None,
     threshold: float | None = None,
     threshold_abs: float | None = None,
@@ -85,8 +90,13 @@ def decompose(
 
     Parameters
     ----------
-    mesh : path, trimesh.Trimesh, trimesh.Scene or (vertices, faces)
-        Any triangle mesh or file of one; it need not be closed, oriented or clean.
+    mesh : path, open file, bytes, trimesh.Trimesh, trimesh.Scene, list of trimesh.Trimesh, or vertices
+        Any triangle mesh or file of one; it need not be closed, oriented or clean. A list is one object of several
+        bodies.
+    faces : array-like [F, 3], optional
+        Of vertices ``[V, 3]`` given as `mesh`; ``(vertices, faces)`` is the same.
+    file_type : str, optional
+        The format of an open file or of bytes, such as ``"obj"``; by default what its name or its content tells.
     criterion : "concavity", "distance", "volume" or NavigableSpace, optional
         Decides when a part is tight enough. ``distance``: its surface and its hull's lie at most `threshold` apart.
         ``concavity``: so do they, and the hull adds little volume (CoACD's measure). ``volume``: its hull adds at most
@@ -202,7 +212,7 @@ def decompose(
     make_policy(options.first_policy)  # reports a bad network before any work is done
     with Run(options.threads, options.timeout, progress, options.seed) as run:
         with run.stage("load"):
-            source = in_metres(load_mesh(mesh), options)
+            source = in_metres(load_mesh(mesh, faces, file_type), options)
         apart = options.per_node and len(source.nodes) > 1
         if options.per_node and not apart:
             alone = f"per_node had no effect: {source.name} was read as one node"
