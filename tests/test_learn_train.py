@@ -143,11 +143,14 @@ def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path,
 
 
 @pytest.mark.slow
-def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "whole")
-    run(meshes, tmp_path / "halves", iterations=70)
+@pytest.mark.parametrize(("stop", "validated"), [(20, 20), (70, 60)], ids=["before it learns", "while it learns"])
+def test_a_resumed_run_is_the_run_that_was_never_stopped(
+    meshes: Path, tmp_path: Path, stop: int, validated: int
+) -> None:
+    run(meshes, tmp_path / "whole", validate_every=validated)
+    run(meshes, tmp_path / "halves", validate_every=validated, iterations=stop)
     (tmp_path / "halves" / "checkpoint.npz.1.part").write_bytes(b"what a crash left")
-    run(meshes, tmp_path / "halves", resume=True)
+    run(meshes, tmp_path / "halves", validate_every=validated, resume=True)
     assert_same_run(tmp_path / "whole", tmp_path / "halves")
 
 

@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import IO, Literal, TypeAlias
 
 import numpy as np
 import trimesh
@@ -20,7 +20,7 @@ from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report
 from rlacd.io.read.load import load_mesh
 from rlacd.options import (
-    LENGTHS,
+    ELSEWHERE,
     OPTION_NAMES,
     SIMPLE,
     DetailName,
@@ -32,6 +32,7 @@ from rlacd.options import (
     VolumeOf,
 )
 from rlacd.options.fields import check_callback
+from rlacd.options.keywords import suggesting
 from rlacd.options.names import UNITS, PrimitiveKind
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.presets import PresetName
@@ -41,23 +42,29 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
 
-MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
+MeshLike: TypeAlias = (
+    "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
+    " | ArrayLike | IO[bytes]"
+)
 
 
+@suggesting(*ELSEWHERE)
 def decompose(
     mesh: MeshLike,
+    faces: ArrayLike | None = None,
     *,
+    file_type: str | None = None,
     criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = None,
-    threshold: float = 0.05,
+    threshold: float | None = None,
     threshold_abs: float | None = None,
-    volume_tolerance: float = 0.01,
-    volume_of: VolumeOf = "part",
+    volume_tolerance: float | None = None,
+    volume_of: VolumeOf | None = None,
     max_hulls: int | None = None,
     max_vertices: int | None = None,
     max_faces: int | None = None,
     detail: DetailName = SIMPLE,
     primitives: bool | Sequence[PrimitiveKind] = (),
-    overlap: float = 0.0,
+    overlap: float | None = None,
     overlap_abs: float | None = None,
     keep_open: float | None = None,
     keep_open_abs: float | None = None,
@@ -74,7 +81,7 @@ def decompose(
     search_steps: int | None = None,
     preset: PresetName | None = None,
     per_node: bool = False,
-    relative_to: RelativeTo = "scene",
+    relative_to: RelativeTo | None = None,
     unit: UnitName | None = None,
     scale: float | None = None,
     progress: ProgressCallback | None = None,
@@ -83,23 +90,29 @@ def decompose(
 
     Parameters
     ----------
-    mesh : path, trimesh.Trimesh, trimesh.Scene or (vertices, faces)
-        Any triangle mesh or file of one; it need not be closed, oriented or clean.
+    mesh : path, open file, bytes, trimesh.Trimesh, trimesh.Scene, list of trimesh.Trimesh, or vertices
+        Any triangle mesh or file of one; it need not be closed, oriented or clean. A list is one object of several
+        bodies.
+    faces : array-like [F, 3], optional
+        Of vertices ``[V, 3]`` given as `mesh`; ``(vertices, faces)`` is the same.
+    file_type : str, optional
+        The format of an open file or of bytes, such as ``"obj"``; by default what its name or its content tells.
     criterion : "concavity", "distance", "volume" or NavigableSpace, optional
         Decides when a part is tight enough. ``distance``: its surface and its hull's lie at most `threshold` apart.
         ``concavity``: so do they, and the hull adds little volume (CoACD's measure). ``volume``: its hull adds at most
         `volume_tolerance` of volume. `NavigableSpace`: its hull stays out of the space that a ball of a given size can
         reach. By default concavity, and distance with `threshold_abs`.
-    threshold : float
-        Largest concavity or distance of a part, in CoACD's frame, where the input's longest side is 2: 0.05 is 2.5 % of
-        it. Between 0.001 and 2. All other lengths are shares of the longest side, or in the input's unit.
+    threshold : float, optional
+        Largest concavity or distance of a part, in CoACD's frame, where the input's longest side is 2: 0.05, the
+        default, is 2.5 % of it. Between 0.001 and 2. All other lengths are shares of the longest side, or in the
+        input's unit.
     threshold_abs : float, optional
-        The same in the input's unit; replaces `threshold`.
-    volume_tolerance : float
-        With the criterion ``volume``, the share of volume that a hull may add: 0.01 is 1 %, as in V-HACD. Parts smaller
-        than a thousandth of the whole's convex hull count as this large.
-    volume_of : "part" or "whole"
-        Whether it is a share of each part's own volume, or of the whole solid's.
+        The same in the input's unit, instead of `threshold`.
+    volume_tolerance : float, optional
+        With the criterion ``volume``, the share of volume that a hull may add: 0.01, the default, is 1 %, as in V-HACD.
+        Parts smaller than a thousandth of the whole's convex hull count as this large.
+    volume_of : "part" or "whole", optional
+        Whether it is a share of each part's own volume, the default, or of the whole solid's.
     max_hulls : int, optional
         Maximum number of hulls. It has no effect if the decomposition has no more anyway; otherwise the one with the
         least concavity among those found under coarser thresholds is returned, and ``report["warnings"]`` says by how
@@ -116,13 +129,13 @@ def decompose(
         criterion: the simplest whose volume is within a quarter of the least. Only those named;
         True allows all. Its hull is then a convex polyhedron around the primitive, and ``Decomposition.primitives``
         describes it. Models (MJCF, URDF, SDF, USD) hold primitives in place of such hulls.
-    overlap : float
+    overlap : float, optional
         Hulls that touch overlap by this share of the longest side, so that nothing thin slips between them: one takes
         in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and
         ``report["warnings"]`` says at how many seams. At most 0.25. With `per_node`, hulls of different nodes do not
         overlap.
     overlap_abs : float, optional
-        The same in the input's unit; replaces `overlap`.
+        The same in the input's unit, instead of `overlap`.
     keep_open : float, optional
         Passages stay open: in a hole, slot or mouth that holds a ball of at least `threshold` in radius, a ball of this
         share of its radius still fits between the hulls, at the same place. Passages are found from points spread over
@@ -170,8 +183,8 @@ def decompose(
     per_node : bool
         Decompose each node of a scene separately, such as the doors and drawers of a cupboard, which move. The limits
         on hulls hold for each. Every hull's ``metadata`` names its node, with or without this.
-    relative_to : "scene" or "node"
-        With `per_node`, what `threshold` is relative to: the size of the whole scene, or of each node.
+    relative_to : "scene" or "node", optional
+        With `per_node`, what `threshold` is relative to: the size of the whole scene, the default, or of each node.
     unit : "mm", "cm", "m", "in" or "file", optional
         The unit of the input, which is converted to metres; ``file`` takes what the file says. By default coordinates
         stay as they are.
@@ -194,14 +207,16 @@ def decompose(
         An option has the wrong type or is out of range; raised before any work is done.
     """
     given = locals()
-    options = Options(**{name: given[name] for name in OPTION_NAMES})
+    options = Options.of({name: given[name] for name in OPTION_NAMES})
     check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(options.first_policy)  # reports a bad network before any work is done
     with Run(options.threads, options.timeout, progress, options.seed) as run:
         with run.stage("load"):
-            source = in_metres(load_mesh(mesh), options)
+            source = in_metres(load_mesh(mesh, faces, file_type), options)
         apart = options.per_node and len(source.nodes) > 1
-        source = replace(source, warnings=(*source.warnings, *_without_effect(options, source, apart)))
+        if options.per_node and not apart:
+            alone = f"per_node had no effect: {source.name} was read as one node"
+            source = replace(source, warnings=(*source.warnings, alone))
         done = _each_node(source, options, run) if apart else _as_one(source, options, run)
     report = {
         "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
@@ -213,19 +228,6 @@ def decompose(
     }
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
-
-
-def _without_effect(options: Options, source: InputMesh, apart: bool) -> list[str]:
-    """A sentence for each option that changes nothing for this input."""
-    said = []
-    if options.per_node and not apart:
-        said.append(f"per_node had no effect: {source.name} was read as one node")
-    if options.relative_to == "node" and not apart:
-        said.append("relative_to had no effect: nodes were not decomposed separately")
-    for name in LENGTHS:
-        if getattr(options, f"{name}_abs") is not None and getattr(options, name) != getattr(Options, name):
-            said.append(f"{name} had no effect: {name}_abs was given too")
-    return said
 
 
 def _as_one(source: InputMesh, options: Options, run: Run) -> Finished:

@@ -103,7 +103,7 @@ class Decomposition(Result):
         path: str | os.PathLike[str],
         *,
         file_format: str | None = None,
-        density: float = 1000.0,
+        density: float | None = None,
         mass: float | None = None,
         up: Axis | None = None,
         one_mesh: bool = False,
@@ -125,7 +125,7 @@ class Decomposition(Result):
             ``"godot"``, for a ``*.glb`` (or, with unreal, ``*.obj``) with the input and hulls named as those engines
             expect: the hulls of a glTF file, and of a scene or textured mesh from memory, are added to the input's own
             scene, under the nodes they belong to, and everything else stays as it is.
-        density : float
+        density : float, optional
             Mass per cubic unit of the input: models say how heavy the repaired input is.
         mass : float, optional
             Mass of the whole body, instead of `density`.

@@ -259,7 +259,7 @@ def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[s
 
 @pytest.mark.slow
 @pytest.mark.promise("batch-alone")
-def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> None:
+def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assets, out = tmp_path / "assets", tmp_path / "out"
     names = ["dies", "dies_once", "grows", "hangs", "prints", "bug", "well"]
     for name in names:
@@ -267,13 +267,16 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
     (assets / "bad.obj").write_text("no mesh")
     (assets / "gone.obj").symlink_to(assets / "nowhere")
     (assets / "shut.obj").mkdir()
-    run = batch(assets, "-o", out, "--jobs", 2, "--limit", 12, "--memory", 1)
+    geometry = '<collision><geometry><mesh filename="lost.obj"/></geometry></collision>'
+    (assets / "arm.urdf").write_text(f'<robot name="arm"><link name="link">{geometry}</link></robot>')
+    monkeypatch.chdir(tmp_path)
+    run = batch("assets", "-o", "out", "--jobs", 2, "--limit", 12, "--memory", 1)
     assert run.exit_code == 5, run.output
     told = rows(out)
     assert {name.removesuffix(".obj"): row["status"] for name, row in told.items()} == {
         **dict.fromkeys(["dies", "grows", "hangs", "bug"], "fallback"),
         **dict.fromkeys(["dies_once", "prints", "well"], "done"),
-        **dict.fromkeys(["bad", "gone"], "failed"),
+        **dict.fromkeys(["bad", "gone", "arm.urdf"], "failed"),
     }
     assert told["dies.obj"]["error"] == "its process died of SIGSEGV"
     assert told["hangs.obj"]["error"] == "it took more than 12 s"
@@ -281,6 +284,7 @@ def test_no_mesh_stops_the_others(trouble: dict[str, str], tmp_path: Path) -> No
     assert told["grows.obj"]["error"] == "it needed more than 1 GB of memory"
     assert "surprise" in told["bug.obj"]["error"]
     assert "does not exist" in told["gone.obj"]["error"]
+    assert told["arm.urdf"]["error"].startswith("arm.urdf refers to lost.obj, but lost.obj does not")
     assert str(tmp_path) not in (out / "manifest.jsonl").read_text(), "a manifest is the same wherever the meshes lie"
     assert told["well.obj"]["outputs"]
     assert told["bad.obj"]["outputs"] == {}

@@ -195,7 +195,7 @@ def test_a_folder_can_be_filled_in_any_format(mesh: Path, stand_in: StandIn) -> 
         (["--from", "obj"], 2, "give - as IN"),
         (["-o", "{dir}/ell.stl"], 2, "overwrite the input"),
         (["--report", "{dir}/ell.stl/r.json"], 3, "is a file, not a folder"),
-        (["--report", "{dir}"], 3, "it is a folder"),
+        (["--report", "{dir}/r.pdf"], 2, "must end in .json, .html or .htm"),
         (["--report", "{dir}/ell_hulls.glb"], 2, "overwrite the hulls"),
         (["--picture", "{dir}/p.jpg"], 2, ".png"),
         (["--criterion", "navigable", "--balls", "{dir}/b.ply"], 2, ".csv or .glb"),
@@ -270,7 +270,7 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
     run = rlacd(*(word.format(dir=mesh.parent) for word in words))
     assert run.exit_code == 2
     assert run.stderr.endswith(f"did you mean  {typed.format(dir=mesh.parent)}\n")
-    assert "No such command" in rlacd("decompsoe").stderr
+    assert "No such command 'decompsoe'. Did you mean 'decompose'?" in rlacd("decompsoe").stderr
 
 
 @pytest.mark.parametrize(
@@ -356,13 +356,39 @@ def shell(*words: object, **options: Any) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("words", ["decompose {} --quiet --report -", "--help", "info --help", "decompose --help-all"])
 @pytest.mark.parametrize(("out", "says"), [(">/dev/full", "No space left"), (">&-", "it is closed")])
-def test_a_report_that_cannot_be_printed_is_an_error_of_one_sentence(mesh: Path, out: str, says: str) -> None:
-    words = f"{sys.executable} -m rlacd decompose {mesh} --quiet --report - {out}"
-    run = subprocess.run(["sh", "-c", words], stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+def test_what_cannot_be_printed_is_an_error_of_one_sentence(mesh: Path, words: str, out: str, says: str) -> None:
+    command = f"{sys.executable} -m rlacd {words.format(mesh)} {out}"
+    run = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, text=True, timeout=120, check=False)
     assert (run.returncode, len(run.stderr.splitlines())) == (3, 1), run.stderr
     assert "cannot write to stdout" in run.stderr
     assert says in run.stderr
+
+
+EARLY = """
+import signal, sys
+
+class Early:
+    def find_spec(self, name, *_):
+        if name == {name!r}:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Early())
+from rlacd.__main__ import main
+main()
+"""
+"""The command line, with Ctrl-C while a module is imported."""
+
+
+@pytest.mark.parametrize("name", ["rlacd.cli.main", "click", "rlacd.cli.decompose", "trimesh.base"])
+@pytest.mark.promise("exit-codes")
+def test_ctrl_c_before_the_work_is_one_sentence(mesh: Path, name: str) -> None:
+    command = [sys.executable, "-c", EARLY.format(name=name), "decompose", str(mesh)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert (run.returncode, run.stdout) == (130, "")
+    assert run.stderr == "rlacd: interrupted; no file is left half-written.\n"
+    assert not mesh.with_name("ell_hulls.glb").exists()
 
 
 @pytest.mark.slow

@@ -142,6 +142,9 @@ def test_too_thin_for_single_precision_is_reported_and_double_precision_formats_
     for ending in ("obj", "ply", "stl"):
         (mesh,) = load(save_hulls([hull], tmp_path / f"thin.{ending}")).values()
         assert_convex_hull(mesh)
+    for size, misfit in ((1e39, "large"), (1e-60, "small")):
+        with pytest.raises(OutputError, match=f"hull_000.*too {misfit} for single precision"):
+            save_hulls([hull_of(trimesh.creation.box().vertices * size)], tmp_path / "out.glb")
 
 
 # --- places -----------------------------------------------------------------------------------------------------------

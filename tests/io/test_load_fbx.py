@@ -80,8 +80,8 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     assert set(load_mesh(tmp_path / "box.fbx").warnings) == {
         "skinned meshes of box.fbx are read as bound, at their nodes",
         "animations of box.fbx were left out",
-        "lower levels of detail of box.fbx were left out: 2",
-        "invisible nodes of box.fbx were left out: 1",
+        "lower levels of detail were left out: 2",
+        "hidden nodes were left out, with those below them: 1",
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,20 +61,29 @@ def off(solid: Prism) -> bytes:
     return "\n".join([*lines, *(" ".join(map(str, [len(p), *p])) for p in polygons), ""]).encode()
 
 
-def ply(solid: Prism, order: str, corner: str = "I", element: str = "face") -> bytes:
-    """As Blender and others write it: other fields beside the positions, and a field of its own on each face."""
+def ply(solid: Prism, order: str, corner: str = "I", element: str = "face", *, odd: bool = False) -> bytes:
+    """As Blender and others write it: other fields beside the positions, and a field of its own on each face.
+
+    If odd, faces come before the points, each of which has a list of its own length.
+    """
     points, polygons = solid
     kind = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
-    head = f"ply\nformat {kind} 1.0\nelement vertex {len(points)}\nproperty uchar red\n"
+
+    def row(*fields: tuple[str, list[Any]]) -> bytes:
+        if not order:
+            return (" ".join(str(value) for _, values in fields for value in values) + "\n").encode()
+        return b"".join(struct.pack(f"{order}{len(values)}{code}", *values) for code, values in fields)
+
+    head = f"element vertex {len(points)}\nproperty uchar red\n" + "property list uchar float w\n" * odd
     head += "".join(f"property double {axis}\n" for axis in "xyz")
-    head += f"element {element} {len(polygons)}\nproperty uchar flags\n"
-    head += f"property list uchar {'uint' if corner == 'I' else 'int'} vertex_indices\nend_header\n"
-    if not order:
-        rows = [" ".join(map(str, [7, *p])) for p in points.tolist()]
-        rows += [" ".join(map(str, [1, len(p), *p])) for p in polygons]
-        return (head + "\n".join(rows) + "\n").encode()
-    body = b"".join(struct.pack(order + "B3d", 7, *p) for p in points.tolist())
-    return head.encode() + body + b"".join(struct.pack(f"{order}BB{len(p)}{corner}", 1, len(p), *p) for p in polygons)
+    weights = [[("B", [i % 3 + 1]), ("f", [0.5] * (i % 3 + 1))] if odd else [] for i in range(len(points))]
+    rows = (row(("B", [7]), *w, ("d", p)) for w, p in zip(weights, points.tolist(), strict=True))
+    vertices = head, b"".join(rows)
+    head = f"element {element} {len(polygons)}\nproperty uchar flags\n"
+    head += f"property list uchar {'uint' if corner == 'I' else 'int'} vertex_indices\n"
+    faces = head, b"".join(row(("B", [1, len(p)]), (corner, p)) for p in polygons)
+    heads, bodies = zip(*((faces, vertices) if odd else (vertices, faces)), strict=True)
+    return f"ply\nformat {kind} 1.0\n{''.join(heads)}end_header\n".encode() + b"".join(bodies)
 
 
 def dae(solid: Prism, one_list: bool = True) -> bytes:
@@ -117,6 +127,8 @@ WRITERS = {
     "ascii.ply": lambda solid: ply(solid, ""),
     "little.ply": lambda solid: ply(solid, "<"),
     "big.ply": lambda solid: ply(solid, ">"),
+    "odd.ply": lambda solid: ply(solid, "", odd=True),
+    "odd_binary.ply": lambda solid: ply(solid, "<", odd=True),
 }
 
 

@@ -11,9 +11,14 @@ import trimesh
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.load import load_mesh
+from rlacd.io.robots.usd import read_colliders
 
 Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
-from pxr import Gf, Sdf, UsdGeom, UsdUtils, Vt  # noqa: E402
+from pxr import Gf, Sdf, UsdGeom, UsdPhysics, UsdUtils, Vt  # noqa: E402
+
+from rlacd.io.read.usd_stage import check_files  # noqa: E402
+
+BOX = trimesh.creation.box()
 
 
 def add_mesh(stage: Any, path: str, points: Any, polygons: Any) -> Any:
@@ -40,8 +45,10 @@ def cupboard(path: Path) -> Path:
     add_box(stage, "/Cupboard/box", (2, 4, 6)).AddTranslateOp().Set(Gf.Vec3d(10, 0, 0))
     quad = add_mesh(stage, "/Cupboard/door", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [range(4)])
     quad.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
-    add_box(stage, "/Cupboard/hidden").CreateVisibilityAttr(UsdGeom.Tokens.invisible)
-    add_box(stage, "/Cupboard/guide").CreatePurposeAttr(UsdGeom.Tokens.guide)
+    UsdGeom.Xform.Define(stage, "/Cupboard/hidden").CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+    add_box(stage, "/Cupboard/hidden/box")
+    for purpose in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
+        add_box(stage, f"/Cupboard/{purpose}").CreatePurposeAttr(purpose)
     stage.Save()
     return path
 
@@ -54,6 +61,8 @@ def test_what_is_rendered_is_read_where_it_stands(tmp_path: Path, ending: str) -
         path = tmp_path / "cupboard.usdz"
     mesh = load_mesh(path)
     assert [node.name for node in mesh.nodes] == ["box", "door"]
+    hidden, others = "hidden nodes were left out, with those below them: 1", "guides and proxies were left out: 2"
+    assert mesh.warnings == (hidden, others)
     assert (mesh.up, mesh.metres, mesh.unit) == ("y", 0.01, "cm")
     assert len(mesh.faces) == 12 + 2
     box = mesh.of_node(0).vertices
@@ -102,16 +111,29 @@ def test_instances_are_read_each_where_it_stands(tmp_path: Path) -> None:
     assert np.allclose(np.ptp(mesh.vertices, axis=0), (11, 1, 1))
 
 
-@pytest.mark.parametrize("named", ["../secret.usda", "{folder}/secret.usda", "./nowhere.usda"])
-def test_files_outside_the_folder_or_missing_are_named(tmp_path: Path, named: str) -> None:
-    cupboard(tmp_path / "secret.usda")
+CLIPS = '(clips = {{ dictionary default = {{ {} string primPath = "/Cupboard/box" }} }})'
+"""Of values that change, which OpenUSD reads from other files."""
+
+
+@pytest.mark.parametrize(
+    "naming",
+    [
+        *("(prepend references = @../secret.usda@)", "(prepend references = @{folder}/secret.usda@)"),
+        "(prepend payload = @./nowhere.usda@)",
+        *(CLIPS.format(f"asset[] assetPaths = [@{name}@]\n") for name in ("../secret.usda", "nowhere.usda")),
+        CLIPS.format('string templateAssetPath = "../secret.#.usda"\n'),
+    ],
+)
+def test_files_outside_the_folder_or_missing_are_named_and_never_opened(tmp_path: Path, naming: str) -> None:
+    for name in ("secret.usda", "secret.1.usda"):
+        cupboard(tmp_path / "cupboard.usda").rename(tmp_path / name)
     (tmp_path / "in").mkdir()
     path = tmp_path / "in" / "cart.usda"
-    stage = Usd.Stage.CreateNew(str(path))
-    stage.DefinePrim("/A").GetReferences().AddReference(named.format(folder=tmp_path), "/Cupboard")
-    stage.Save()
-    with pytest.raises(MeshFileError, match=r"outside its folder|cannot be opened"):
-        load_mesh(path)
+    path.write_text(f'#usda 1.0\ndef Mesh "A" {naming.replace("{folder}", str(tmp_path))} {{ }}\n')
+    for read in (load_mesh, read_colliders, check_files):
+        with pytest.raises(MeshFileError, match=r"outside its folder|cannot be opened|by a template"):
+            read(path)
+    assert not [layer for layer in Sdf.Layer.GetLoadedLayers() if "secret" in layer.identifier]
 
 
 @pytest.mark.parametrize("changes", [{1604: 137, 1628: 56}, {107: 90, 241: 56, 431: 188}])
@@ -133,3 +155,18 @@ def test_faces_that_do_not_fit_are_refused(tmp_path: Path) -> None:
         stage.Save()
         with pytest.raises(MeshFileError, match="export it again"):
             load_mesh(tmp_path / f"{number}.usda")
+
+
+def test_faces_that_are_holes_are_left_out(tmp_path: Path) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "box.usda"))
+    mesh = add_mesh(stage, "/box", BOX.vertices, [*BOX.faces, range(3)])
+    mesh.CreateHoleIndicesAttr([12, 0])
+    UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
+    stage.Save()
+    colliders = read_colliders(tmp_path / "box.usda")
+    for faces in (load_mesh(tmp_path / "box.usda").faces, np.frombuffer(colliders.blobs["0.faces"], np.int64)):
+        assert np.array_equal(faces.reshape(-1, 3), BOX.faces[1:])
+    mesh.GetHoleIndicesAttr().Set([13])
+    stage.Save()
+    with pytest.raises(MeshFileError, match="holes at /box"):
+        load_mesh(tmp_path / "box.usda")

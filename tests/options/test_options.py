@@ -12,14 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from trimesh import creation
 
 import rlacd
+from rlacd.batch.job_spec import JobSpec
+from rlacd.cli.main import app
 from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd, vhacd
 from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
 from rlacd.learn.options import TrainOptions
-from rlacd.options import OPTION_NAMES, Options
+from rlacd.options import LENGTHS, OPTION_NAMES, Options
 from rlacd.options.fields import check_callback
 from rlacd.options.names import SCORES as SCORE_NAMES
 from rlacd.options.navigable import NavigableSpace
@@ -174,6 +177,67 @@ def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) ->
 def test_the_message_shows_the_value_and_what_it_has_to_be(given: dict[str, Any], says: str) -> None:
     with pytest.raises(OptionError, match=says):
         rlacd.decompose("no such file.obj", **given)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        *(
+            ({"criterion": criterion, name: usual}, f"{name} is {usual!r}; it has to be left out: the criterion")
+            for criterion, names in [("volume", ["threshold"]), ("distance", ["volume_tolerance", "volume_of"])]
+            for name, usual in ((name, getattr(Options, name)) for name in names)
+        ),
+        *(({name: getattr(Options, name), f"{name}_abs": 0.1}, f"left out with {name}_abs") for name in LENGTHS),
+        ({"keep_open": 0.9, "keep_open_abs": 0.1}, "left out with keep_open_abs"),
+        ({"relative_to": "scene"}, "left out without per_node"),
+        ({"relative_to": "node", "per_node": True, "threshold_abs": 0.1}, "no length is a share"),
+        ({"quality": "fast", "search_steps": 0}, "left out with quality='fast'"),
+        ({"quality": "best", "merge": False}, "quality is 'best'; it has to be 'fast'"),
+    ],
+)
+@pytest.mark.promise("options")
+def test_an_option_that_another_overrides_is_refused_even_with_its_default(
+    tmp_path: Path, given: dict[str, Any], says: str
+) -> None:
+    mesh = tmp_path / "box.stl"
+    creation.box().export(mesh)
+    for call in (
+        lambda: rlacd.decompose(mesh, **given),
+        lambda: JobSpec.of(given),
+        lambda: rlacd.rewrite_robot("no such file.urdf", "out.urdf", **given),
+    ):
+        with pytest.raises(OptionError, match=says):
+            call()
+    words = {"--" + ("tolerance" if n == "volume_tolerance" else n.replace("_", "-")): v for n, v in given.items()}
+    typed = [word for flag, value in words.items() for word in ((flag,) if value is True else (flag, str(value)))]
+    typed = ["--no-merge" if word == "--merge" else word for word in typed if word != "False"]
+    run = CliRunner().invoke(app, ["decompose", str(mesh), *typed])
+    assert run.exit_code == 2
+    assert re.search(says, run.stderr) or "--tolerance needs --criterion volume" in run.stderr
+
+
+def test_none_is_as_good_as_not_given() -> None:
+    assert Options.of(dict.fromkeys(OPTION_NAMES)) == Options()
+
+
+@pytest.mark.parametrize(
+    ("call", "name", "says"),
+    [
+        (rlacd.decompose, "treshold", "Did you mean 'threshold'?"),
+        (rlacd.decompose, "max_convex_hull", "Did you mean 'max_hulls'?"),
+        (rlacd.decompose, "radius_abs", "It belongs to NavigableSpace(radius_abs=)."),
+        (rlacd.decompose, "density", "It belongs to .save(density=)."),
+        (rlacd.decompose, "qwx", "'qwx'."),
+        (coacd.run_coacd, "max_hulls", "Did you mean 'max_convex_hull'?"),
+        (vhacd.compute_vhacd, "max_convex_hulls", "Did you mean 'maxConvexHulls'?"),
+    ],
+)
+def test_an_option_that_is_unknown_is_told_with_the_one_that_was_meant(call: Any, name: str, says: str) -> None:
+    with pytest.raises(TypeError, match=rf"unexpected keyword argument '{name}'\. ?.*") as caught:
+        call("no such file.obj", **{name: 1})
+    assert str(caught.value).endswith(says)
+    with pytest.raises(TypeError, match="Did you mean 'threshold'"):
+        rlacd.rewrite_robot("no such file.urdf", "out.urdf", treshold=0.1)
 
 
 def test_callbacks_that_take_one_argument_are_accepted() -> None:

@@ -84,16 +84,13 @@ def test_a_unit_and_a_factor_convert_everything(unit: str, metres: float) -> Non
     assert np.allclose(result.source.vertices, plain.source.vertices * factor, rtol=1e-12, atol=0)
 
 
-def test_a_share_beside_a_length_is_told_to_have_no_effect() -> None:
-    done = rlacd.decompose(table(), threshold=0.03, threshold_abs=0.1, quality="fast", threads=1)
-    assert done.report["warnings"] == ["threshold had no effect: threshold_abs was given too"]
-
-
 def test_a_mass_of_ones_own(tmp_path: Path) -> None:
     rest = fall_in_mujoco(decomposed_table().save(tmp_path / "table.xml", mass=3.5))
     assert rest.mass == pytest.approx(3.5, rel=1e-6)
     with pytest.raises(OptionError, match="mass"):
         decomposed_table().save(tmp_path / "table.xml", mass=-1.0)
+    with pytest.raises(OptionError, match="density is 1000"):
+        decomposed_table().save(tmp_path / "table.xml", mass=1.0, density=1000.0)  # the default, but given
 
 
 @pytest.mark.parametrize("ending", ["xml", "urdf", "sdf"])

@@ -70,7 +70,7 @@ class JobSpec:
         OutputError, MissingExtraError
             The format is unknown, or needs an extra.
         """
-        checked = Options(**{"threads": 1, **options})
+        checked = Options.of({"threads": 1, **options})
         if not isinstance(checked.first_policy, str):
             raise OptionError("in a batch, policy has to be a name or a file: objects stay in their process.")
         make_policy(checked.first_policy)
@@ -95,7 +95,7 @@ class JobSpec:
 
         The number of threads and the path of a policy's file do not affect the key.
         """
-        options = Options(**self.options).as_plain()
+        options = Options.of(self.options).as_plain()
         del options["threads"]
         if options["policy"].endswith(WEIGHTS_ENDING):
             options["policy"] = WEIGHTS_ENDING

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 import warnings
 from collections.abc import Mapping
@@ -165,13 +166,14 @@ class MeshServer:
         wall, cpu = time.perf_counter(), time.process_time()
         files: dict[str, bytes] = {}
         with TemporaryDirectory(dir=self._staging) as folder:
-            path = lay_out(blobs, Path(folder)) if blobs else Path(values["path"])
+            path = (lay_out(blobs, Path(folder)) if blobs else Path(values["path"])).absolute()  # as messages name it
             try:
                 spec = self._spec(values["spec"], shared)
                 report, files = make(spec, path, values["stem"], self._staging, values["hull_only"])
                 answer: dict[str, Any] = {"report": report}
             except Exception as error:
-                said = sentence_of(error).replace(str(path), values["name"]).replace(str(self._staging), "")
+                said = sentence_of(error).replace(f"{path.parent}{os.sep}", values["name"].removesuffix(path.name))
+                said = said.replace(str(self._staging), "")
                 answer = {"error": said, "unusable": isinstance(error, MeshError)}
         spent = {"seconds": round(time.perf_counter() - wall, 4), "cpu": round(time.process_time() - cpu, 4)}
         return {**answer, **spent, "peak_mb": peak_memory() // 2**20}, files

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rlacd.cli.commands import Argument, Command, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
+from rlacd.cli.lean import ctrl_c_at_once
 from rlacd.cli.options import PoolOptions, decompose_options, how
 from rlacd.errors import OptionError
 from rlacd.options.fields import check_fields, option, stated
@@ -78,7 +79,8 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     than --limit, it is given its convex hull. OUT/manifest.jsonl records the outcome of each mesh. To resume after an
     interruption, run the same command again. Ctrl-C once finishes what is running; twice quits at once.
     """
-    from rlacd.batch import Batch, JobSpec
+    with ctrl_c_at_once():
+        from rlacd.batch import Batch, JobSpec
 
     own, where = BatchOptions(**taken(given, BatchOptions)), PoolOptions(**taken(given, PoolOptions))
     if where.jobs == 0:

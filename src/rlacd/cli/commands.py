@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from rlacd.cli.exit_codes import EPILOG, exit_codes
+from rlacd.cli.exit_codes import EPILOG, give
 from rlacd.options.fields import About
 
 ARGUMENTS, OPTIONS = "Arguments", "Options"
@@ -38,6 +38,18 @@ class Option(click.Option):
         self.panel = panel
 
 
+def help_option() -> click.Option:
+    """``--help``, whose text may find stdout full or closed."""
+
+    def show(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+        if wanted and not ctx.resilient_parsing:
+            give(ctx.get_help() + "\n")
+            ctx.exit()
+
+    known: dict[str, Any] = {"is_flag": True, "is_eager": True, "expose_value": False, "callback": show}
+    return click.Option(["-h", "--help"], help="Show this message and exit.", **known)
+
+
 class Command(click.Command):
     """A command whose help has headings.
 
@@ -45,7 +57,7 @@ class Command(click.Command):
     ----------
     name : str
     run : callable
-        Called with the value of each parameter by its name; its errors become exit codes. Its docstring is the help.
+        Called with the value of each parameter by its name. Its docstring is the help.
     parameters : sequence of Argument or Option
     first : collection of str
         The options that ``--help`` shows, by name; ``--help-all`` shows all. All if there are none.
@@ -59,15 +71,15 @@ class Command(click.Command):
         first: Collection[str] = (),
         **settings: Any,
     ) -> None:
-        def guarded(**given: Any) -> None:
-            with exit_codes():
-                run(**given)
-
         params: list[click.Parameter] = [*parameters]
         if first:
             params.append(_help_all())
         self._first = first
-        super().__init__(name, callback=guarded, params=params, help=run.__doc__, epilog=EPILOG, **settings)
+        super().__init__(name, callback=run, params=params, help=run.__doc__, epilog=EPILOG, **settings)
+
+    def get_help_option(self, ctx: click.Context) -> click.Option:
+        """What shows the help."""
+        return help_option()
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the parameters under their headings."""
@@ -91,7 +103,7 @@ def _help_all() -> Option:
     def show(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
         if wanted:
             ctx.meta[_ALL] = True
-            click.echo(ctx.get_help())
+            give(ctx.get_help() + "\n")
             ctx.exit()
 
     text = "Show all options and exit."

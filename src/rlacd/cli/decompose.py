@@ -19,7 +19,7 @@ from rlacd.cli.lean import import_trimesh
 from rlacd.cli.options import decompose_options, how, unit_given
 from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
-from rlacd.options.output import OutputOptions
+from rlacd.options.output import PAGES, OutputOptions
 
 ROBOTS = (".urdf", ".xml")
 IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
@@ -29,6 +29,9 @@ MESH = (
     "The mesh: obj, stl, ply, off, xyz, msh, glb, gltf, vrm, dae, zae, 3mf, usd, fbx, step, iges. It need not be "
     "closed or clean. Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced. - reads stdin."
 )
+
+REPORTS = (".json", *PAGES)
+"""What the name of a report ends in."""
 
 FROM = "What stdin holds, if IN is -: obj, stl, ...  [default: told from its content]"
 
@@ -136,7 +139,7 @@ def _write_report(wanted: OutputOptions, text: str) -> None:
 
 def is_html(path: str) -> bool:
     """Tell from its name whether a report should be a page; here, since `rlacd.view` takes time to load."""
-    return Path(path).suffix.lower() in (".html", ".htm")
+    return Path(path).suffix.lower() in PAGES
 
 
 def _rewrite(stage: Any, robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
@@ -222,7 +225,7 @@ def _check_input(mesh: Path) -> None:
 
 def _check_output(mesh: Path, wanted: OutputOptions) -> None:
     """Check that no file is written twice, that the input is never overwritten, and that the report can be written."""
-    from rlacd.io.write.target import check_file
+    from rlacd.io.write.target import checked_place
 
     seen = {_same(mesh): "the input"}
     for name, flag in (("output", "-o"), ("report", "--report"), ("picture", "--picture"), ("balls", "--balls")):
@@ -233,7 +236,7 @@ def _check_output(mesh: Path, wanted: OutputOptions) -> None:
         if place in seen:
             raise OptionError(f"{flag} {path} would overwrite {seen[place]}; choose another name.")
         if name == "report" and path != STDIO:
-            check_file(Path(path))
+            checked_place(path, "the report", REPORTS)
         seen[place] = "the hulls" if name == "output" else f"what {flag} writes"
 
 

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from enum import IntEnum
 from typing import NoReturn
 
+import click
+
 from rlacd.errors import OutputError, RlacdError, sentence_of
 
 
@@ -37,13 +39,18 @@ EPILOG = "\b\n" + inspect.cleandoc(ExitCode.__doc__ or "").replace("\n", "\n  ")
 """The end of every command's help; the mark preserves its lines."""
 
 
+INTERRUPTED = "interrupted; no file is left half-written."
+
+
 @contextlib.contextmanager
 def exit_codes() -> Iterator[None]:
     """Turn every error into one sentence on stderr and an exit code; RLACD_DEBUG=1 lets the traceback through."""
     try:
         yield
+    except (click.ClickException, click.exceptions.Exit):
+        raise  # click's own
     except KeyboardInterrupt:
-        _fail("interrupted; no file is left half-written.", ExitCode.INTERRUPTED)
+        _fail(INTERRUPTED, ExitCode.INTERRUPTED)
     except BrokenPipeError:
         _silence_stdout()  # its reader (head, jq) has closed it
         raise SystemExit(ExitCode.CANNOT_WRITE) from None

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
+
+from rlacd.cli.exit_codes import INTERRUPTED, ExitCode, leave, say
 
 NOT_OURS = ("scipy", "shapely", "rtree", "cascadio")
 """Libraries that trimesh uses where they are installed, and rlacd never needs: half of a command's time."""
@@ -17,7 +24,27 @@ def import_trimesh(mesh: Path) -> None:
     unused = (*NOT_OURS, "networkx", "lxml") if mesh.suffix.lower() in WITHOUT_GRAPHS else NOT_OURS
     hidden = [name for name in unused if name not in sys.modules]
     sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
-    import trimesh  # noqa: F401
+    with ctrl_c_at_once():
+        import trimesh  # noqa: F401
 
     for name in hidden:
         del sys.modules[name]
+
+
+@contextmanager
+def ctrl_c_at_once() -> Iterator[None]:
+    """End the process at Ctrl-C, before there is anything to write: libraries catch whatever is raised in an import."""
+
+    def end(*_: object) -> NoReturn:
+        say(f"rlacd: {INTERRUPTED}")
+        leave(ExitCode.INTERRUPTED)
+
+    previous = signal.getsignal(signal.SIGINT)
+    if previous is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)

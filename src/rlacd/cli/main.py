@@ -17,7 +17,9 @@ import click
 from click.shell_completion import get_completion_class
 
 from rlacd._version import __version__
+from rlacd.cli.commands import help_option
 from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes, give, leave, say
+from rlacd.options.keywords import meant
 from rlacd.plain_json import printable
 
 COMMANDS = ("decompose", "info", "view", "batch", "train")
@@ -26,7 +28,21 @@ COMPLETE = "_RLACD_COMPLETE"
 
 
 class Commands(click.Group):
-    """Finds a command in the module of its name, and suggests the right one if a file is given in its place."""
+    """Finds a command in the module of its name, and suggests the right one; every error becomes an exit code."""
+
+    def make_context(self, *args: Any, **more: Any) -> click.Context:
+        """Read the words before the command."""
+        with exit_codes():
+            return super().make_context(*args, **more)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Read the other words and run the command."""
+        with exit_codes():
+            return super().invoke(ctx)
+
+    def get_help_option(self, ctx: click.Context) -> click.Option:
+        """What shows the help."""
+        return help_option()
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """All commands, in the order of the help."""
@@ -47,15 +63,16 @@ class Commands(click.Group):
             typed = shlex.join(["rlacd", verb, *args])
             say(f"rlacd: {printable(word)} is not a command; did you mean  {printable(typed)}")
             raise SystemExit(ExitCode.BAD_INPUT)
+        if word not in COMMANDS and not word.startswith("-"):
+            ctx.fail(f"No such command {word!r}.{meant(word, COMMANDS)}")
         return super().resolve_command(ctx, args)
 
 
 def _print_and_exit(ctx: click.Context, param: click.Parameter, value: Any) -> None:
     if not value:
         return
-    with exit_codes():
-        complete = param.name == "show_completion" and get_completion_class(value)
-        give(complete(app, {}, "rlacd", COMPLETE).source() + "\n" if complete else f"rlacd {__version__}\n")
+    complete = param.name == "show_completion" and get_completion_class(value)
+    give(complete(app, {}, "rlacd", COMPLETE).source() + "\n" if complete else f"rlacd {__version__}\n")
     ctx.exit()
 
 
@@ -66,7 +83,6 @@ app = Commands(
     help="Approximate convex decomposition: any mesh in, few tight convex hulls out.",
     epilog=EPILOG,
     no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
     params=[
         click.Option(["--version"], is_flag=True, help="Show the version and exit.", **_EAGER),
         click.Option(
@@ -81,7 +97,7 @@ app = Commands(
 
 
 def main() -> None:
-    """Run the command line: the entry point of the ``rlacd`` script and of ``python -m rlacd``."""
+    """Run the command line."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # JSON is UTF-8, and file names hold more than a code page of Windows
         sys.stdout.reconfigure(encoding="utf-8")
     # Little of what a command allocates can be freed before it ends, so look for that rarely.

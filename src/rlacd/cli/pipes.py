@@ -30,24 +30,16 @@ def stdin_as_file(mesh: Path, ending: str | None) -> Iterator[Path]:
             raise OptionError(f"--from is the format of a mesh on stdin, not of {mesh}: give - as IN, or leave it out.")
         yield mesh
         return
-    from rlacd.io.read.open_file import LARGEST_FILE, format_of
+    from rlacd.io.read.in_memory import as_file
+    from rlacd.io.read.open_file import LARGEST_FILE
 
     content = b"" if sys.stdin is None else sys.stdin.buffer.read(LARGEST_FILE + 1)  # one more is refused as too large
     if not content.strip(b"\0 \t\r\n"):
         raise MeshFileError("stdin is empty: check what writes the mesh to it")
-    ending = (ending or format_of(content) or "").lower().removeprefix(".")
-    if ending in ("urdf", "xml"):
+    if (ending or "").lower().removeprefix(".") in ("urdf", "xml"):
         raise OptionError("a robot refers to files beside it, so it is not read from stdin: give the name of its file.")
-    if not ending.isalnum():
-        raise OptionError("what stdin holds cannot be told from its content: add --from obj, or what it is.")
-    with TemporaryDirectory(prefix="rlacd-") as folder:
-        place = Path(folder) / f"stdin.{ending}"
-        place.write_bytes(content)
-        try:
-            yield place
-        except MeshFileError as error:
-            said = str(error).replace(str(place), "stdin").replace("rename it to .", "use --from ")
-            raise MeshFileError(said) from error
+    with as_file(content, ending, "stdin", "--from ") as place:
+        yield place
 
 
 def refuse_stdin(mesh: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of
 from rlacd.cli.decompose import ROBOTS
 from rlacd.cli.exit_codes import leave, say
+from rlacd.cli.lean import ctrl_c_at_once
 from rlacd.cli.options import lengths
 from rlacd.cli.pipes import refuse_stdin
 from rlacd.errors import OptionError
@@ -35,8 +36,9 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
     refuse_stdin(mesh)
     if mesh.suffix.lower() in ROBOTS:
         raise OptionError(f"{mesh} is a robot; view shows a single mesh: give one of the meshes that it refers to.")
-    from rlacd.decompose_mesh import decompose
-    from rlacd.view.viewer import open_viewer
+    with ctrl_c_at_once():
+        from rlacd.decompose_mesh import decompose
+        from rlacd.view.viewer import open_viewer
 
     controls = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
     with open_viewer(mesh, decompose, controls, **given) as server, contextlib.suppress(KeyboardInterrupt):

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
-from rlacd.options import LENGTHS, Options
+from rlacd.options import LENGTHS
 from rlacd.options.fields import flag, integer, number, one_of, read
+from rlacd.options.keywords import suggesting
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 
@@ -37,6 +38,7 @@ class Mesh:
         self.indices = np.ascontiguousarray(indices, dtype=np.int32).reshape(-1, 3)
 
 
+@suggesting()
 def run_coacd(
     mesh: Any,
     threshold: float = 0.05,
@@ -104,7 +106,7 @@ def run_coacd(
     result = decompose(
         (mesh.vertices, mesh.indices),
         criterion="concavity",
-        threshold=Options.threshold if real_metric else max(threshold, LENGTHS["threshold"][0]),
+        threshold=None if real_metric else max(threshold, LENGTHS["threshold"][0]),
         threshold_abs=threshold if real_metric else None,
         max_hulls=None if most_hulls < 1 else most_hulls,
         max_vertices=max_ch_vertex if decimate else None,

@@ -14,6 +14,7 @@ from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
 from rlacd.options.fields import flag, integer, number, read
+from rlacd.options.keywords import suggesting
 
 __all__ = ["compute_vhacd"]
 
@@ -27,6 +28,7 @@ _UNUSED = {
 }
 
 
+@suggesting()
 def compute_vhacd(
     points: npt.ArrayLike,
     faces: npt.ArrayLike,

@@ -23,10 +23,13 @@ from rlacd.options.fields import (
     option,
     read,
     relative,
+    shown,
     stated,
 )
+from rlacd.options.keywords import unknown_option
 from rlacd.options.names import POLICIES, PRIMITIVE_KINDS, PrimitiveKind, policy_name, read_policy, read_primitives
 from rlacd.options.navigable import NavigableSpace
+from rlacd.options.output import OutputOptions
 from rlacd.options.presets import PRESETS, HullLimits, PresetName, find_preset
 
 CRITERIA = {
@@ -263,22 +266,46 @@ class Options:
             object.__setattr__(self, "criterion", "concavity" if self.threshold_abs is None else "distance")
         if self.quality is None:  # searching means merging
             object.__setattr__(self, "quality", "balanced" if self.merge else FAST)
-        for name, rule in self._conflicts():
-            raise OptionError(f"{name} is {getattr(self, name)!r}; it has to be {rule}.")
 
-    def _conflicts(self) -> Iterator[tuple[str, str]]:
-        """Options that others exclude, and what they have to be instead."""
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Options:
+        """Check options as somebody gave them, where None stands for one that was not given.
+
+        Raises
+        ------
+        OptionError
+            A value is of the wrong type or out of its range, or another one that was given overrides it.
+        TypeError
+            There is no such option.
+        """
+        given = {name: value for name, value in given.items() if value is not None}
+        for name in given:
+            if name not in OPTION_NAMES:
+                raise unknown_option("decompose", name, OPTION_NAMES, ELSEWHERE)
+        options = cls(**given)
+        for name, rule in options._overridden():
+            if name in given:
+                raise OptionError(f"{name} is {shown(given[name])}; it has to be {rule}.")
+        return options
+
+    def _overridden(self) -> Iterator[tuple[str, str]]:
+        """Options that have no effect beside others, and what they have to be instead."""
         for needed, names in _OWN.items():
-            for name in names:
-                if needed not in self.numbers and getattr(self, name) != getattr(type(self), name):
-                    instead = " and ".join(word.removeprefix("volume_") for word in self.numbers)
-                    yield name, f"left out: the criterion {self.criterion_name} has {instead} instead"
+            instead = " and ".join(word.removeprefix("volume_") for word in self.numbers)
+            if needed not in self.numbers:
+                yield from ((n, f"left out: the criterion {self.criterion_name} has {instead} instead") for n in names)
         if self.per_node and self.criterion_name == "navigable":
             yield "per_node", "left out: navigable space is that of the whole scene"
-        if self.keep_open is not None and self.keep_open_abs is not None:
-            yield "keep_open", "left out with keep_open_abs, a radius instead of a share"
-        for name in ("budget", "search_steps"):
-            if self.quality == FAST and getattr(self, name) is not None:
+        for name in (*LENGTHS, "keep_open"):
+            if getattr(self, f"{name}_abs") is not None:
+                yield name, f"left out with {name}_abs, a length in the input's unit"
+        shares = [name for name in LENGTHS if getattr(self, f"{name}_abs") is None and getattr(self, name) > 0]
+        if not self.per_node:
+            yield "relative_to", "left out without per_node"
+        elif not [name for name in shares if name not in _OWN or name in self.numbers]:
+            yield "relative_to", "left out: no length is a share of the longest side"
+        if self.quality == FAST:
+            for name in ("budget", "search_steps"):
                 yield name, "left out with quality='fast', which does not search"
         if not self.merge and self.quality != FAST:
             yield "quality", "'fast', or left out, without merge: searching includes merging"
@@ -360,5 +387,8 @@ class Options:
                 lengths[name] = min(max(getattr(of_scene, name) * node / scene, least), most)
         return dataclasses.replace(self, threshold_abs=None, overlap_abs=None, **lengths)
 
+
+ELSEWHERE = (NavigableSpace, OutputOptions)
+"""Options that the command line has beside those of a decomposition."""
 
 OPTION_NAMES = tuple(field.name for field in dataclasses.fields(Options))

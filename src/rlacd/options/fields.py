@@ -249,6 +249,12 @@ def about(options: Any, name: str) -> About:
     return known
 
 
+def stated_in(options: Any, name: str) -> str:
+    """How Python gives an option of a dataclass; empty if it has none of that name, or Python none."""
+    fields = {field.name: field.metadata["option"] for field in dataclasses.fields(options)}
+    return fields[name].python or "" if name in fields else ""
+
+
 def check_fields(options: Any) -> None:
     """Check every field of a frozen dataclass declared with `option`, and put plain values in their place.
 

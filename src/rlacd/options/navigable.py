@@ -15,6 +15,9 @@ Point: TypeAlias = tuple[float, float, float]
 SHARES = (1e-4, 10.0)
 """Shares of the longest side that radius and tolerance may be: less takes no end of balls, more fills everything."""
 
+USUAL = {"radius": 0.025, "tolerance": 0.05}
+"""Where neither the share nor the length is given."""
+
 LARGEST_COORDINATE = 1e100
 """Coordinates: of larger ones, products would be infinite."""
 
@@ -88,8 +91,8 @@ class NavigableSpace:
         A value is of the wrong type or out of its range.
     """
 
-    radius: float | None = option(0.025, kind=_SHARE, metavar="NUMBER")
-    tolerance: float | None = option(0.05, kind=_SHARE, metavar="NUMBER")
+    radius: float | None = option(None, kind=_SHARE, metavar="NUMBER", usual=f"{USUAL['radius']:g}")
+    tolerance: float | None = option(None, kind=_SHARE, metavar="NUMBER", usual=f"{USUAL['tolerance']:g}")
     reachable_only: bool = option(True, keyword=True, flags=("--reachable-only/--everywhere",), usual="reachable-only")
     seeds: tuple[Point, ...] | None = option(
         None, kind=_SEEDS, keyword=True, flags=("--seed-point",), metavar="X,Y,Z", repeated=True, usual="outside"
@@ -101,16 +104,13 @@ class NavigableSpace:
     tolerance_abs: float | None = option(None, kind=LENGTH, keyword=True)
 
     def __post_init__(self) -> None:
-        absolute = [name for name in ("radius", "tolerance") if getattr(self, f"{name}_abs") is not None]
-        for name in absolute:
-            if getattr(self, name) not in (None, getattr(type(self), name)):
-                raise OptionError(
-                    f"{name} is {getattr(self, name)!r}; it has to be left out with {name}_abs, its length."
-                )
-            object.__setattr__(self, name, SHARES[1])  # anything in range, for the check
         check_fields(self)
-        for name in absolute:
-            object.__setattr__(self, name, None)
+        for name, usual in USUAL.items():
+            share, length = getattr(self, name), getattr(self, f"{name}_abs")
+            if share is not None and length is not None:
+                raise OptionError(f"{name} is {share!r}; it has to be left out with {name}_abs, its length.")
+            if share is None and length is None:
+                object.__setattr__(self, name, usual)
 
     def in_frame(self, scale: float) -> tuple[float, float]:
         """Get radius and tolerance in the frame where the longest side is 2; `scale` is its units per the input's.

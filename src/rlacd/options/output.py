@@ -13,6 +13,9 @@ Axis = Literal["x", "y", "z"]
 DENSITY = 1000.0
 """Water's, where the unit is a metre."""
 
+PAGES = (".html", ".htm")
+"""What the name of a report that is a page ends in."""
+
 
 def _folders(given: Any) -> list[str]:
     if not isinstance(given, (list, tuple)) or not all(isinstance(word, str) for word in given):
@@ -55,8 +58,7 @@ class OutputOptions:
     package_dirs
         Where a robot's package://NAME/ is; a FOLDER alone may be read and holds packages. May be repeated.
     report
-        Write all measurements as JSON, or as an HTML page if the name ends in .html; - writes JSON to stdout, and
-        nothing else there.
+        Write all measurements: .json, or .html for a page; - writes JSON to stdout, and nothing else there.
     picture
         Draw the input beside its hulls, together and pulled apart. Needs the extra rlacd[view].
     balls
@@ -103,5 +105,5 @@ class OutputOptions:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.mass is not None and self.density not in (None, DENSITY):
+        if self.mass is not None and self.density is not None:
             raise OptionError(f"density is {self.density}; it has to be left out with mass, that of the whole body.")

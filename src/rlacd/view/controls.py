@@ -42,7 +42,7 @@ def read_controls(given: dict[str, Any]) -> dict[str, Any]:
         if name not in CONTROLS:
             raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(CONTROLS))}.")
     controls = {name: usual if given.get(name) is None else given[name] for name, usual in CONTROLS.items()}
-    Options(**options_of(controls))
+    Options.of(options_of(controls))
     return controls
 
 

@@ -11,6 +11,7 @@ from rlacd._version import __version__
 from rlacd.errors import MissingExtraError
 from rlacd.io.write import write_file
 from rlacd.io.write.target import checked_place
+from rlacd.options.output import PAGES
 from rlacd.result import Result
 from rlacd.view.heat import heat_map
 from rlacd.view.page import still_page
@@ -27,7 +28,7 @@ def save_report_page(
     note says so.
     """
     check_up(up)
-    place = checked_place(path, "the report", (".html", ".htm"))
+    place = checked_place(path, "the report", PAGES)
     write_file(place, report_page(decomposition, up=up, picture=picture).encode())
     return place
 

@@ -7,7 +7,7 @@ names, those that engines go by and `--keep-input` gives, tell them.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +31,9 @@ LONGEST_NAME = 1000
 
 DEEPEST_PART = 20
 """Depth of nested instances: the cost of an instance grows with the cube of its depth."""
+
+
+HIDDEN = "hidden nodes were left out, with those below them"
 
 
 class Triangles(NamedTuple):
@@ -66,6 +69,11 @@ def one_shape(name: str, vertices: FloatArray, faces: Int64Array | None = None) 
     """The geometry of a file without a scene."""
     faces = np.empty((0, 3), dtype=np.int64) if faces is None else faces
     return [(SourceNode(name, name, np.eye(4)), Triangles(vertices, faces))]
+
+
+def counts_of(left_out: Mapping[str, int]) -> list[str]:
+    """A sentence for each kind of content that was left out, with how often it was."""
+    return [f"{what}: {count}" for what, count in left_out.items() if count]
 
 
 def damaged(path: Path, kind: str, why: str = "") -> MeshFileError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, ToldNodes, read_apart, served
-from rlacd.io.read.contents import Contents, Triangles, damaged
+from rlacd.io.read.contents import HIDDEN, Contents, Triangles, counts_of, damaged
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Values
 
@@ -73,7 +74,7 @@ def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
     said = dict.fromkeys(text.format(path.name) for name, text in _UNREAD.items() if len(getattr(scene, name)))
     said |= dict.fromkeys(f"{path.name}: {one.description}" for one in scene.metadata.warnings)
     nodes, left_out = _shown(scene)
-    said |= {f"{what} of {path.name} were left out: {count}": None for what, count in left_out.items() if count}
+    said |= dict.fromkeys(counts_of(left_out))
     told = ToldNodes(path)
     for index, (node, mesh) in enumerate(nodes):
         to_world = np.vstack([np.array(node.geometry_to_world).T, (0, 0, 0, 1)])
@@ -91,25 +92,26 @@ def _is_plain(axes: np.ndarray[Any, Any]) -> bool:
     return bool(axes[1] % 2 == 0 and np.linalg.det(rows) > 0)
 
 
-def _shown(scene: Any) -> tuple[list[tuple[Any, Any]], dict[str, int]]:
+def _shown(scene: Any) -> tuple[list[tuple[Any, Any]], Counter[str]]:
     """The nodes that place a mesh, with it; and how many were left out, by the reason."""
     import ufbx
 
-    found, gone = [], dict[int, str]()
+    found, gone, left_out = [], set[int](), Counter[str]()
     for node in scene.nodes:  # a parent comes before its children
         mesh, parent, number = node.mesh, node.parent, node.typed_id
         _KEPT.append((node, mesh, parent))
-        if parent is not None and parent.typed_id in gone:
-            gone[number] = gone[parent.typed_id]
-        elif not node.visible:
-            gone[number] = "invisible nodes"
-        elif parent is not None and parent.attrib_type == ufbx.ElementType.LOD_GROUP:
+        why = "" if node.visible else HIDDEN
+        if not why and parent is not None and parent.attrib_type == ufbx.ElementType.LOD_GROUP:
             _KEPT.append(first := parent.children[0])
-            if first.typed_id != number:
-                gone[number] = "lower levels of detail"
-        if mesh is not None and number not in gone:
+            why = "lower levels of detail were left out" if first.typed_id != number else ""
+        if parent is not None and parent.typed_id in gone:
+            gone.add(number)
+        elif why:
+            gone.add(number)
+            left_out[why] += 1
+        elif mesh is not None:
             found.append((node, mesh))
-    return found, {what: list(gone.values()).count(what) for what in gone.values()}
+    return found, left_out
 
 
 def _triangles(mesh: Any) -> Triangles:

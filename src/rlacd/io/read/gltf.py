@@ -13,7 +13,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.beside import FolderFiles
-from rlacd.io.read.contents import MOST_PLACES, Contents, Triangles
+from rlacd.io.read.contents import HIDDEN, MOST_PLACES, Contents, Triangles, counts_of
 from rlacd.io.read.draco import DRACO, decode_draco
 from rlacd.io.read.gltf_arrays import Arrays, Json, item
 from rlacd.io.read.open_file import JSON_CHUNK, MAGIC
@@ -136,11 +136,10 @@ class _Scene:
         unread = (*LINES, *POINTS) if solid else LINES
         said = {
             "primitives that are points or lines were left out": sum(mode in unread for mode in modes),
-            "hidden nodes were left out, with those below them": self._hidden,
+            HIDDEN: self._hidden,
             "meshes with a skin but without joints were placed by their nodes": len(self._unjointed),
         }
-        warnings = [f"{what}: {count}" for what, count in said.items() if count]
-        return [(node, shape) for node, shape in found if len(shape.vertices)], warnings
+        return [(node, shape) for node, shape in found if len(shape.vertices)], counts_of(said)
 
     def _shown(self) -> list[int]:
         """The nodes of the scene, by index."""

@@ -10,21 +10,26 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import IO, TypeAlias
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError
+from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError, OptionError
 from rlacd.io.read import function_of
 from rlacd.io.read.contents import Contents, damaged, one_shape, require_few, without_engine_hulls
+from rlacd.io.read.in_memory import is_in_memory, opened
 from rlacd.io.read.open_file import CONVERTERS, NO_MESHES, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
+from rlacd.options.fields import shown
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, heights
 from rlacd.solid.input_mesh import Asset, InputMesh
 
-Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
+Source: TypeAlias = (
+    "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
+    " | ArrayLike | IO[bytes]"
+)
 
 READERS = {
     "obj": "read.obj:read_obj",
@@ -46,16 +51,21 @@ FORMATS = tuple(READERS)
 """The formats that are read."""
 
 
-def load_mesh(source: Source) -> InputMesh:
+def load_mesh(source: Source, faces: ArrayLike | None = None, file_type: str | None = None) -> InputMesh:
     """Read a mesh of any format and bring all its bodies into one list of triangles.
 
     Parameters
     ----------
     source
         A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, fbx, step, iges, usd), a mesh or scene of
-        trimesh, or vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of
-        a geometry is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces.
-        Nodes of a scene that are hulls for an engine, by their names, are left out with a warning if there are others.
+        trimesh, a list of meshes, a file that is open in binary mode or its bytes, or vertices ``[V, 3]`` with faces
+        ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed by its transform.
+        Paths and curves are ignored; point clouds give vertices without faces. Nodes of a scene that are hulls for an
+        engine, by their names, are left out with a warning if there are others.
+    faces
+        Of vertices that are the source.
+    file_type
+        The format of an open file or of bytes, where neither its name nor its content tells it.
 
     Returns
     -------
@@ -73,11 +83,24 @@ def load_mesh(source: Source) -> InputMesh:
     MissingExtraError
         The extra that reads the file is not installed: ``fbx``, ``usd``, ``cad`` for STEP and IGES, ``draco``.
     """
+    if faces is not None:
+        if isinstance(source, str | os.PathLike | trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
+            raise MeshDataError(
+                "what follows the mesh are faces, of vertices in its place: give options by their names"
+            )
+        source = (source, faces)
+    if is_in_memory(source):
+        with opened(source, file_type) as place:
+            return load_mesh(place)
+    if file_type is not None:
+        raise OptionError(f"file_type is {shown(file_type)}; it has to be left out, except for an open file or bytes.")
     if isinstance(source, os.PathLike):
         source = os.fspath(source)  # bytes are refused below
     if isinstance(source, str):
         path = Path(source)
         return without_engine_hulls(_baked(path.name, _read(path)))
+    if isinstance(source, list) and source and all(isinstance(one, trimesh.Trimesh) for one in source):
+        source = trimesh.Scene(source)
     arrays_of, geometry_of = (function_of(f"read.trimesh_scene:{name}") for name in ("arrays_of", "geometry_of"))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind, looks = type(source).__name__, hasattr(source, "geometry") or getattr(source, "visual", None)
@@ -86,7 +109,7 @@ def load_mesh(source: Source) -> InputMesh:
     if isinstance(source, tuple) and len(source) == 2:
         return replace(_baked("arrays", Contents(one_shape("arrays", *arrays_of(*source)))), nodes=(), node_of=None)
     raise MeshDataError(
-        f"cannot take a mesh from {type(source).__name__}: give a path, a trimesh object or (vertices, faces)"
+        f"cannot take a mesh from {type(source).__name__}: give a path, a trimesh object or vertices and faces"
     )
 
 

@@ -31,6 +31,7 @@ _KINDS = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
+_AXES = ("x", "y", "z")
 _CORNERS = ("vertex_indices", "vertex_index")
 _TEXT = re.compile(rb"(?:^|[\r\n])format\s+ascii\b", re.IGNORECASE)
 _END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
@@ -63,51 +64,52 @@ class _Element:
 def _rows(body: bytes, at: int, element: _Element) -> tuple[Int64Array, dict[str, Any]]:
     """Where each row begins and the last one ends; by property its numbers, or the lengths and the items of its lists.
 
-    If not all lists are as long as those of the first row, they are found one by one, and numbers are passed over.
+    If not all lists are as long as those of the first row, they are found one by one, and of numbers coordinates only.
     """
-    _, lists = _walked(body, at, element, min(element.count, 1))
+    _, first = _walked(body, at, element, min(element.count, 1))
     fields: list[Any] = []
     for name, (kind, length) in element.properties.items():
         fields += [] if length is None else [(_LENGTH + name, length)]
-        fields += [(name, kind)] if length is None else [(name, kind, sum(map(len, lists[name])))]
+        fields += [(name, kind)] if length is None else [(name, kind, sum(map(len, first[name])))]
     record = np.dtype(fields)
     begins = at + record.itemsize * np.arange(element.count + 1)
+    lists = {name for name, (_, length) in element.properties.items() if length is not None}
     if element.count and begins[-1] <= len(body):
         rows = np.frombuffer(body, record, element.count, at)
         counts = {name: rows[_LENGTH + name] for name in lists}
-        if all((counts[name] == len(items)).all() for name, (items,) in lists.items()):
+        if all((counts[name] == len(first[name][0])).all() for name in lists):
             return begins, {
-                name: (counts[name].astype(np.int64), whole(rows[name]).ravel()) if name in lists else rows[name]
+                name: (counts[name].astype(np.int64), rows[name].ravel()) if name in lists else rows[name]
                 for name in element.properties
             }
-    begins, lists = _walked(body, at, element, element.count)
+    begins, found = _walked(body, at, element, element.count)
     return begins, {
-        name: (np.array([len(one) for one in items]), whole(np.concatenate(items)))
-        for name, items in lists.items()
+        name: (np.array([len(one) for one in items]), np.concatenate(items)) if name in lists else np.concatenate(items)
+        for name, items in found.items()
         if items
     }
 
 
 def _walked(body: bytes, at: int, element: _Element, rows: int) -> tuple[Int64Array, dict[str, list[npt.NDArray[Any]]]]:
-    """Where each of some rows begins and the last one ends, and the lists of each name."""
+    """Where each of some rows begins and the last one ends, and the lists and coordinates of each name."""
     begins = [at]
-    lists: dict[str, list[npt.NDArray[Any]]] = {
-        name: [] for name, (_, length) in element.properties.items() if length is not None
+    found: dict[str, list[npt.NDArray[Any]]] = {
+        name: [] for name, (_, length) in element.properties.items() if length is not None or name in _AXES
     }
     for _ in range(rows):
         for name, (kind, length) in element.properties.items():
-            if length is None:
-                at += kind.itemsize
-                continue
-            if (count := int(np.frombuffer(body, length, 1, at)[0])) < 0:
-                raise ValueError(f"a list of {count}")
-            at += length.itemsize
-            lists[name].append(np.frombuffer(body, kind, count, at))
+            count = 1
+            if length is not None:
+                if (count := int(np.frombuffer(body, length, 1, at)[0])) < 0:
+                    raise ValueError(f"a list of {count}")
+                at += length.itemsize
+            if name in found:
+                found[name].append(np.frombuffer(body, kind, count, at))
             at += kind.itemsize * count
         if at > len(body):
             raise ValueError(f"its header declares {element.count} lines")
         begins.append(at)
-    return np.array(begins), lists
+    return np.array(begins), found
 
 
 def read_ply(path: Path, content: bytes) -> Contents:
@@ -129,17 +131,19 @@ def read_ply(path: Path, content: bytes) -> Contents:
     if is_text:  # read as binary with eight bytes for each number
         numbers, counts = rows_of(body.rstrip() + b"\n")
         body, lines = numbers.astype("<f8").tobytes(), 8 * np.append(0, np.cumsum(counts[counts > 0]))
-    points, faces = np.empty((0, 3)), [np.empty((0, 3), dtype=np.int64)]
+    values: dict[str, dict[str, Any]] = {}
     at = 0
     for name, element in elements.items():
-        begins, values = _rows(body, at, element)
+        begins, values[name] = _rows(body, at, element)
         if lines is not None and not np.array_equal(lines[np.searchsorted(lines, at) :][: element.count + 1], begins):
             raise ValueError(f"a {name} line of another length than its header declares")
         at = int(begins[-1])
-        if name == "vertex" and element.count:
-            points = np.stack([values[axis].astype(np.float64) for axis in "xyz"], axis=1)
-        elif name in ("face", STRIPS) and element.count:
-            faces.append(_triangles(values, name == STRIPS, points))
+    points, faces = np.empty((0, 3)), [np.empty((0, 3), dtype=np.int64)]
+    if (vertices := values.get("vertex")) and elements["vertex"].count:
+        points = np.stack([vertices[axis].astype(np.float64) for axis in _AXES], axis=1)
+    for name in ("face", STRIPS):
+        if name in values and elements[name].count:
+            faces.append(_triangles(values[name], name == STRIPS, points))
     described = _DESCRIBED.search(header) is not None and STRIPS not in elements
     asset = Asset(content, path, "ply") if described and header.count(b"\n") < MOST_FIELDS else None
     return Contents(one_shape(path.stem, points, np.concatenate(faces)), asset=asset)
@@ -195,7 +199,7 @@ def _triangles(values: dict[str, Any], are_strips: bool, points: FloatArray) -> 
     lists = [values[name] for name in _CORNERS if isinstance(values.get(name), tuple)]
     if not lists:
         raise ValueError("its faces have no list vertex_indices")
-    counts, corners = lists[0]
+    counts, corners = lists[0][0], whole(lists[0][1])
     if are_strips:  # -1 ends a strip as well
         strips = [
             strip_triangles(part[part >= 0])

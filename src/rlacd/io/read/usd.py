@@ -13,7 +13,7 @@ SERVER = "rlacd.io.read.usd_stage:read_stage"
 def read_usd(path: Path, _: bytes) -> Contents:
     """Read a stage: a node for each mesh.
 
-    Invisible prims and those for other purposes than to be rendered (guides, proxies) are left out. Subdivision
+    Invisible prims, guides and proxies are left out with a warning, faces that are holes without one. Subdivision
     surfaces are read as their cages. A mesh has the colours and the surface of its material, without pictures.
 
     Raises

@@ -5,6 +5,8 @@ A stage may name other files. They are read only from the folder of the file or 
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, ToldNodes, served
-from rlacd.io.read.contents import Triangles, damaged
+from rlacd.io.read.contents import HIDDEN, Triangles, counts_of, damaged
 from rlacd.io.read.open_file import read_file
 from rlacd.io.read.polygons import triangles_of
 from rlacd.pool import Blobs, Values
@@ -45,19 +47,23 @@ def read_stage(values: Values, blobs: Blobs) -> Answered:
     check_files(path)
     stage = Usd.Stage.Open(str(path))
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
-    nodes = ToldNodes(path)
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+    nodes, left_out = ToldNodes(path), Counter[str]()
+    prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for prim in prims:
         if prim.IsA(UsdGeom.PointInstancer):
             raise MeshFileError(f"{path} has a point instancer, which is not read: convert its instances to meshes")
-        if not _is_rendered(prim):
+        if (why := _left_out(prim)) is not None:
+            left_out[why] += 1
+            if why == HIDDEN:
+                prims.PruneChildren()
             continue
         if not prim.IsA(UsdGeom.Mesh) and str(prim.GetTypeName()) not in PRIMITIVES:
             continue
         to_world = np.array(cache.GetLocalToWorldTransform(prim), dtype=np.float64).T
         names = prim.GetName(), str(prim.GetPath())
         nodes.add(names, to_world, _look(prim), Triangles(*prim_geometry(path, prim)))
-    up = str(UsdGeom.GetStageUpAxis(stage)).lower()
-    return {"nodes": nodes.values, "up": up, "metres": float(UsdGeom.GetStageMetersPerUnit(stage))}, nodes.blobs
+    up, metres = str(UsdGeom.GetStageUpAxis(stage)).lower(), float(UsdGeom.GetStageMetersPerUnit(stage))
+    return {"nodes": nodes.values, "up": up, "metres": metres, "warnings": counts_of(left_out)}, nodes.blobs
 
 
 def _look(prim: Any) -> dict[str, list[float]] | None:
@@ -89,7 +95,7 @@ def check_files(path: Path) -> None:
         layer = Sdf.Layer.FindOrOpen(waiting.pop())
         if layer is None:
             raise damaged(path, "USD")
-        for named in filter(None, layer.GetCompositionAssetDependencies()):  # a file may refer to its own prims
+        for named in _named(path, layer):
             found = layer.ComputeAbsolutePath(named)
             if found in known:
                 continue
@@ -104,11 +110,28 @@ def check_files(path: Path) -> None:
             waiting.append(found)
 
 
-def _is_rendered(prim: Any) -> bool:
-    shown = UsdGeom.Imageable(prim)
-    if not prim.IsA(UsdGeom.Gprim) or shown.ComputeVisibility() == UsdGeom.Tokens.invisible:
-        return False
-    return shown.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+def _named(path: Path, layer: Any) -> list[str]:
+    """The files that a layer names and OpenUSD opens: sublayers, references, payloads, and clips of values."""
+    found = [named for named in layer.GetCompositionAssetDependencies() if named]  # it may refer to its own prims
+    paths: list[Any] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    prims = (layer.GetPrimAtPath(one) for one in paths if one.IsPrimPath() or one.IsPrimVariantSelectionPath())
+    for clip in itertools.chain.from_iterable(prim.GetInfo("clips").values() for prim in prims if prim):
+        if "templateAssetPath" in clip:
+            raise MeshFileError(f"{path} has clips of values by a template, which are not read: flatten it first")
+        found += [one.path for one in [*clip.get("assetPaths", ()), clip.get("manifestAssetPath")] if one]
+    return found
+
+
+def _left_out(prim: Any) -> str | None:
+    """Why a prim is not shown; None if it is, or if it has nothing to show."""
+    if not prim.IsA(UsdGeom.Imageable):
+        return None
+    imageable = UsdGeom.Imageable(prim)
+    if imageable.ComputeVisibility() == UsdGeom.Tokens.invisible:
+        return HIDDEN
+    shown = imageable.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+    return "guides and proxies were left out" if prim.IsA(UsdGeom.Gprim) and not shown else None
 
 
 def prim_geometry(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
@@ -122,10 +145,17 @@ def _mesh(path: Path, prim: Any) -> tuple[FloatArray, np.ndarray[Any, Any]]:
     points = np.asarray(_value(mesh.GetPointsAttr()) or (), dtype=np.float64)
     counts = np.asarray(_value(mesh.GetFaceVertexCountsAttr()) or (), dtype=np.int64)
     corners = np.asarray(_value(mesh.GetFaceVertexIndicesAttr()) or (), dtype=np.int64)
+    holes = np.asarray(_value(mesh.GetHoleIndicesAttr()) or (), dtype=np.int64)
     if (counts < 0).any() or counts.sum() != len(corners):
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} that are inconsistent: export it again")
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise MeshFileError(f"{path} has faces at {prim.GetPath()} that refer to missing points: export it again")
+    if len(holes):
+        if holes.min() < 0 or holes.max() >= len(counts):
+            raise MeshFileError(f"{path} has holes at {prim.GetPath()} that are none of its faces: export it again")
+        kept = np.ones(len(counts), dtype=bool)
+        kept[holes] = False
+        counts, corners = counts[kept], corners[np.repeat(kept, counts)]
     positions = points.reshape(-1, 3)
     faces = triangles_of(positions, counts, corners)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:

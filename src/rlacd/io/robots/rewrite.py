@@ -27,7 +27,7 @@ from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
-from rlacd.options import LENGTHS
+from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
 from rlacd.solid.frame import Frame
@@ -119,6 +119,7 @@ def rewrite_robot(
         The place cannot be written to.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
+    _check_options(options)
     if source.suffix.lower() in usd.ENDINGS:
         _check_place(source, place, usd.ENDINGS)
         return rewrite_stage(usd.read_colliders(source), place, options, keep_input=keep_input)
@@ -126,7 +127,6 @@ def rewrite_robot(
         raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     kind, root, folder = _opened(source, place)
-    _check_options(options)
     references = References(source, packages)
     plan, warnings = _plan(root, kind, references, place, folder)
     if not plan.uses:
@@ -195,6 +195,7 @@ def _opened(source: Path, place: Path) -> tuple[str, Element, Path]:
 
 
 def _check_options(options: Mapping[str, Any]) -> None:
+    Options.of({name: value for name, value in options.items() if name != "progress"})
     for name in ("unit", "scale", "per_node"):
         if options.get(name):
             raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")

@@ -29,7 +29,7 @@ from rlacd.io.write.model import (
 )
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, hull_target, mesh_folder
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
-from rlacd.options.output import DENSITY, OutputOptions
+from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 
 __all__ = ["FORMATS", "MODELS", "file_stem", "hull_target", "save", "write_file"]
@@ -57,7 +57,7 @@ def save(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
     asked = OutputOptions(**options)
     target = hull_target(path, asked)
     ending = target.path.suffix.lower().lstrip(".")
-    unused = [name for name in ("density", "mass") if getattr(asked, name) not in (None, DENSITY)]
+    unused = [name for name in ("density", "mass") if getattr(asked, name) is not None]
     if unused and target.file_format not in SIMULATED:
         warnings.warn(f"{unused[0]} had no effect: {target.path.name} holds no mass", UserWarning, stacklevel=3)
     if (data := _with_scene(result, target.file_format, ending, bool(asked.keep_input))) is not None:

@@ -25,7 +25,7 @@ def check_balls(path: str | os.PathLike[str]) -> Path:
     OutputError
         The place cannot be written to.
     """
-    return checked_place(path, "the balls", _ENCODERS)
+    return checked_place(path, "the balls", [*_ENCODERS])
 
 
 def save_balls(balls: Balls, path: str | os.PathLike[str]) -> Path:

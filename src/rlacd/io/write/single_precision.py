@@ -66,7 +66,7 @@ def required_hull(hull: Triangulated, name: str, where: str) -> tuple[Triangles,
     Raises
     ------
     OutputError
-        It is too thin for its size even about its own centre; the message says its name and where it was to go.
+        It is too large, small or thin even about its own centre; the message says its name and where it was to go.
     """
     shift = np.zeros(3)
     rounded = rounded_hull(hull)
@@ -74,7 +74,10 @@ def required_hull(hull: Triangulated, name: str, where: str) -> tuple[Triangles,
         shift = (hull.vertices.min(axis=0) + hull.vertices.max(axis=0)) / 2
         rounded = rounded_hull(hull, shift)
     if rounded is None:
-        said = f"cannot write {name} {where}: it is too thin for single precision"
+        size = float(np.ptp(hull.vertices, axis=0).max())
+        single = np.finfo(np.float32)
+        misfit = "large" if size / 2 > single.max else "small" if size < single.tiny else "thin"
+        said = f"cannot write {name} {where}: it is too {misfit} for single precision"
         raise OutputError(f"{said}; scale the mesh, or write .obj, .ply or .stl in double precision.")
     return rounded, shift
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -162,7 +162,7 @@ def check_file(path: Path) -> None:
         _check_parent(path)
 
 
-def checked_place(path: str | os.PathLike[str], what: str, endings: Collection[str]) -> Path:
+def checked_place(path: str | os.PathLike[str], what: str, endings: Sequence[str]) -> Path:
     """Check, before any work, that a file with one of some endings can be written, the first of which is named.
 
     Raises
@@ -174,7 +174,8 @@ def checked_place(path: str | os.PathLike[str], what: str, endings: Collection[s
     """
     place = Path(read(path_like(), "path", path))
     if place.suffix.lower() not in endings:
-        raise OptionError(f"cannot write {what} {shown(str(place))}: it must end in {' or '.join(endings)}; rename it.")
+        known = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
+        raise OptionError(f"cannot write {what} {shown(str(place))}: it must end in {known}; rename it.")
     check_file(place)
     return place
 
