@@ -76,7 +76,7 @@ def make_report(
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
-        stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
+        weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         if has_surface and apart is None:
             warnings += _unmeasured(solid)
@@ -101,7 +101,7 @@ def make_report(
             "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
             "passages": apart and apart.passages,
             "scale": solid.frame.scale,
-            "mass": mass_of(*concatenated(stands_for_mass), solid.frame).as_plain(),
+            "mass": mass_of(*concatenated(weighed), solid.frame).as_plain(),
             "repair": [{**vars(body)} for body in solid.bodies],
             "holes": _holes(solid),
             "search": reached.found and reached.found.as_plain(),

@@ -16,14 +16,14 @@ from collections.abc import Callable
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import face_areas, poll_stop, signed_tetrahedra
+from rlacd._native import face_areas, poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes, may_have_holes
 from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
-from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
+from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.wraps import (
@@ -62,17 +62,6 @@ def _sort_out(state: State) -> None:
     state.soup = trust_windings(state.soup, state.bodies)
 
 
-def _unite(state: State) -> None:
-    """Unite all parts and fill their cavities."""
-    shapes = [part.shape for part in state.parts]
-    if not state.wanted.keep_cavities:
-        state.solid = unite(shapes)
-        return
-    soup = state.soup
-    inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), state.bodies) < 0
-    state.solid = unite_around_cavities(shapes, [bool(inward[part.body]) for part in state.parts])
-
-
 def _is_nothing(state: State) -> bool:
     return state.volume == 0
 
@@ -108,7 +97,7 @@ STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (_always, build_walls),
     (is_crowd, wrap_sheets),
     (has_sheets, build_slabs),
-    (_always, _unite),
+    (_always, State.unite_parts),
     (is_inside_out, rebuild_tangles),
     (may_have_rooms, fill_rooms),
     (may_have_slits, fill_slits),
@@ -149,7 +138,7 @@ def repair(
     threads
         Number of threads that measure distances; all cores by default. The result does not depend on it.
     keep_cavities
-        Keep sealed rooms empty: those that a union encloses, and closed bodies wound opposite to the body around them.
+        Keep closed cavities empty: those that a union encloses, and closed bodies wound against the body around them.
         A closed sheet without thickness still becomes a solid.
 
     Returns

@@ -84,6 +84,8 @@ class InputMesh:
         What the input's coordinates were multiplied by.
     left_out
         Nodes of the asset whose triangles were left out: hulls for an engine, which new ones replace.
+    deviation
+        How far the triangles may be from the curved surfaces that the input describes; None if it holds triangles.
     """
 
     vertices: FloatArray
@@ -97,6 +99,7 @@ class InputMesh:
     asset: Asset | None = None
     factor: float = 1.0
     left_out: tuple[SourceNode, ...] = ()
+    deviation: float | None = None
 
     @property
     def unit(self) -> str:
@@ -105,7 +108,8 @@ class InputMesh:
 
     def scaled(self, factor: float) -> InputMesh:
         """Multiply all coordinates."""
-        return replace(self, vertices=self.vertices * factor, factor=self.factor * factor)
+        deviation = None if self.deviation is None else self.deviation * factor
+        return replace(self, vertices=self.vertices * factor, factor=self.factor * factor, deviation=deviation)
 
     def of_node(self, index: int) -> InputMesh:
         """Get only the triangles that one node places, and the vertices that they use."""

@@ -18,13 +18,16 @@ from numpy.typing import ArrayLike
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import Contents, damaged, one_shape, require_few, without_engine_hulls
+from rlacd.io.read.contents import USUAL, Contents, Fineness, damaged, one_shape, require_few, without_engine_hulls
 from rlacd.io.read.open_file import CONVERTERS, NO_MESHES, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, heights
 from rlacd.solid.input_mesh import Asset, InputMesh
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
+
+CURVED = ("step", "stp", "iges", "igs")
+"""The formats that hold surfaces instead of triangles."""
 
 READERS = {
     "obj": "read.obj:read_obj",
@@ -36,7 +39,7 @@ READERS = {
     **dict.fromkeys(("dae", "zae"), "read.collada:read_collada"),
     "3mf": "read.threemf:read_3mf",
     "fbx": "read.fbx:read_fbx",
-    **dict.fromkeys(("step", "stp", "iges", "igs"), "read.cad:read_cad"),
+    **dict.fromkeys(CURVED, "read.cad:read_cad"),
     "xyz": "read.simple_formats:read_xyz",
     **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "read.usd:read_usd"),
 }
@@ -46,7 +49,7 @@ FORMATS = tuple(READERS)
 """The formats that are read."""
 
 
-def load_mesh(source: Source) -> InputMesh:
+def load_mesh(source: Source, fineness: Fineness = USUAL) -> InputMesh:
     """Read a mesh of any format and bring all its bodies into one list of triangles.
 
     Parameters
@@ -56,6 +59,8 @@ def load_mesh(source: Source) -> InputMesh:
         trimesh, or vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of
         a geometry is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces.
         Nodes of a scene that are hulls for an engine, by their names, are left out with a warning if there are others.
+    fineness
+        How near the triangles of a file of curved surfaces have to be to them.
 
     Returns
     -------
@@ -77,7 +82,7 @@ def load_mesh(source: Source) -> InputMesh:
         source = os.fspath(source)  # bytes are refused below
     if isinstance(source, str):
         path = Path(source)
-        return without_engine_hulls(_baked(path.name, _read(path)))
+        return without_engine_hulls(_baked(path.name, _read(path, fineness)))
     arrays_of, geometry_of = (function_of(f"read.trimesh_scene:{name}") for name in ("arrays_of", "geometry_of"))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind, looks = type(source).__name__, hasattr(source, "geometry") or getattr(source, "visual", None)
@@ -90,7 +95,7 @@ def load_mesh(source: Source) -> InputMesh:
     )
 
 
-def _read(path: Path) -> Contents:
+def _read(path: Path, fineness: Fineness) -> Contents:
     """Parse a file; raises MeshFileError with the most likely reason."""
     content = read_named(path)  # here, not by name in a parser: a name like a URL must not be fetched
     if not content.strip(b"\0 \t\r\n"):
@@ -107,7 +112,8 @@ def _read(path: Path) -> Contents:
         hint = f"{renamed}, which it seems to hold" if renamed else "convert it to glb, obj, stl or ply"
         raise MeshFileError(f"{path} is in a format that rlacd does not read: {CONVERTERS.get(extension, hint)}")
     try:
-        contents: Contents = function_of(READERS[extension])(path, content)
+        how = (fineness,) if extension in CURVED else ()
+        contents: Contents = function_of(READERS[extension])(path, content, *how)
     except Exception as error:  # parsers may raise anything on damaged files
         if renamed:
             raise MeshFileError(f"{path} is not {extension} but {holds}: {renamed}") from error
@@ -153,7 +159,8 @@ def _baked(name: str, contents: Contents) -> InputMesh:
         why = f" ({'; '.join(contents.warnings)})" if contents.warnings else ""
         raise EmptyMeshError(f"{name} holds no triangles and no points{why}: check the export")
     mesh = replace(mesh, warnings=(*mesh.warnings, *contents.warnings), nodes=tuple(nodes))
-    return replace(mesh, up=contents.up, metres=contents.metres, asset=contents.asset)
+    given = {"up": contents.up, "metres": contents.metres, "asset": contents.asset, "deviation": contents.deviation}
+    return replace(mesh, **given)
 
 
 def _usable(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Array | None) -> InputMesh:
