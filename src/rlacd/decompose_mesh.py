@@ -17,7 +17,7 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish.finish import Finished, finish, misses_some
-from rlacd.finish.report import joint_report
+from rlacd.finish.report import joint_report, missed
 from rlacd.io.read.contents import USUAL, Fineness
 from rlacd.io.read.load import load_mesh
 from rlacd.options import (
@@ -39,6 +39,7 @@ from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
 
@@ -265,7 +266,8 @@ def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> R
 
 def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
-    scale = Frame.of(source.vertices[np.unique(source.faces)]).scale
+    frame = Frame.of(source.vertices[np.unique(source.faces)])
+    scale = frame.scale
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()
     meshes = [source.of_node(index) for index in used]
@@ -285,6 +287,11 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     names = [source.nodes[place].name for place in used]
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
     report["options"] |= {name: getattr(options, name) for name in ("threshold", "threshold_abs")}
+    if report["hausdorff"]["under"] is not None:
+        found = [hull for part in done for h in part.hulls if (hull := Hull.of(frame.to_frame(h.vertices))) is not None]
+        left_out = missed(frame.to_frame(source.specks), found, frame, run)
+        report["hausdorff"]["under"] = max(report["hausdorff"]["under"], left_out.distance)
+        report["warnings"] += left_out.said
     report["warnings"][:0] = source.warnings
     return Finished([hull for one in done for hull in one.hulls], report)
 

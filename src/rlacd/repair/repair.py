@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,7 +43,7 @@ from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import NO_FILM, bodies_of, compacted, detach_films
+from rlacd.solid.topology import NO_FILM, bodies_of, compacted, detach_films, marked
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
@@ -159,7 +160,21 @@ def repair(
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
     poll_stop()
     frame = Frame.of(points)
-    points = frame.to_frame(points)
+    cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
+    wanted = Wanted(open_bodies, gap, cells, keep_cavities)
+    solid = _repaired(mesh, (frame.to_frame(points), corners), frame, wanted, threads)
+    vertices, faces = solid.surface
+    is_left = np.full(len(vertices), len(faces) > 0) & ~marked(faces, len(vertices))
+    if len(mesh.specks) == 0 and not is_left.any():
+        return solid
+    return replace(solid, left_out=np.concatenate([vertices[is_left], frame.to_frame(mesh.specks)]))
+
+
+def _repaired(
+    mesh: InputMesh, soup: tuple[FloatArray, Int64Array], frame: Frame, wanted: Wanted, threads: int | None
+) -> Solid:
+    """Repair the vertices and faces of a mesh in its frame."""
+    points, corners = soup
     poll_stop()
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
     taken = one_body(welded_vertices, welded_faces)
@@ -177,8 +192,7 @@ def repair(
         solid = hull_of_points(points)
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), (*mesh.warnings, said))
-    cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
-    state = State(SurfaceQuery(vertices, faces, threads), frame, Wanted(open_bodies, gap, cells, keep_cavities))
+    state = State(SurfaceQuery(vertices, faces, threads), frame, wanted)
     _take_steps(state)
     return state.result(mesh.warnings)
 

@@ -22,7 +22,7 @@ from rlacd.io.read.contents import USUAL, Contents, Fineness, damaged, one_shape
 from rlacd.io.read.open_file import CONVERTERS, NO_MESHES, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, heights
-from rlacd.solid.input_mesh import Asset, InputMesh
+from rlacd.solid.input_mesh import Asset, InputMesh, no_points
 
 Source: TypeAlias = str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]
 
@@ -159,8 +159,8 @@ def _baked(name: str, contents: Contents) -> InputMesh:
         why = f" ({'; '.join(contents.warnings)})" if contents.warnings else ""
         raise EmptyMeshError(f"{name} holds no triangles and no points{why}: check the export")
     mesh = replace(mesh, warnings=(*mesh.warnings, *contents.warnings), nodes=tuple(nodes))
-    given = {"up": contents.up, "metres": contents.metres, "asset": contents.asset, "deviation": contents.deviation}
-    return replace(mesh, **given)
+    mesh = replace(mesh, asset=contents.asset, deviation=contents.deviation)
+    return replace(mesh, up=contents.up, metres=contents.metres)
 
 
 def _usable(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Array | None) -> InputMesh:
@@ -179,7 +179,9 @@ def _usable(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Ar
         vertices = vertices[finite]
     first = vertices[faces[:, 0]]  # a node of scale 0, a way to hide it, must not stretch the box of the others
     speck = (first == vertices[faces[:, 1]]).all(axis=1) & (first == vertices[faces[:, 2]]).all(axis=1)
+    specks = no_points()
     if speck.any() and not speck.all():
+        specks = first[speck]
         faces, node_of = faces[~speck], None if node_of is None else node_of[~speck]
     arrays = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
-    return InputMesh(*arrays, name, tuple(warnings), node_of=node_of)
+    return InputMesh(*arrays, name, tuple(warnings), node_of=node_of, specks=specks)
