@@ -14,6 +14,7 @@ from typing import Any
 import manifold3d
 import numpy as np
 import numpy.typing as npt
+import trimesh
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -89,8 +90,10 @@ def judge(case: Case, samples: int = SAMPLES) -> list[str]:
     random = np.random.default_rng(0)
     if len(faces):
         found += coverage(case, where, faces, hulls, random, samples)
+        found += left_out(case, where[np.unique(every_face)], hulls)
         found += overhang(case, where[every_face], hulls, random, samples)
     if case.shape.is_closed and len(faces) == len(every_face):  # a part may reach out to faces without area
+        found += mass(case, where, faces)
         solid = filled_solid(where, faces)
         if solid is not None:
             found += concavity(case, solid, where[faces], hulls, random, samples)
@@ -127,6 +130,31 @@ def coverage(
         word in case.warned for word in ("outside the hulls", "from the hulls")
     ):
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, and no word of it")
+    return found
+
+
+def left_out(case: Case, corners: Floats, hulls: list[Polytope]) -> list[str]:
+    """Corners that only faces without an area have lie in a hull, or a warning says that they do not."""
+    farthest = float(distance_to_union(corners, hulls).max())
+    under = case.report["hausdorff"]["under"]
+    if under is None or farthest <= COVERAGE_TOLERANCE + ROUNDING or "outside the hulls" in case.warned:
+        return []
+    return [f"a corner of a face lies {farthest:.6g} outside the hulls, and no word of it"]
+
+
+def mass(case: Case, where: Floats, faces: Ints) -> list[str]:
+    """Volume, centre and inertia are those that trimesh finds for the closed input, less its cavities."""
+    said, kept = case.report.get("mass"), ("closed", "reoriented")
+    if said is None or any(body["step"] not in kept for body in case.report.get("repair", [{"step": ""}])):
+        return []
+    body = trimesh.Trimesh(where, faces, process=False)
+    unit = 2 / np.ptp(case.shape.vertices[np.unique(finite_faces(case.shape))], axis=0).max()
+    volume, inertia = said["volume_abs"] * unit**3, np.array(said["inertia_abs"]) * unit**5
+    found = []
+    if abs(volume - body.volume) > HAIR * (1 + body.volume):
+        found.append(f"the volume is {volume:.8g}, not {body.volume:.8g}")
+    if np.abs(inertia - body.moment_inertia).max() > HAIR * 10:
+        found.append(f"the inertia is {inertia.tolist()}, not {body.moment_inertia.tolist()}")
     return found
 
 

@@ -24,6 +24,10 @@ NEARLY = (0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-4)
 """Distance between features meant to coincide, for primitives with sides of 1 to 4."""
 
 
+HOLLOW = 0.1
+"""Share of the shapes that have closed cavities."""
+
+
 @dataclass(frozen=True)
 class Shape:
     """Triangles and how they were made.
@@ -51,7 +55,7 @@ def make_shape(seed: int) -> Shape:
     """Make the shape of a seed."""
     random = np.random.default_rng([seed, 1])
     compose = pick(random, COMPOSITIONS)
-    shape = compose(random)
+    shape = hollow(random) if np.random.default_rng([seed, 4]).random() < HOLLOW else compose(random)
     for _ in range(int(random.choice(4, p=[0.5, 0.25, 0.15, 0.1]))):
         shape = pick(random, FAULTS)(shape, random)
     return placed(shape, random)
@@ -124,6 +128,26 @@ def shells(random: Random) -> Shape:
         turned = one.faces[:, ::-1] if random.random() < 0.5 else one.faces
         inner.append(replace(one, vertices=center + share * (one.vertices - center), faces=turned))
     return concatenated([one, *inner])
+
+
+def hollow(random: Random) -> Shape:
+    """A box with closed cavities in some of its octants, and in some of these a body that stands free."""
+    found = [Shape(*PRIMITIVES["box"](random), ("hollow box",), True)]
+    for octant in random.permutation(8)[: random.integers(1, 4)]:
+        middle = 0.25 * np.array([octant // 4, octant // 2 % 2, octant % 2]) * 2 - 0.25
+        one = Shape(*PRIMITIVES[str(random.choice(list(PRIMITIVES)))](random), ("cavity",))
+        size = float(random.choice([0.02, 0.2, 0.45]))
+        within = size * (one.vertices - (one.vertices.min(axis=0) + one.vertices.max(axis=0)) / 2)
+        within /= np.ptp(one.vertices, axis=0).max()
+        found.append(replace(one, vertices=within + middle, faces=one.faces[:, ::-1]))
+        if random.random() < 0.3:
+            solid = PRIMITIVES["box"](random)
+            around = manifold3d.Manifold(manifold3d.Mesh64(within + middle, one.faces.astype(np.uint64)))
+            inner = manifold3d.Manifold.cube([0.1 * size] * 3, True).translate(middle)
+            if (inner - around).is_empty():
+                found.append(Shape(0.1 * size * solid[0] + middle, solid[1], ("with a body in it",)))
+    joined = concatenated(found)
+    return replace(joined, vertices=joined.vertices * random.integers(1, 4, 3), is_closed=True)
 
 
 def sheets(random: Random) -> Shape:

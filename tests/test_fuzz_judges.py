@@ -48,6 +48,7 @@ SPACE = {"criterion": rlacd.NavigableSpace(0.05, 0.02)}
         ("concave", None, None, {}),
         ("more than 0.05, and no word of it", None, {"threshold": 0.05}, {}),
         ("into a ball", None, SPACE, {"concavity": None}),
+        ("the volume is", None, None, {"mass": {"volume_abs": 8.0, "inertia_abs": np.eye(3).tolist()}}),
     ],
 )
 def test_what_was_promised_and_is_not_so_is_seen(
@@ -59,6 +60,23 @@ def test_what_was_promised_and_is_not_so_is_seen(
     report = {**(whole if options else good).report, "parts": 1, **said}
     wrong = replace(good, hulls=(good if count else whole).hulls[:1], options=options or good.options, report=report)
     assert any(seen in word for word in judge(wrong))
+
+
+def test_a_mass_with_its_cavity_and_a_corner_without_a_word_are_seen() -> None:
+    inner = creation.box((0.5, 0.5, 0.5))
+    hollow = trimesh.util.concatenate([creation.box(), trimesh.Trimesh(inner.vertices, inner.faces[:, ::-1])])
+    shape = Shape(np.array(hollow.vertices), np.array(hollow.faces), (), True)
+    good = case(Closed(shape.vertices, shape.faces))
+    assert judge(good) == []
+    solid = replace(good, report={**good.report, "mass": case(Closed(*_arrays(creation.box()))).report["mass"]})
+    assert any("the volume is 8, not 7" in word for word in judge(solid))
+    point = replace(shape, vertices=np.concatenate([shape.vertices, [[3, 0, 0]]]))
+    point = replace(point, faces=np.concatenate([shape.faces, [[16, 16, 16]]]))
+    assert any("a corner of a face lies" in word for word in judge(replace(good, shape=point)))
+
+
+def _arrays(mesh: Any) -> tuple[Any, Any]:
+    return np.array(mesh.vertices), np.array(mesh.faces)
 
 
 @pytest.mark.parametrize("limit", [{"max_vertices": 7}, {"max_faces": 11}, {"max_hulls": 1}])

@@ -17,7 +17,8 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish.finish import Finished, finish, misses_some
-from rlacd.finish.report import joint_report
+from rlacd.finish.report import joint_report, missed
+from rlacd.io.read.contents import USUAL, Fineness
 from rlacd.io.read.load import load_mesh
 from rlacd.options import (
     ELSEWHERE,
@@ -39,6 +40,7 @@ from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
+from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
 
@@ -72,6 +74,7 @@ def decompose(
     policy: str | Policy | None = None,
     resolution: int = 100,
     open: OpenName = "auto",
+    keep_cavities: bool = False,
     gap: float = 0.015,
     seed: int = 0,
     threads: int | None = None,
@@ -154,6 +157,9 @@ def decompose(
         How to treat bodies with openings, such as cups and damaged scans. ``auto``: solid if nothing can get inside or
         if the openings look like missing faces; otherwise a shell as thin as its faces. ``solid``: hollows are filled.
         ``thin``: nothing is filled.
+    keep_cavities : bool
+        Closed cavities stay empty: those that an inner shell or closed bodies bound, and rooms that only narrow gaps
+        lead to. By default they are filled, as nothing can get in; the mass leaves closed cavities out either way.
     gap : float
         Radius of a ball, as a share of the longest side: what it cannot get into through the openings counts as closed.
     seed : int
@@ -212,7 +218,7 @@ def decompose(
     make_policy(options.first_policy)  # reports a bad network before any work is done
     with Run(options.threads, options.timeout, progress, options.seed) as run:
         with run.stage("load"):
-            source = in_metres(load_mesh(mesh, faces, file_type), options)
+            source = in_metres(load_mesh(mesh, faces, file_type, _fineness(options)), options)
         apart = options.per_node and len(source.nodes) > 1
         if options.per_node and not apart:
             alone = f"per_node had no effect: {source.name} was read as one node"
@@ -224,10 +230,24 @@ def decompose(
         "provenance": [{"node": hull.metadata.get("node"), "body": hull.metadata.get("body")} for hull in done.hulls],
         "up": source.up,
         "metres": source.metres,
+        "deviation_abs": source.deviation,
         "seconds": {**run.seconds, "total": run.elapsed},
     }
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
+
+
+def _fineness(options: Options) -> Fineness:
+    """How near to curved surfaces triangles have to be: a tenth of the distance that the criterion allows."""
+    space, factor = options.criterion, _factor(options, 1.0)
+    if isinstance(space, NavigableSpace):
+        share, length = space.tolerance, space.tolerance_abs
+    elif "threshold" in options.numbers:
+        share, length = options.threshold / 2, options.threshold_abs
+    else:
+        return USUAL
+    of_nodes = options.per_node and options.relative_to == "node"
+    return Fineness((share or 0.0) / 10, None if length is None else length / factor / 10, of_nodes)
 
 
 def _as_one(source: InputMesh, options: Options, run: Run) -> Finished:
@@ -248,7 +268,8 @@ def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> R
 
 def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
-    scale = Frame.of(source.vertices[np.unique(source.faces)]).scale
+    frame = Frame.of(source.vertices[np.unique(source.faces)])
+    scale = frame.scale
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()
     meshes = [source.of_node(index) for index in used]
@@ -268,6 +289,11 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     names = [source.nodes[place].name for place in used]
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
     report["options"] |= {name: getattr(options, name) for name in ("threshold", "threshold_abs")}
+    if report["hausdorff"]["under"] is not None:
+        found = [hull for part in done for h in part.hulls if (hull := Hull.of(frame.to_frame(h.vertices))) is not None]
+        left_out = missed(frame.to_frame(source.specks), found, frame, run)
+        report["hausdorff"]["under"] = max(report["hausdorff"]["under"], left_out.distance)
+        report["warnings"] += left_out.said
     report["warnings"][:0] = source.warnings
     return Finished([hull for one in done for hull in one.hulls], report)
 
@@ -280,16 +306,21 @@ def in_metres(source: InputMesh, options: Options) -> InputMesh:
     OptionError
         The unit is to be that of the file, which does not say it.
     """
-    factor = 1.0 if options.scale is None else options.scale
     if options.unit == "file" and source.metres is None:
         raise OptionError(f"unit is 'file', but {source.name} does not say its unit; give mm, cm, m or in.")
+    stated = source.metres
     if options.unit is not None:
-        stated = source.metres
         if stated is not None and not math.isclose(stated, UNITS.get(options.unit, stated)):
             said = (
                 f"the unit of {source.name} is {stated:g} m, by its format or by what it says; --unit {options.unit} "
             )
             source = replace(source, warnings=(*source.warnings, f"{said}overrides that"))
-        factor *= UNITS.get(options.unit, source.metres or 1.0)
         source = replace(source, metres=1.0)
+    factor = _factor(options, stated or 1.0)
     return source if factor == 1.0 else source.scaled(factor)
+
+
+def _factor(options: Options, metres: float) -> float:
+    """What coordinates of a file whose unit is so many metres are multiplied by."""
+    unit = 1.0 if options.unit is None else UNITS.get(options.unit, metres)
+    return unit if options.scale is None else options.scale * unit

@@ -66,8 +66,8 @@ class Decomposition(Result):
         ``scale`` : float
             What one unit of the input measures in that frame: divide a length by it to have it in the input's unit.
         ``mass`` : dict
-            Of the repaired solid at density one, in the input's unit: ``volume_abs``, ``centre_abs`` and, about that
-            centre, ``inertia_abs`` (3 by 3).
+            Of the repaired solid, closed cavities left out, at density one, in the input's unit: ``volume_abs``,
+            ``centre_abs`` and, about that centre, ``inertia_abs`` (3 by 3).
         ``search`` : dict or None
             What the search of a quality level has done: ``level``, ``steps``, ``accepted``, ``seconds``, whether it was
             ``exhausted``, and the parts of the ``first_pass``, of the best of the ``portfolio``, and at its end.
@@ -87,6 +87,8 @@ class Decomposition(Result):
             For each hull, in the order of ``hulls``, what most of the surface inside it belongs to: ``node``, the name
             of the input's node, None if it has no scene; ``body``, its number in ``repair``. Also in
             ``hull.metadata``.
+        ``deviation_abs`` : float or None
+            How far the triangles that were decomposed may be from the surfaces of a STEP or IGES file, in its unit.
         ``up``, ``metres``
             The axis that points up and the unit of length in metres, as the input's format or file says; the unit is
             None if it does not.

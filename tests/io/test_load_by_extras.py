@@ -7,17 +7,22 @@ import shutil
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
 
+import rlacd
 from fuzz.damaged import CASES, written_by_extras
 from fuzz.fbx import Model, fbx
+from rlacd import NavigableSpace
 from rlacd.cli.main import app
 from rlacd.errors import EmptyMeshError, MeshFileError, MissingExtraError
-from rlacd.io.read.cad import DEVIATION
+from rlacd.io.read import cad
+from rlacd.io.read.contents import USUAL
+from rlacd.io.read.gltf import read_gltf
 from rlacd.io.read.load import load_mesh
 
 BOX = trimesh.creation.box()
@@ -82,19 +87,69 @@ def test_parts_of_an_assembly_are_nodes_in_metres(tmp_path: Path) -> None:
     assert sorted(solids) == ["pin_left", "pin_right", "plate"]
     assert np.allclose(solids["plate"].bounds, [[0, 0, -0.01], [0.06, 0.04, 0]], atol=1e-8)
     for name, x in (("pin_left", 0.01), ("pin_right", 0.05)):
-        assert np.allclose(solids[name].bounds.mean(axis=0), (x, 0.02, 0.01), atol=DEVIATION * 0.06)
+        assert np.allclose(solids[name].bounds.mean(axis=0), (x, 0.02, 0.01), atol=USUAL.share * 0.06)
         assert solids[name].volume == pytest.approx(np.pi * 0.005**2 * 0.02, rel=0.01)
+
+
+def sag(mesh: Any) -> float:
+    """How far triangles with corners on the ball lie inside it, by trimesh's closest points."""
+    corners = mesh.vertices[mesh.faces]
+    nearest = trimesh.triangles.closest_point(corners, np.zeros((len(corners), 3)))
+    assert np.allclose(np.linalg.norm(corners, axis=2), 0.03, atol=1e-6)
+    return 0.03 - float(np.linalg.norm(nearest, axis=1).min())
 
 
 @CAD
 def test_triangles_keep_to_the_surface_and_inches_are_converted() -> None:
     mesh = load_mesh(BALL)
     assert mesh.metres == 1.0
-    of_corners, of_middles = (
-        np.linalg.norm(p, axis=1) for p in (mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1))
-    )
-    assert np.allclose(of_corners, 0.03, atol=1e-6)
-    assert 0.03 - of_middles.min() < DEVIATION * 0.06
+    assert mesh.deviation == pytest.approx(USUAL.share * 0.06, rel=0.01)
+    assert sag(mesh) < mesh.deviation
+
+
+@CAD
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ({"threshold": 0.004}, 0.004 / 20 * 0.06),
+        ({"threshold_abs": 2e-4}, 2e-5),
+        ({"threshold_abs": 0.2, "scale": 1000.0}, 0.02),
+        ({"threshold_abs": 1e-5, "unit": "in"}, 1e-6),
+        ({"criterion": NavigableSpace(0.1, 0.005)}, 0.005 / 10 * 0.06),
+        ({"threshold": 0.5}, USUAL.share * 0.06),
+    ],
+    ids=str,
+)
+@pytest.mark.promise("certified")
+def test_triangles_are_nearer_to_a_surface_than_a_tenth_of_the_threshold_and_that_is_said(
+    options: dict[str, Any], wanted: float
+) -> None:
+    result = rlacd.decompose(BALL, quality="fast", threads=1, **options)
+    said = result.report["deviation_abs"]
+    size = np.ptp(result.source.vertices, axis=0).max()
+    assert said == pytest.approx(wanted, rel=0.01)
+    shrunk = trimesh.Trimesh(result.source.vertices * 0.06 / size, result.source.faces, process=False)
+    assert sag(shrunk) <= said * 0.06 / size
+    assert len(result.report["warnings"]) == ("unit" in options)  # which overrides the metre
+
+
+@CAD
+def test_no_file_becomes_more_triangles_than_can_be_handled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bound is lower here, in this process: a server of its own would not know."""
+    monkeypatch.setattr(cad, "MOST", 20_000)
+    values = {"path": str(BALL), "kind": "iges", "share": 1e-4, "metres": None, "of_nodes": False}
+    facts, blobs = cad.triangulate(Path())(values, {"file": BALL.read_bytes()}, {})
+    count = sum(len(shape.faces) for _, shape in read_gltf(BALL, blobs["glb"]).geometry)
+    assert 15_000 < count < 25_000
+    assert facts["sought"] == pytest.approx(6e-6, rel=0.01)
+    assert facts["deviation"] > 5 * facts["sought"]
+
+
+@CAD
+def test_the_command_says_how_far_triangles_are_from_the_surface(tmp_path: Path) -> None:
+    run = CliRunner().invoke(app, ["decompose", str(STAND), "-o", str(tmp_path / "out.glb"), "--threshold", "1mm"])
+    assert "triangles, up to 6e-05 from the surface in the file (in the input's unit)" in run.stderr
+    assert "triangles lie up to 6e-05 from" in CliRunner().invoke(app, ["info", str(STAND)]).output
 
 
 @CAD

@@ -53,44 +53,6 @@ def test_a_small_ball_rolls_on_a_grid_fine_enough(gap, filled):
     assert (volume(solid_of(join(box, lid), gap=gap)) > 7) == filled
 
 
-def inverted(mesh):
-    return trimesh.Trimesh(mesh.vertices, mesh.faces[:, ::-1], process=False)
-
-
-def cube(side):
-    return trimesh.creation.box(extents=(side,) * 3)
-
-
-def slabs():
-    """Six walls 0.2 thick around a room, as bodies of their own."""
-    sizes = {2: (2.0, 2.0, 0.2), 0: (0.2, 2.0, 1.7), 1: (1.7, 0.2, 1.7)}
-    walls = [
-        (trimesh.creation.box(extents=size), 0.9 * side * np.eye(3)[k]) for k, size in sizes.items() for side in (1, -1)
-    ]
-    return join(*(moved(wall, *place) for wall, place in walls))
-
-
-ROOM, BALL = join(BOX, inverted(cube(1.6)), cube(0.4)), trimesh.creation.icosphere(subdivisions=2)
-CAVITIES = {
-    "a room with a stool": (ROOM, 8, 8 - 1.6**3 + 0.4**3),
-    "inside out": (inverted(ROOM), 8, 8 - 1.6**3 + 0.4**3),
-    "slabs": (join(slabs(), cube(0.4)), 8, 8 - 1.6**3 + 0.4**3),
-    "a cavity in what stands in a cavity": (
-        join(BOX, inverted(cube(1.6)), cube(1.0), inverted(cube(0.6))),
-        8,
-        8 - 1.6**3 + 1 - 0.6**3,
-    ),
-    "side by side": (join(moved(BALL, -2, 0, 0), inverted(moved(BALL, 2, 0, 0))), *[2 * BALL.volume] * 2),
-}
-
-
-@pytest.mark.parametrize("name", CAVITIES)
-def test_sealed_rooms_are_filled_or_kept_whatever_their_windings(name):
-    mesh, filled, kept = CAVITIES[name]
-    assert volume(solid_of(mesh)) == pytest.approx(filled)
-    assert volume(solid_of(mesh, keep_cavities=True)) == pytest.approx(kept)
-
-
 def revolved(*profile, sections=24):
     mesh = trimesh.creation.revolve(np.array(profile), sections=sections)
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)

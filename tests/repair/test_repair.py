@@ -254,3 +254,48 @@ def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name
     assert report["concavity"]["max"] <= 0.0501
     radii = math.sqrt(2) if "class5" in name else 1  # a wrap ends at balls, a right angle at most from where they touch
     assert max(body["deviation"] for body in report["repair"]) < radii * DEFAULT_GAP
+
+
+# Faces without an area beside a box, and how far from its hull a corner lies that no other face has.
+NOTHING = {
+    "a point": ([[3, 0, 0]], [[0, 0, 0]], 2),
+    "a point, three times": ([[3, 0, 0]] * 3, [[0, 1, 2]], 2),
+    "points": ([[3, 0, 0], [0, -4, 0]], [[0, 0, 0], [1, 1, 1]], 3),
+    "an edge": ([[3, 0, 0]], [[-8, 0, 0]], 2),
+    "an edge apart": ([[3, 0, 0], [4, 0, 0]], [[0, 1, 1]], 3),
+    "a point inside": ([[0.5, 0, 0]], [[0, 0, 0]], 0),
+    "an edge inside": ([[0.5, 0, 0]], [[-8, 0, 0]], 0),
+    "three corners in a line": ([[3, 0, 0], [4, 0, 0], [5, 0, 0]], [[0, 1, 2]], 0),
+    "a line from a corner": ([[3, 3, 3], [5, 5, 5]], [[-1, 0, 1]], 0),
+    "a sliver": ([[3, 0, 0], [4, 1e-13, 0], [5, 0, 0]], [[0, 1, 2]], 0),
+}
+
+
+@pytest.mark.parametrize("name", NOTHING)
+@pytest.mark.promise("covered")
+@pytest.mark.promise("loss-named")
+def test_corners_of_faces_without_an_area_are_covered_or_named(name: str) -> None:
+    points, faces, away = NOTHING[name]
+    mesh = (np.concatenate([BOX.vertices, points]), np.concatenate([BOX.faces, np.array(faces) + 8]))
+    result = rlacd.decompose(mesh, quality="fast", threads=1)
+    corners = np.array(points, dtype=float)
+    missed = np.min([trimesh.proximity.signed_distance(hull, corners) * -1 for hull in result], axis=0).max()
+    assert max(missed, 0) == pytest.approx(away, abs=2e-3)
+    report = result.report
+    assert report["hausdorff"]["under"] / report["scale"] == pytest.approx(away, abs=2e-3)
+    said = [warning for warning in report["warnings"] if "only a point or an edge were left out" in warning]
+    assert len(said) == (away > 0)
+    assert (
+        not said or f"lie{'s' if '1 corner ' in said[0] else ''} up to {away * report['scale']:.4g} outside" in said[0]
+    )
+
+
+@pytest.mark.parametrize("per_node", [False, True])
+def test_a_node_without_size_is_named_if_hulls_miss_it(per_node: bool) -> None:
+    speck = trimesh.Trimesh([[3, 0, 0]] * 3, [[0, 1, 2]], process=False)
+    scene = trimesh.Scene({"one": BOX, "two": moved(BOX, -2, 0, 0), "speck": speck})
+    report = rlacd.decompose(scene, per_node=per_node, quality="fast", threads=1).report
+    assert report["hausdorff"]["under"] == pytest.approx(1.0)
+    assert (
+        "1 corner lies up to 1 outside the hulls (longest side = 2), farthest near (3, 0, 0)" in report["warnings"][0]
+    )

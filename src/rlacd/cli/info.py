@@ -51,7 +51,8 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
     dict
         ``file``, ``name``, ``vertices``, ``faces``, ``bounds`` (two corners, in the file's unit), ``scale`` (frame
         units per unit of the file), ``repair`` (a dict per body: ``body``, ``step``, ``faces_in``, ``faces_out``,
-        ``deviation`` in frame units), ``solid`` (``faces``, and ``volume`` in the file's unit cubed), ``warnings``.
+        ``deviation`` in frame units), ``deviation`` (how far triangles may be from the surfaces of a CAD file, in the
+        file's unit, or None), ``solid`` (``faces``, and ``volume`` in the file's unit cubed), ``warnings``.
 
     Raises
     ------
@@ -73,6 +74,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
         "faces": len(mesh.faces),
         "bounds": [used.min(axis=0).tolist(), used.max(axis=0).tolist()],
         "scale": float(solid.frame.scale),
+        "deviation": mesh.deviation,
         "repair": [vars(body) for body in solid.bodies],
         "solid": {
             "faces": len(solid.faces),
@@ -89,6 +91,9 @@ def describe_text(facts: dict[str, Any]) -> str:
     held = f"{len(bodies)} bod{'y' if len(bodies) == 1 else 'ies'}"
     lines = [facts["file"], f"  holds    {facts['faces']} triangles, {facts['vertices']} vertices, {held}"]
     lines.append(f"  size     {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g}")
+    if facts["deviation"] is not None:
+        near = f"up to {facts['deviation']:.3g} from its surfaces"
+        lines.append(f"  curved   triangles lie {near}, or nearer if a threshold needs it")
     lines.append(f"  repaired {facts['solid']['faces']} triangles, volume {facts['solid']['volume']:.6g}")
     for step, count in Counter(body["step"] for body in bodies).most_common():
         worst = max(body["deviation"] for body in bodies if body["step"] == step)

@@ -109,6 +109,10 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
     time = ("" if total is None else f", {total:.2f} s") + STOPPED[report.get("stopped_by")]
     lines = [f"{written}: {counted(len(result), 'hull', 'hulls')}, {triangles} triangles{time}"]
     lines += [f"  {fit}" for fit in [_fit(report, unit)] if fit]
+    if report.get("deviation_abs") is not None:
+        scale, in_words = _unit(report, unit)
+        moved = report["deviation_abs"] * report["scale"] / scale
+        lines.append(f"  measured to triangles, up to {moved:.4g} from the surface in the file ({in_words})")
     least, parts = report.get("at_least") or 1, report["parts"]
     if 1 < least <= parts:
         fewer = "fewer hulls" if least == parts else f"fewer than {least} hulls"

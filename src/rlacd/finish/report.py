@@ -20,8 +20,9 @@ from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
 from rlacd.run import Run
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
-from rlacd.solid.distance import Interval, Place, hull_distances
+from rlacd.solid.distance import Interval, Place, hull_distances, hull_union
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
@@ -41,15 +42,23 @@ MOST_HOLES = 1000
 """Holes that a report lists."""
 
 
+class Missed(NamedTuple):
+    """Places that hulls do not hold: how far the farthest of them is, and a sentence if that is worth one."""
+
+    distance: float
+    said: list[str]
+
+
 class _Distances(NamedTuple):
     """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body; and
-    the passages that they narrow."""
+    the passages that they narrow. What was left out is by itself."""
 
     over: float
     under: float
     over_at: str
     under_at: str
     passages: list[dict[str, Any]]
+    left_out: Missed
 
 
 def make_report(
@@ -76,7 +85,7 @@ def make_report(
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
-        stands_for_mass = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else [solid.mesh]
+        weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         if has_surface and apart is None:
             warnings += _unmeasured(solid)
@@ -98,10 +107,10 @@ def make_report(
             **({"primitives": _primitives(parts)} if options.primitives else {}),
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
-            "hausdorff": {"over": apart and apart.over, "under": apart and apart.under},
+            "hausdorff": {"over": apart and apart.over, "under": apart and max(apart.under, apart.left_out.distance)},
             "passages": apart and apart.passages,
             "scale": solid.frame.scale,
-            "mass": mass_of(*concatenated(stands_for_mass), solid.frame).as_plain(),
+            "mass": mass_of(*concatenated(weighed), solid.frame).as_plain(),
             "repair": [{**vars(body)} for body in solid.bodies],
             "holes": _holes(solid),
             "search": reached.found and reached.found.as_plain(),
@@ -256,7 +265,26 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
         return solid.frame.place(point, int(solid.body_of[face]))
 
     passages = narrowed(reached, hulls, found.over[1], run)
-    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at), passages)
+    left_out = missed(solid.left_out, hulls, solid.frame, run)
+    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at), passages, left_out)
+
+
+def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) -> Missed:
+    """How far outside the hulls the corners ``[N, 3]`` lie that only faces with corners in one place have."""
+    if len(points) == 0:
+        return Missed(0.0, [])
+    distance = hull_union(hulls, run.threads).distance(np.ascontiguousarray(points), run.threads)
+    out, farthest = int((distance > COVERAGE_TOLERANCE).sum()), float(distance.max())
+    if out == 0:
+        return Missed(farthest, [])
+    corners = "1 corner lies" if out == 1 else f"{out} corners lie"
+    return Missed(
+        farthest,
+        [
+            f"Faces that are only a point or an edge were left out: {corners} up to {farthest:.4g} outside the hulls "
+            f"(longest side = 2), farthest near {frame.place(points[distance.argmax()])}."
+        ],
+    )
 
 
 def _is_undecided(interval: Interval, limit: float) -> bool:
@@ -324,6 +352,7 @@ def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, reached: Reac
             f"Some of the input's surface lies up to {apart.under:.4g} outside the hulls, farthest near "
             f"{apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
         )
+    sentences += apart.left_out.said if apart is not None else []
     if apart is not None and not exceeds and apart.over > reached.goal.overhang + COVERAGE_TOLERANCE:
         sentences.append(
             f"The hulls extend up to {apart.over:.4g} beyond the input's surface, more than the threshold, farthest "

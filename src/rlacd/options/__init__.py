@@ -182,6 +182,9 @@ class Options:
     open
         Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
         others thin shells; solid fills all that enclose a space; thin fills none.
+    keep_cavities
+        Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are filled, as
+        nothing can get in, and only the mass leaves them out.
     gap
         Openings that a ball of this radius, a share of the longest side, cannot pass count as closed.
     seed
@@ -242,6 +245,7 @@ class Options:
     policy: str | Policy | None = option(None, METHOD, _POLICY, metavar="NAME", usual="greedy; learned with --no-merge")
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
     open: OpenName = option("auto", METHOD, one_of=OpenName)
+    keep_cavities: bool = option(False, METHOD)
     gap: float = option(0.015, METHOD, number(*GAPS, typed=str), metavar="NUMBER")
     seed: int = option(0, RUN, least=0, most=2**63 - 1)
     threads: int | None = option(None, RUN, least=1, most=1024, usual="all cores")
@@ -296,6 +300,8 @@ class Options:
                 yield from ((n, f"left out: the criterion {self.criterion_name} has {instead} instead") for n in names)
         if self.per_node and self.criterion_name == "navigable":
             yield "per_node", "left out: navigable space is that of the whole scene"
+        if self.keep_cavities and isinstance(self.criterion, NavigableSpace) and not self.criterion.sees_cavities:
+            yield "keep_cavities", "left out: balls get into cavities with seeds or reachable_only=False (--everywhere)"
         for name in (*LENGTHS, "keep_open"):
             if getattr(self, f"{name}_abs") is not None:
                 yield name, f"left out with {name}_abs, a length in the input's unit"
@@ -343,7 +349,7 @@ class Options:
     @property
     def sees_cavities(self) -> bool:
         """Whether sealed cavities may count."""
-        return isinstance(self.criterion, NavigableSpace) and self.criterion.sees_cavities
+        return self.keep_cavities or (isinstance(self.criterion, NavigableSpace) and self.criterion.sees_cavities)
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values, the criterion by its name or its own options, a policy by its name."""

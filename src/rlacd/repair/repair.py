@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import face_areas, poll_stop, signed_tetrahedra
+from rlacd._native import face_areas, poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes, may_have_holes
 from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
-from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite, unite_around_cavities
+from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.wraps import (
@@ -42,7 +43,7 @@ from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import NO_FILM, bodies_of, compacted, detach_films
+from rlacd.solid.topology import NO_FILM, bodies_of, compacted, detach_films, marked
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of the grid that it rolls on."""
@@ -60,17 +61,6 @@ def _are_crowded(state: State) -> bool:
 def _sort_out(state: State) -> None:
     """Find the sides of crowded bodies by windings where angles fail."""
     state.soup = trust_windings(state.soup, state.bodies)
-
-
-def _unite(state: State) -> None:
-    """Unite all parts and fill their cavities."""
-    shapes = [part.shape for part in state.parts]
-    if not state.wanted.keep_cavities:
-        state.solid = unite(shapes)
-        return
-    soup = state.soup
-    inward = np.bincount(soup.body, signed_tetrahedra(soup.vertices, soup.faces), state.bodies) < 0
-    state.solid = unite_around_cavities(shapes, [bool(inward[part.body]) for part in state.parts])
 
 
 def _is_nothing(state: State) -> bool:
@@ -108,7 +98,7 @@ STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (_always, build_walls),
     (is_crowd, wrap_sheets),
     (has_sheets, build_slabs),
-    (_always, _unite),
+    (_always, State.unite_parts),
     (is_inside_out, rebuild_tangles),
     (may_have_rooms, fill_rooms),
     (may_have_slits, fill_slits),
@@ -149,7 +139,7 @@ def repair(
     threads
         Number of threads that measure distances; all cores by default. The result does not depend on it.
     keep_cavities
-        Keep sealed rooms empty: those that a union encloses, and closed bodies wound opposite to the body around them.
+        Keep closed cavities empty: those that a union encloses, and closed bodies wound against the body around them.
         A closed sheet without thickness still becomes a solid.
 
     Returns
@@ -170,7 +160,21 @@ def repair(
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
     poll_stop()
     frame = Frame.of(points)
-    points = frame.to_frame(points)
+    cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
+    wanted = Wanted(open_bodies, gap, cells, keep_cavities)
+    solid = _repaired(mesh, (frame.to_frame(points), corners), frame, wanted, threads)
+    vertices, faces = solid.surface
+    is_left = np.full(len(vertices), len(faces) > 0) & ~marked(faces, len(vertices))
+    if len(mesh.specks) == 0 and not is_left.any():
+        return solid
+    return replace(solid, left_out=np.concatenate([vertices[is_left], frame.to_frame(mesh.specks)]))
+
+
+def _repaired(
+    mesh: InputMesh, soup: tuple[FloatArray, Int64Array], frame: Frame, wanted: Wanted, threads: int | None
+) -> Solid:
+    """Repair the vertices and faces of a mesh in its frame."""
+    points, corners = soup
     poll_stop()
     welded_vertices, welded_faces, is_film = _native.weld(points, corners)
     taken = one_body(welded_vertices, welded_faces)
@@ -188,8 +192,7 @@ def repair(
         solid = hull_of_points(points)
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), (*mesh.warnings, said))
-    cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
-    state = State(SurfaceQuery(vertices, faces, threads), frame, Wanted(open_bodies, gap, cells, keep_cavities))
+    state = State(SurfaceQuery(vertices, faces, threads), frame, wanted)
     _take_steps(state)
     return state.result(mesh.warnings)
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from manifold3d import Manifold, OpType
+from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd._native import poll_stop
@@ -110,7 +112,31 @@ def split_labels(vertices: FloatArray, faces: Int64Array, label: Int64Array) -> 
     return parts
 
 
+@dataclass(frozen=True)
+class Cavities:
+    """Cavities of a solid that were filled.
+
+    Attributes
+    ----------
+    count : int
+    walls : (vertices, faces), optional
+        What was dropped to fill them, as it was wound: with the faces of the filled solid, the surface that was there.
+    """
+
+    count: int = 0
+    walls: tuple[FloatArray, NDArray[np.int32]] | None = None
+
+
 def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Shape:
+    """Unite solids and fill the cavities nothing can reach; see `unite_and_fill`."""
+    if not keep_cavities:
+        return unite_and_fill(solids)[0]
+    united = _all_united(solids)
+    # More cavity than solid means shells that came out inside out, not cavities.
+    return united if volume_of(united) > 0 else _filled(united)[0]
+
+
+def unite_and_fill(solids: Sequence[Shape]) -> tuple[Shape, Cavities]:
     """Unite solids and fill the cavities nothing can reach; one that is no manifold has none (`one_body`).
 
     Raises
@@ -118,39 +144,45 @@ def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Shape:
     CrossingsError
         They cross each other too often.
     """
+    return _filled(_all_united(solids))
+
+
+def _all_united(solids: Sequence[Shape]) -> Shape:
     if len(solids) == 1 and not isinstance(solids[0], Manifold):
         return solids[0]
     manifolds = [manifold for solid in solids if not (manifold := as_manifold(solid)).is_empty()]
     if not manifolds:
         return Manifold()
-    if len(manifolds) > MOST_UNITED:
-        return Manifold.compose(manifolds)
-    united = _united(manifolds)
-    # More cavity than solid means shells that came out inside out, not cavities.
-    return united if keep_cavities and united.volume() > 0 else _without_cavities(united)
+    return Manifold.compose(manifolds) if len(manifolds) > MOST_UNITED else _united(manifolds)
 
 
-def unite_around_cavities(shapes: Sequence[Shape], inward: list[bool]) -> Shape:
-    """Unite solids except for the cavities that some of them bound, and keep what stands in a cavity.
+def hollowed(shapes: Sequence[Shape], inward: Sequence[bool]) -> Sequence[Shape]:
+    """Cut out of solids the cavities that others of them bound; what stands in a cavity stays.
 
     Parameters
     ----------
     shapes : sequence of Manifold or (vertices, faces)
         Each with positive volume.
-    inward : list of bool
+    inward : sequence of bool
         Which of them the input winds inside out. A solid is a cavity if it is wound opposite to the outermost solid
         around it.
+
+    Returns
+    -------
+    sequence of Manifold or (vertices, faces)
+        The same if there are no cavities.
     """
+    if len(set(inward)) < 2:
+        return shapes
     solids = [as_manifold(shape) for shape in shapes]
     kept = [i for i, solid in enumerate(solids) if not solid.is_empty()]
-    if len({inward[i] for i in kept}) < 2:
-        return unite(solids, keep_cavities=True)
     around = {kept[i]: [kept[j] for j in others] for i, others in enumerate(_around([solids[i] for i in kept]))}
     outermost = {i: max(around[i], key=lambda j: solids[j].volume(), default=i) for i in kept}
     cavities = {i for i in kept if inward[i] != inward[outermost[i]]}
+    if not cavities:
+        return shapes
     inside: dict[int, list[Manifold]] = {j: [solids[i] for i in sorted(cavities) if j in around[i]] for j in kept}
-    hollow = [solids[j] - as_manifold(unite(inside[j])) if inside[j] else solids[j] for j in kept if j not in cavities]
-    return unite(hollow, keep_cavities=True)
+    return [solids[j] - as_manifold(unite(inside[j])) if inside[j] else solids[j] for j in kept if j not in cavities]
 
 
 def _around(solids: list[Manifold]) -> list[list[int]]:
@@ -172,19 +204,21 @@ def _around(solids: list[Manifold]) -> list[list[int]]:
     return around
 
 
-def _without_cavities(solid: Manifold) -> Shape:
+def _filled(solid: Shape) -> tuple[Shape, Cavities]:
     """Fill the cavities: drop the shells that bound them, and what stands in them.
 
     manifold3d's own decomposition takes time in proportion to the number of shells times that of the faces, and noise
     between overlapping walls leaves hundreds of tiny cavities.
     """
+    if not isinstance(solid, Manifold) or solid.is_empty():
+        return solid, Cavities()
     vertices, faces = surface_of(solid)
     shells = _native.closed_bodies(vertices, faces)
     assert shells is not None, "two faces of a manifold share an edge"
     shell, volume, _, boxes = shells[:4]
     is_cavity = volume <= 0
     if not is_cavity.any() or is_cavity.all():
-        return solid
+        return solid, Cavities()
     kept = ~is_cavity
     order = np.argsort(shell, kind="stable")
     begin = np.searchsorted(shell[order], np.arange(len(volume) + 1))  # where the faces of each shell begin
@@ -197,7 +231,9 @@ def _without_cavities(solid: Manifold) -> Shape:
         around = _native.Surface(vertices, np.ascontiguousarray(faces[order[begin[cavity] : begin[cavity + 1]]]))
         standing = around.winding(vertices[faces[order[begin[some]], 0]], is_closed=True) < 0
         kept[some[standing]] = False
-    return compacted(vertices, faces[kept[shell]])
+    is_kept = kept[shell]
+    walls = compacted(vertices, faces[~is_kept])
+    return compacted(vertices, faces[is_kept]), Cavities(int(is_cavity.sum()), walls)
 
 
 def _united(solids: list[Manifold]) -> Manifold:

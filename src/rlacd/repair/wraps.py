@@ -15,7 +15,7 @@ from rlacd.repair.distance import (
 )
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import area_of, as_manifold, size_of, slab_of_faces, tunnels_in, unite, volume_of
+from rlacd.repair.union import Cavities, area_of, as_manifold, size_of, slab_of_faces, tunnels_in, unite, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.component import DENSE
@@ -58,14 +58,14 @@ def wrap_sheets(state: State) -> None:
         return
     state.note(soup.body, "wrapped")
     state.parts = [part for part in state.parts if not is_slab[part.body]]
-    state.parts.append(Piece(wrap, int(soup.body.min())))
+    state.parts.append(Piece(wrap, int(soup.body.min()), is_slab=True))
     state.sheets = no_faces(soup.vertices)
 
 
 def wrap_all(state: State) -> None:
     """Take what the ball cannot reach from outside all bodies to be solid."""
     gap = state.wanted.gap
-    state.solid = _wrapped(state, state.soup)
+    state.solid, state.cavities = _wrapped(state, state.soup), Cavities()
     state.note(state.soup.body, "wrapped")
     state.parts = [Piece(state.solid, 0)]
     state.warnings.append(
@@ -99,7 +99,7 @@ def rebuild_tangles(state: State) -> None:
         solid = slab_of_faces(own.vertices, own.faces) if is_few else _wrapped(state, own)
         state.note(own.body, "slab" if is_few else "wrapped")
         state.parts.append(Piece(solid, body))
-    state.solid = unite([part.shape for part in state.parts], keep_cavities=state.wanted.keep_cavities)
+    state.unite_parts()
     bodies = "1 body crosses" if len(tangled) == 1 else f"{len(tangled)} bodies cross"
     state.warnings.append(
         f"{bodies} too much of their own surface to be cut, so whatever the faces enclose is taken to be solid."

@@ -60,7 +60,9 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
         f"There was no time to repair the mesh: the result is the convex hulls of its bodies as they are in the file "
         f"({len(hulls)}), and the mass is that of these hulls."
     )
-    solid = Solid(Manifold(), (vertices, faces), frame, (), (*mesh.warnings, warning))
+    solid = Solid(
+        Manifold(), (vertices, faces), frame, (), (*mesh.warnings, warning), left_out=frame.to_frame(mesh.specks)
+    )
     return solid, [Part(hull.vertices, hull.faces, hull.volume, hull) for hull in hulls]
 
 

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.topology import compacted
+
+
+def no_points() -> FloatArray:
+    """An array of no points."""
+    return np.empty((0, 3))
+
 
 _UNITS = {1e-6: "µm", 1e-3: "mm", 1e-2: "cm", 1.0: "m", 0.0254: "in", 0.3048: "ft"}
 
@@ -84,6 +92,10 @@ class InputMesh:
         What the input's coordinates were multiplied by.
     left_out
         Nodes of the asset whose triangles were left out: hulls for an engine, which new ones replace.
+    specks
+        ``[N, 3]``, where faces were that are a single point: they were left out.
+    deviation
+        How far the triangles may be from the curved surfaces that the input describes; None if it holds triangles.
     """
 
     vertices: FloatArray
@@ -97,6 +109,8 @@ class InputMesh:
     asset: Asset | None = None
     factor: float = 1.0
     left_out: tuple[SourceNode, ...] = ()
+    specks: FloatArray = field(default_factory=no_points)
+    deviation: float | None = None
 
     @property
     def unit(self) -> str:
@@ -105,10 +119,12 @@ class InputMesh:
 
     def scaled(self, factor: float) -> InputMesh:
         """Multiply all coordinates."""
-        return replace(self, vertices=self.vertices * factor, factor=self.factor * factor)
+        deviation = None if self.deviation is None else self.deviation * factor
+        vertices, specks = self.vertices * factor, self.specks * factor
+        return replace(self, vertices=vertices, specks=specks, deviation=deviation, factor=self.factor * factor)
 
     def of_node(self, index: int) -> InputMesh:
         """Get only the triangles that one node places, and the vertices that they use."""
         assert self.node_of is not None
         vertices, faces = compacted(self.vertices, self.faces[self.node_of == index])
-        return replace(self, vertices=vertices, faces=faces, warnings=(), nodes=(), node_of=None)
+        return replace(self, vertices=vertices, faces=faces, warnings=(), nodes=(), node_of=None, specks=no_points())

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rlacd._native import Surface
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
+from rlacd.solid.input_mesh import no_points
 
 Shape: TypeAlias = Manifold | tuple[FloatArray, NDArray[np.int32]]
 """A closed solid: a manifold, or vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]``."""
@@ -104,6 +105,12 @@ class Solid:
     pieces
         Closed solids whose union, without its cavities, the shape is; none if that is not known, or there is only one.
         They may be removed when they are no longer needed: they take as much memory as the shape.
+    left_out
+        ``[N, 3]``, corners of faces that have two corners or all three in one place, if they are those of no other
+        face.
+    cavity_walls
+        Faces around the cavities that were filled, as the input winds them, and around what stands in them; None if
+        there were none. With the shape's own faces, they bound what the input bounds.
     """
 
     shape: Shape
@@ -116,6 +123,8 @@ class Solid:
     is_as_given: bool = False
     index: Surface | None = None
     pieces: list[Shape] = field(default_factory=list)
+    left_out: FloatArray = field(default_factory=no_points)
+    cavity_walls: Shape | None = None
 
     @property
     def vertices(self) -> FloatArray:
@@ -126,6 +135,11 @@ class Solid:
     def faces(self) -> NDArray[np.int32]:
         """Of the shape ``[F, 3]``, outward."""
         return self.mesh[1]
+
+    @property
+    def weighed(self) -> list[tuple[FloatArray, NDArray[np.int32]]]:
+        """Meshes ``[V, 3]``, ``[F, 3]`` that together bound what the input bounds: the solid less its cavities."""
+        return [self.mesh] if self.cavity_walls is None else [self.mesh, mesh_of(self.cavity_walls)]
 
     @cached_property
     def manifold(self) -> Manifold:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.apart import Answered, answer_of, served
-from rlacd.io.read.contents import Contents, damaged
+from rlacd.io.read.contents import USUAL, Contents, Fineness, damaged
 from rlacd.io.read.gltf import read_gltf, split
 from rlacd.io.read.open_file import JSON_CHUNK, MAGIC
 from rlacd.options.names import UNITS
@@ -18,8 +18,11 @@ from rlacd.pool import Blobs, Values
 
 SERVER = "rlacd.io.read.cad:triangulate"
 
-DEVIATION = 1e-3
-"""How far triangles may be from the surface, as a share of the longest side: a fifth of a threshold of 0.01."""
+FINEST = 5e-5
+"""Share of the longest side that triangles may be from the surface at least: a tenth of the least threshold."""
+
+MOST = 500_000
+"""Triangles, about: with a smaller deviation their number grows in proportion, and the time faster."""
 
 ANGLE = 0.5
 """Radians between neighbouring triangles of a curved surface, however small: 13 sides a circle."""
@@ -28,8 +31,10 @@ ROUGH = 0.1
 """The same as a share of the edge that a surface ends at, where only its size is wanted."""
 
 
-def read_cad(path: Path, content: bytes) -> Contents:
+def read_cad(path: Path, content: bytes, fineness: Fineness) -> Contents:
     """Read the solids and surfaces of an assembly: a node for each, in metres and the axes of the file.
+
+    A deviation that takes more than `MOST` triangles becomes larger, with a warning.
 
     Raises
     ------
@@ -39,18 +44,28 @@ def read_cad(path: Path, content: bytes) -> Contents:
         The extra ``cad`` is not installed.
     """
     kind = "step" if path.suffix.lower() in (".step", ".stp") else "iges"
-    glb = answer_of(SERVER, path, kind.upper(), {"path": str(path), "kind": kind}, {"file": content}).blobs["glb"]
-    contents = read_gltf(path, glb)
+    wanted = {"path": str(path), "kind": kind, **fineness._asdict()}
+    answer = answer_of(SERVER, path, kind.upper(), wanted, {"file": content})
+    glb, contents = answer.blobs["glb"], read_gltf(path, answer.blobs["glb"])
     if not contents.geometry:
         raise MeshFileError(f"{path} holds no surfaces: if its parts lie elsewhere, export them all into one file")
     empty = sum("mesh" not in node and not node.get("children") for node in split(glb)[0]["nodes"])
-    said = f"parts of {path.name} without surfaces, or that lie in other files, were left out: {empty}"
-    return contents._replace(warnings=(*contents.warnings, *([said] if empty else [])), up="z")
+    said = [f"parts of {path.name} without surfaces, or that lie in other files, were left out: {empty}"] * (empty > 0)
+    deviation, sought = answer.values["deviation"], answer.values["sought"]
+    if deviation > sought:
+        said.append(
+            f"the triangles of {path.name} are up to {deviation:.4g} m from its surfaces, more than a tenth of the "
+            f"threshold: {sought:.4g} m would take over {MOST} of them"
+        )
+    return contents._replace(warnings=(*contents.warnings, *said), up="z", deviation=deviation)
 
 
 @served
 def triangulate(values: Values, blobs: Blobs) -> Answered:
-    """Convert a ``file`` of a ``kind`` to a ``glb`` in metres: twice, the first time to see how large it is."""
+    """Convert a ``file`` of a ``kind`` to a ``glb`` in metres, with the ``deviation`` ``sought``, or a larger one.
+
+    First it is converted roughly, to see how large it is, then as usual, to see how many triangles that takes.
+    """
     import cascadio
 
     def converted(**tolerance: float | bool) -> bytes:
@@ -59,17 +74,33 @@ def triangulate(values: Values, blobs: Blobs) -> Answered:
             return bytes(glb)
         raise damaged(Path(values["path"]), values["kind"].upper(), "or it holds no surfaces")
 
+    def contents_of(glb: bytes) -> Contents:
+        return read_gltf(Path(values["path"]), glb)
+
+    unit = UNITS["mm"] if values["kind"] == "iges" else 1.0  # STEP is written in metres, and IGES in millimetres
     glb = converted(tol_linear=ROUGH, tol_relative=True)
-    if size := _size(read_gltf(Path(values["path"]), glb)):
-        unit = 1.0 if values["kind"] == "iges" else UNITS["mm"]  # STEP is written in metres, and IGES as it is
-        glb = converted(tol_linear=DEVIATION * size / unit)
-    return {}, {"glb": _scaled(glb, UNITS["mm"]) if values["kind"] == "iges" else glb}
+    whole, least = (unit * size for size in _sizes(contents_of(glb)))
+    usual = USUAL.share * whole
+    wanted = values["share"] * (least if values["of_nodes"] else whole)
+    wanted = wanted if values["metres"] is None else values["metres"]
+    deviation = sought = min(max(wanted, FINEST * whole), usual)
+    if usual > 0:
+        glb = converted(tol_linear=usual / UNITS["mm"])
+    if sought < usual:
+        count = sum(len(shape.faces) for _, shape in contents_of(glb).geometry)
+        deviation = max(sought, usual * min(count / MOST, 1.0))
+        glb = converted(tol_linear=deviation / UNITS["mm"])
+    facts = {"deviation": deviation, "sought": sought}
+    return facts, {"glb": _scaled(glb, unit) if values["kind"] == "iges" else glb}
 
 
-def _size(contents: Contents) -> float:
-    """The longest side of all that is placed."""
+def _sizes(contents: Contents) -> tuple[float, float]:
+    """The longest side of all that is placed, and that of the smallest node."""
     placed = [shape.vertices @ node.transform[:3, :3].T + node.transform[:3, 3] for node, shape in contents.geometry]
-    return float(np.ptp(np.concatenate(placed), axis=0).max()) if placed else 0.0
+    if not placed:
+        return 0.0, 0.0
+    sides = [float(np.ptp(points, axis=0).max()) for points in placed]
+    return float(np.ptp(np.concatenate(placed), axis=0).max()), min(sides)
 
 
 def _scaled(glb: bytes, factor: float) -> bytes:

@@ -43,6 +43,28 @@ class Triangles(NamedTuple):
     faces: npt.NDArray[Any]
 
 
+class Fineness(NamedTuple):
+    """How near to curved surfaces their triangles have to be; no file takes more than the usual distance.
+
+    Attributes
+    ----------
+    share
+        Of the longest side of everything, or with `of_nodes` of the smallest node's.
+    metres
+        Instead of a share, a length.
+    of_nodes
+        Whether nodes count by themselves.
+    """
+
+    share: float = 1e-3
+    metres: float | None = None
+    of_nodes: bool = False
+
+
+USUAL = Fineness()
+"""A fifth of a threshold of 0.01."""
+
+
 class Contents(NamedTuple):
     """All that is read of a file.
 
@@ -56,6 +78,8 @@ class Contents(NamedTuple):
         The axis that points up, and the unit of length in metres if the file or its format states it.
     asset
         The file, if it says more than where its triangles are: colours, materials, texture coordinates, nodes.
+    deviation
+        How far its triangles may be from the surfaces that it describes, if these are curved.
     """
 
     geometry: Sequence[tuple[SourceNode, Triangles]]
@@ -63,6 +87,7 @@ class Contents(NamedTuple):
     up: Axis = "z"
     metres: float | None = None
     asset: Asset | None = None
+    deviation: float | None = None
 
 
 def one_shape(name: str, vertices: FloatArray, faces: Int64Array | None = None) -> list[tuple[SourceNode, Triangles]]:

@@ -18,18 +18,21 @@ from numpy.typing import ArrayLike
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError, OptionError
 from rlacd.io.read import function_of
-from rlacd.io.read.contents import Contents, damaged, one_shape, require_few, without_engine_hulls
+from rlacd.io.read.contents import USUAL, Contents, Fineness, damaged, one_shape, require_few, without_engine_hulls
 from rlacd.io.read.in_memory import is_in_memory, opened
 from rlacd.io.read.open_file import CONVERTERS, NO_MESHES, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.options.fields import shown
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, heights
-from rlacd.solid.input_mesh import Asset, InputMesh
+from rlacd.solid.input_mesh import Asset, InputMesh, no_points
 
 Source: TypeAlias = (
     "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
     " | ArrayLike | IO[bytes]"
 )
+
+CURVED = ("step", "stp", "iges", "igs")
+"""The formats that hold surfaces instead of triangles."""
 
 READERS = {
     "obj": "read.obj:read_obj",
@@ -41,7 +44,7 @@ READERS = {
     **dict.fromkeys(("dae", "zae"), "read.collada:read_collada"),
     "3mf": "read.threemf:read_3mf",
     "fbx": "read.fbx:read_fbx",
-    **dict.fromkeys(("step", "stp", "iges", "igs"), "read.cad:read_cad"),
+    **dict.fromkeys(CURVED, "read.cad:read_cad"),
     "xyz": "read.simple_formats:read_xyz",
     **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "read.usd:read_usd"),
 }
@@ -51,7 +54,9 @@ FORMATS = tuple(READERS)
 """The formats that are read."""
 
 
-def load_mesh(source: Source, faces: ArrayLike | None = None, file_type: str | None = None) -> InputMesh:
+def load_mesh(
+    source: Source, faces: ArrayLike | None = None, file_type: str | None = None, fineness: Fineness = USUAL
+) -> InputMesh:
     """Read a mesh of any format and bring all its bodies into one list of triangles.
 
     Parameters
@@ -66,6 +71,8 @@ def load_mesh(source: Source, faces: ArrayLike | None = None, file_type: str | N
         Of vertices that are the source.
     file_type
         The format of an open file or of bytes, where neither its name nor its content tells it.
+    fineness
+        How near the triangles of a file of curved surfaces have to be to them.
 
     Returns
     -------
@@ -98,7 +105,7 @@ def load_mesh(source: Source, faces: ArrayLike | None = None, file_type: str | N
         source = os.fspath(source)  # bytes are refused below
     if isinstance(source, str):
         path = Path(source)
-        return without_engine_hulls(_baked(path.name, _read(path)))
+        return without_engine_hulls(_baked(path.name, _read(path, fineness)))
     if isinstance(source, list) and source and all(isinstance(one, trimesh.Trimesh) for one in source):
         source = trimesh.Scene(source)
     arrays_of, geometry_of = (function_of(f"read.trimesh_scene:{name}") for name in ("arrays_of", "geometry_of"))
@@ -113,7 +120,7 @@ def load_mesh(source: Source, faces: ArrayLike | None = None, file_type: str | N
     )
 
 
-def _read(path: Path) -> Contents:
+def _read(path: Path, fineness: Fineness) -> Contents:
     """Parse a file; raises MeshFileError with the most likely reason."""
     content = read_named(path)  # here, not by name in a parser: a name like a URL must not be fetched
     if not content.strip(b"\0 \t\r\n"):
@@ -130,7 +137,8 @@ def _read(path: Path) -> Contents:
         hint = f"{renamed}, which it seems to hold" if renamed else "convert it to glb, obj, stl or ply"
         raise MeshFileError(f"{path} is in a format that rlacd does not read: {CONVERTERS.get(extension, hint)}")
     try:
-        contents: Contents = function_of(READERS[extension])(path, content)
+        how = (fineness,) if extension in CURVED else ()
+        contents: Contents = function_of(READERS[extension])(path, content, *how)
     except Exception as error:  # parsers may raise anything on damaged files
         if renamed:
             raise MeshFileError(f"{path} is not {extension} but {holds}: {renamed}") from error
@@ -176,7 +184,8 @@ def _baked(name: str, contents: Contents) -> InputMesh:
         why = f" ({'; '.join(contents.warnings)})" if contents.warnings else ""
         raise EmptyMeshError(f"{name} holds no triangles and no points{why}: check the export")
     mesh = replace(mesh, warnings=(*mesh.warnings, *contents.warnings), nodes=tuple(nodes))
-    return replace(mesh, up=contents.up, metres=contents.metres, asset=contents.asset)
+    mesh = replace(mesh, asset=contents.asset, deviation=contents.deviation)
+    return replace(mesh, up=contents.up, metres=contents.metres)
 
 
 def _usable(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Array | None) -> InputMesh:
@@ -195,7 +204,9 @@ def _usable(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Ar
         vertices = vertices[finite]
     first = vertices[faces[:, 0]]  # a node of scale 0, a way to hide it, must not stretch the box of the others
     speck = (first == vertices[faces[:, 1]]).all(axis=1) & (first == vertices[faces[:, 2]]).all(axis=1)
+    specks = no_points()
     if speck.any() and not speck.all():
+        specks = first[speck]
         faces, node_of = faces[~speck], None if node_of is None else node_of[~speck]
     arrays = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
-    return InputMesh(*arrays, name, tuple(warnings), node_of=node_of)
+    return InputMesh(*arrays, name, tuple(warnings), node_of=node_of, specks=specks)

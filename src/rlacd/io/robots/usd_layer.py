@@ -124,7 +124,7 @@ def _body(prim: Any) -> Any:
 def _fix_mass(path: Path, body: Any, masses: Mapping[str, Any]) -> None:
     """State the mass, centre and inertia of a body, as they follow from its shapes before hulls are among them.
 
-    Meshes that become hulls have `masses`: those of the repaired solids, along their axes on the stage.
+    Meshes that become hulls have `masses`: those of their reports, along their axes on the stage.
     """
     from pxr import Gf, Usd, UsdGeom, UsdPhysics
 

@@ -46,7 +46,7 @@ class RigidBody:
     visual
         The input as it was read; None for a point cloud.
     mass
-        Of the repaired solid, at the requested density.
+        Of the repaired solid without its closed cavities, at the requested density.
     up
         The axis of the input that points up.
     is_scene
