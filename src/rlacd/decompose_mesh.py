@@ -107,8 +107,8 @@ def decompose(
     max_vertices, max_faces : int, optional
         Limits on the vertices and triangles of each hull. A limited hull contains its part and sticks out by at most
         the threshold (by 0.05 with the criterion ``volume``); concavity does not count the volume that a limit adds. A
-        part without such a hull is cut on as `max_hulls` allows, but never to twice the hulls it takes without limits:
-        a convex body stays one hull. Where that does not do, a warning says how far hulls stick out.
+        part without such a hull is cut on as `max_hulls` allows, but never beyond twice the hulls it takes without
+        limits, and a convex body stays one hull. Where that does not do, a warning says how far hulls stick out.
     detail : "simple" or "full"
         ``simple``: hulls leave out corners that add little, so that they have few, as far as the part still meets the
         criterion. ``full``: the exact hulls of the parts.

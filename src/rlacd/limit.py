@@ -20,10 +20,10 @@ from rlacd.search import SearchContext, eliminate_parts
 from rlacd.solid.component import Component, Part
 
 TIMES_PARTS = 2
-"""Parts are cut on for fewer corners as long as there are fewer than so many times the parts without that."""
+"""Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
 
-SHARE_OF_WORK = 0.3
-"""Of the work done so far, that cutting on may take."""
+SHARE_OF_WORK, LEAST_WORK = 0.3, 0.1e6
+"""Of the work done so far, that cutting on may take, and as much again to merge; at least so many units."""
 
 PIECES = 2
 """Cutting on stops at so many times the pieces that there is room for: merging leaves half of them."""
@@ -37,28 +37,28 @@ def cut_to_limits(
 ) -> list[Part]:
     """Cut parts whose hulls do not meet the criterion only because of the limits, those that take few pieces first.
 
-    A part stays whole if its pieces would not meet it either, or if there would be too many parts. So a convex body
-    always is one.
+    A part stays whole if its pieces would not meet it either, or if there would be too many parts. A body that is one
+    part, such as a ball, always stays one.
     """
-    room = int(min(TIMES_PARTS * len(parts) - 1, options.max_hulls or math.inf)) - len(parts)
-    if room < 1:
+    room = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf)) - len(parts)
+    if room < 1 or len(parts) == 1:
         return parts
     cut = parts
     try:
         met = run.map(limited.is_met, parts)
-        with run.limited(SHARE_OF_WORK * run.work.done):
+        with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_WORK)):
             pieces: dict[Part, list[Part]] = {}
             for part, is_met in zip(parts, met, strict=True):
                 if not is_met and limited.criterion.is_met(part):
                     pieces[part] = _cut_on(part, limited, solid, options, run, room)
             kept = {part: [part] for part in parts}
             for part, new in sorted(pieces.items(), key=lambda item: len(item[1])):
-                if 1 < len(new) <= room + 1:
+                if 1 <= len(new) <= room + 1:
                     room -= len(new) - 1
                     kept[part] = new
             cut = [piece for part in parts for piece in kept[part]]
         if len(cut) > len(parts) and options.merge:
-            with run.limited(SHARE_OF_WORK * run.work.done):
+            with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_WORK)):
                 cut = merge_parts(cut, limited, run, solid=solid)
                 context = SearchContext(solid, limited, options.seed, SweepCache(), first_policy=options.first_policy)
                 cut = eliminate_parts(context, cut, run)
