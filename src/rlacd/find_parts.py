@@ -34,9 +34,6 @@ COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
 only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
 
-SEARCHED = 1.25
-"""Under coarser goals, a search follows if the parts are at most so many times those allowed."""
-
 
 class Reached(NamedTuple):
     """The decomposition reached: complete, or the state when it was stopped.
@@ -84,7 +81,7 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     parts, goal, found = decomposer.decompose(goal)
     limited, most = LimitedCriterion(goal, options.hull_limits), options.max_hulls
     if most is not None and not decomposer.keeps(most, parts):
-        parts = at_most(most, decomposer.coarser(parts, goal, most), decomposer.unite, root, limited, run)
+        parts = at_most(most, decomposer.coarser(parts, goal), decomposer.unite, root, limited, run)
     elif any(options.hull_limits):
         with run.stage("limit"):
             parts = cut_to_limits(parts, limited, root, options, run)
@@ -137,23 +134,18 @@ class _Decomposer:
             parts, found = self._searched(done.parts, done.criterion, goal)
             return self._lifted(parts, goal), goal if self.model.proxy else done.criterion, found
 
-    def coarser(self, free: list[Part], goal: Criterion, most: int) -> Iterator[list[Part]]:
+    def coarser(self, free: list[Part], goal: Criterion) -> Iterator[list[Part]]:
         """Get decompositions under coarser and coarser goals, until one part is left; `free` is that under the goal.
 
-        Those of few parts are searched too. The larger `most`, the more of them: none is left out.
+        They are not searched: on real meshes, hulls as few as asked for fit no better, and it takes most of the time.
         """
         yield free
-        factor, work = 1.0, 0
+        factor, begin = 1.0, self.run.work.done
         while self.run.stopped_by is None:
-            factor *= COARSER if work < MOST_CUTTING else COARSER**4
+            factor *= COARSER if self.run.work.done - begin < MOST_CUTTING else COARSER**4
             with self.run.limited():
                 done = cut_and_merge(self.tree, self.model.tighter(goal, factor), self.run, merge=self.options.merge)
-                work += self.run.work.done
-                found = [done.parts]
-                if 1 < len(done.parts) <= SEARCHED * most:
-                    found.append(self._searched(done.parts, done.criterion, None)[0])
-                found = [self._lifted(parts, goal, factor) for parts in found]
-            yield from found
+            yield self._lifted(done.parts, goal, factor)
             if len(done.parts) <= 1:
                 return
 

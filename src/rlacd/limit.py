@@ -22,7 +22,7 @@ from rlacd.solid.component import Component, Part
 TIMES_PARTS = 2
 """Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
 
-SHARE_OF_WORK, LEAST_WORK = 0.3, 0.1e6
+SHARE_OF_WORK, LEAST_WORK = 0.3, 0.2e6
 """Of the work done so far, that cutting on may take, and as much again to merge; at least so many units."""
 
 PIECES = 2
@@ -93,7 +93,7 @@ def at_most(
     Parameters
     ----------
     most : int
-        With a larger one, the same states and more are looked at, so the error is never larger.
+        With a larger one, more of the same states are looked at, so the error is never larger.
     decompositions : iterable of sequence of Part
         Under coarser and coarser goals. Their parts are united two at a time, and every state on the way counts.
     unite : callable
