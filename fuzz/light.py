@@ -19,12 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 import rlacd
 from fuzz.choices import draw_options
 from fuzz.judges import Case, judge
 from fuzz.mutations import Seed, mutated, nudged, packed
-from fuzz.recipes import Shape, make_shape
+from fuzz.recipes import Shape, concatenated, make_shape
 from fuzz.trials import Trial
 from rlacd.io.read.load import load_mesh
 from rlacd.solid.input_mesh import InputMesh
@@ -37,6 +38,9 @@ LARGEST_FILE = 10_000
 
 MOST_FACES = 48
 """Of a small shape."""
+
+BALLS = 5
+"""One in so many small shapes is round, under limits on its corners."""
 
 SAMPLES = 100
 """Points of the input and of the hulls that the judges look at."""
@@ -100,6 +104,8 @@ class LightTrials:
 
     def shape(self, number: int) -> tuple[Shape, Options]:
         """Shape and options of a trial of the kind ``small``: the first of its shapes that is small enough."""
+        if number % BALLS == 0:
+            return _under_limits(np.random.default_rng([self.seed, number, 22]))
         for tries in range(100):
             shape = make_shape(self.seed * 10**12 + number * 100 + tries)
             if len(shape.faces) <= MOST_FACES:
@@ -196,6 +202,31 @@ def _is_here(file: Seed) -> bool:
 
 def _chosen(trial: Trial) -> bool:
     return bool(np.random.default_rng([trial.seed, trial.number, 22]).random() < DECOMPOSED)
+
+
+def _under_limits(random: np.random.Generator) -> tuple[Shape, Options]:
+    """A few balls of up to 200 corners, stretched, under limits."""
+    balls = []
+    for _ in range(int(random.integers(1, 4))):
+        points = random.normal(size=(int(random.choice([20, 60, 200])), 3))
+        ball = ConvexHull(points / np.linalg.norm(points, axis=1)[:, None])
+        outwards = np.where(np.linalg.det(ball.points[ball.simplices]) > 0, 1, -1)
+        faces = np.where(outwards[:, None] > 0, ball.simplices, ball.simplices[:, ::-1]).astype(np.int64)
+        corners = ball.points * random.uniform(0.2, 1, 3) + random.choice([0.0, 0.5, 3.0], 3)
+        balls.append(Shape(corners, faces, ("ball",), True))
+    shape = concatenated(balls)
+    options: Options = {
+        "threads": 1,
+        "seed": 0,
+        "quality": "fast",
+        "threshold": float(random.choice([0.02, 0.05, 0.2])),
+    }
+    for name, share in (("max_vertices", 0.8), ("max_faces", 0.3), ("max_hulls", 0.2)):
+        if random.random() < share:
+            options[name] = int(random.choice([4, 5, 8, 16, 24, 32, 64] if name != "max_hulls" else [1, 2, 3]))
+    if random.random() < 0.2:
+        options["preset"] = str(random.choice(list(rlacd.PRESETS)))
+    return replace(shape, is_closed=len(balls) == 1), options
 
 
 def _cheap(options: Options) -> Options:

@@ -72,18 +72,19 @@ void bind_hull(nb::module_& m) {
         "Volumes [P] of the joint hulls of pairs [P, 2] of hulls.");
   m.def("simplify_hull",
         released([](const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
-                    const std::vector<HalfSpace>& bounds) {
+                    const std::vector<HalfSpace>& bounds, double enough) {
           require(tolerance >= 0, "the tolerance must not be negative");
           require(!hull.vertices.empty(), "the hull has no vertices");
           std::vector<Above> above;
           for (const HalfSpace& space : bounds) above.push_back({-space.normal, -space.offset});
-          return simplify_hull(hull, max_vertices, max_faces, tolerance, above);
+          return simplify_hull(hull, max_vertices, max_faces, tolerance, above, enough);
         }),
         "vertices"_a, "faces"_a, "max_vertices"_a, "max_faces"_a, "tolerance"_a, "bounds"_a,
+        "enough"_a = std::numeric_limits<double>::infinity(),
         "A convex hull (vertices [V, 3], faces [F, 3]) around a convex hull with at most max_vertices corners and "
         "max_faces triangles and little added volume; corners that cost no more than `tolerance` of distance go "
         "anyway. It stays in the half-spaces n.x <= d of bounds [P, 4] (unit n, d), unless the limits leave no such "
-        "hull.");
+        "hull. Without any, corners that stick out farther than `enough` are evened out.");
 
   nb::class_<FlushBody>(m, "FlushBody", "A closed convex triangle mesh by its flat sides, for finding contacts.")
       .def("__init__", released([](FlushBody* self, const Mesh& hull) { new (self) FlushBody(hull); }), "vertices"_a,

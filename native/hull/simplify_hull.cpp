@@ -10,6 +10,7 @@
 #include "distance/bvh.hpp"
 #include "hull/convex_collapse.hpp"
 #include "hull/convex_planes.hpp"
+#include "hull/even_out.hpp"
 
 namespace rlacd {
 namespace {
@@ -258,14 +259,15 @@ std::vector<std::size_t> stages(std::size_t corners, std::size_t most) {
 }  // namespace
 
 Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
-                   const std::vector<Above>& bounds) {
+                   const std::vector<Above>& bounds, double enough) {
   if (max_vertices < 4 || max_faces < 4) throw std::invalid_argument("a hull has at least 4 vertices and 4 faces");
   // A triangulated convex polytope has twice as many triangles as corners, minus four.
   const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
   const Whitening whitening(hull.vertices);
   if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kThinnest); !thick.empty())
-    return hull.vertices.size() <= most ? hull
-                                        : simplify_hull(hull_mesh(thick), max_vertices, max_faces, tolerance, {});
+    return hull.vertices.size() <= most
+               ? hull
+               : simplify_hull(hull_mesh(thick), max_vertices, max_faces, tolerance, {}, enough);
   std::vector<Vec3> whitened;
   for (const Vec3 p : hull.vertices) whitened.push_back(whitening.to(p));
   const Mesh inner = hull_mesh(whitened);
@@ -294,13 +296,14 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
     best = relax_around(hull_mesh(collapse.corners()), inner, within, stage > most ? kSweepsOnTheWay : kSweepsAtTheEnd);
     if (!fits) break;
   }
-  if (!fits && !within.empty()) return simplify_hull(hull, max_vertices, max_faces, tolerance, {});
+  if (!fits && !within.empty()) return simplify_hull(hull, max_vertices, max_faces, tolerance, {}, enough);
   if (!fits || (most <= kFewCorners && within.empty()))
     for (Mesh& cover : plain_covers(inner, most)) {
       cover = relax_around(std::move(cover), inner, {}, kSweepsAtTheEnd);
       if (!fits || mesh_volume(cover) < mesh_volume(best)) best = std::move(cover), fits = true;
     }
-  return brought_back(best, inner, whitening);
+  Mesh outer = brought_back(best, inner, whitening);
+  return within.empty() && std::isfinite(enough) ? evened_out(std::move(outer), hull, surface, enough) : outer;
 }
 
 }  // namespace rlacd

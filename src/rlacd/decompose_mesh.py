@@ -121,9 +121,10 @@ def decompose(
         least concavity among those found under coarser thresholds is returned, and ``report["warnings"]`` says by how
         much it exceeds the threshold. A larger limit never leads to a larger concavity.
     max_vertices, max_faces : int, optional
-        Limits on the vertices and triangles of each hull. A limited hull still contains its part, and the threshold
-        holds for it too: below 24 vertices or 44 triangles, parts that exceed it are cut on while `max_hulls` allows
-        it. Below 8 vertices or 12 triangles they are not, and a warning says by how much the threshold is exceeded.
+        Limits on the vertices and triangles of each hull. A limited hull contains its part and sticks out by at most
+        the threshold (by 0.05 with the criterion ``volume``); concavity does not count the volume that a limit adds. A
+        part without such a hull is cut on as `max_hulls` allows, but never beyond twice the hulls it takes without
+        limits, and a convex body stays one hull. Where that does not do, a warning says how far hulls stick out.
     detail : "simple" or "full"
         ``simple``: hulls leave out corners that add little, so that they have few, as far as the part still meets the
         criterion. ``full``: the exact hulls of the parts.

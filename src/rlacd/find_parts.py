@@ -1,4 +1,4 @@
-"""From a mesh to the parts of its solid: repair, simplify, cut, merge, search, lift; to at most so many parts.
+"""From a mesh to the parts of its solid: repair, simplify, cut, merge, search, lift, limit.
 
 Lift and limit cut again what fails; no other stage looks back.
 """
@@ -6,23 +6,23 @@ Lift and limit cut again what fails; no other stage looks back.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import NamedTuple
 
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
-from rlacd.criteria.limited import BOX, FEWEST
 from rlacd.cut import CutTree
-from rlacd.cut_and_merge import MOST_CUTTING, MOST_PER_FACE, cut_and_merge
-from rlacd.merge import drop_slivers, grow_cover, merge_parts
-from rlacd.merge.merge import united_in_turn
+from rlacd.cut_and_merge import MOST_CUTTING, cut_and_merge
+from rlacd.limit import at_most, cut_to_limits
+from rlacd.merge import drop_slivers, grow_cover
 from rlacd.options import FAST, Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy.model import Model
 from rlacd.repair.repair import repair
-from rlacd.run import Run, Work
+from rlacd.run import Run
 from rlacd.search import SearchContext, SearchSummary, at_least, cost, eliminate_parts, search
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
@@ -33,9 +33,6 @@ from rlacd.solid.solid import Solid
 COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
 only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
-
-FIRST_POWER = 8
-"""Power of `COARSER` from which parts over a limit are cut where few hulls are left: 25 times the threshold."""
 
 
 class Reached(NamedTuple):
@@ -82,14 +79,12 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     solid.pieces.clear()
     decomposer = _Decomposer.of(model, goal, options, run)
     parts, goal, found = decomposer.decompose(goal)
-    if options.max_hulls is not None and not decomposer.keeps(options.max_hulls, parts):
-        parts = decomposer.at_most(options.max_hulls, parts, goal)
-    elif options.hull_limits.allow(*BOX) and not options.hull_limits.allow(*FEWEST):
-        try:
-            with run.stage("limit"), run.limited(MOST_CUTTING + MOST_PER_FACE * root.size, cuts="cut"):
-                parts = decomposer.cut_to_limits(parts, goal)
-        except Stopped:
-            run.note_stop()
+    limited, most = LimitedCriterion(goal, options.hull_limits), options.max_hulls
+    if most is not None and not decomposer.keeps(most, parts):
+        parts = at_most(most, decomposer.coarser(parts, goal), decomposer.unite, root, limited, run)
+    elif any(options.hull_limits):
+        with run.stage("limit"):
+            parts = cut_to_limits(parts, limited, root, options, run)
     return Reached(solid, options, goal, parts, found, root)
 
 
@@ -129,79 +124,46 @@ class _Decomposer:
         tree = CutTree(model.component, policy, run, second=second)
         return cls(model, options, run, sweeps, tree)
 
-    def decompose(self, goal: Criterion, factor: float = 1.0) -> tuple[list[Part], Criterion, SearchSummary | None]:
-        """Cut, merge, search and lift under a threshold larger by a factor.
+    def decompose(self, goal: Criterion) -> tuple[list[Part], Criterion, SearchSummary | None]:
+        """Cut, merge, search and lift.
 
-        Returns the parts, the goal as settled on them, and a summary of the search. They do not depend on what was
-        done before.
+        Returns the parts, the goal as settled on them, and a summary of the search.
         """
         with self.run.limited():
-            done = cut_and_merge(self.tree, self.model.tighter(goal, factor), self.run, merge=self.options.merge)
-            parts, found = self._searched(done.parts, done.criterion, goal if factor == 1.0 else None)
-            if self.model.proxy is None:
-                return parts, done.criterion, found
-            policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
-            return self.model.lift(parts, goal, factor, policy, self.run, merge=self.options.merge), goal, found
+            done = cut_and_merge(self.tree, self.model.tighter(goal), self.run, merge=self.options.merge)
+            parts, found = self._searched(done.parts, done.criterion, goal)
+            return self._lifted(parts, goal), goal if self.model.proxy else done.criterion, found
+
+    def coarser(self, free: list[Part], goal: Criterion) -> Iterator[list[Part]]:
+        """Get decompositions under coarser and coarser goals, until one part is left; `free` is that under the goal.
+
+        They are not searched: on real meshes, hulls as few as asked for fit no better, and it takes most of the time.
+        """
+        yield free
+        factor, begin = 1.0, self.run.work.done
+        while self.run.stopped_by is None:
+            factor *= COARSER if self.run.work.done - begin < MOST_CUTTING else COARSER**4
+            with self.run.limited():
+                done = cut_and_merge(self.tree, self.model.tighter(goal, factor), self.run, merge=self.options.merge)
+            yield self._lifted(done.parts, goal, factor)
+            if len(done.parts) <= 1:
+                return
+
+    def _lifted(self, parts: list[Part], goal: Criterion, factor: float = 1.0) -> list[Part]:
+        if self.model.proxy is None:
+            return parts
+        policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
+        return self.model.lift(parts, goal, factor, policy, self.run, merge=self.options.merge)
 
     def keeps(self, most: int, parts: list[Part]) -> bool:
         """Whether there are at most so many parts."""
         with self.run.shielded():
             return len(parts) <= most or len(drop_slivers(parts, self.run)) <= most
 
-    def at_most(self, most: int, free: list[Part], goal: Criterion) -> list[Part]:
-        """The decomposition into at most so many parts whose largest error is least, among those under coarser goals.
-
-        `free` is that without a limit, which has more. If there is no time, the solid stays one part.
-        """
-        run, whole, limited = self.run, self.model.solid, LimitedCriterion(goal, self.options.hull_limits)
-        best, least = list[Part]([whole]), math.inf
-        factor, begin = 1.0, run.work.done
-        try:
-            least = limited.error(whole)
-            while True:
-                parts = free if factor == 1.0 else self.decompose(goal, factor)[0]
-                for state, error in united_in_turn(parts, self._united, limited, Work(MOST_CUTTING), run):
-                    if len(state) <= most and error < least:
-                        best, least = state, error
-                if len(parts) <= 1 or run.stopped_by is not None:
-                    return best
-                factor *= COARSER if run.work.done - begin < MOST_CUTTING else COARSER**4
-        except Stopped:
-            run.note_stop()
-        return best
-
-    def _united(self, first: Part, second: Part) -> Part:
+    def unite(self, first: Part, second: Part) -> Part:
+        """Unite two parts, across what lies between them where they were carried from a proxy."""
         clipped = self.model.proxy and self.model.solid.inside(Hull.around(first.hull, second.hull))
         return clipped if clipped and clipped.size else Part.glued(first, second)
-
-    def cut_to_limits(self, parts: list[Part], goal: Criterion) -> list[Part]:
-        """Cut parts that limits too low for the criterion make break it, the worst first, while hulls are left."""
-        limited, most = LimitedCriterion(goal, self.options.hull_limits), self.options.max_hulls or math.inf
-        met = self.run.map(limited.is_met, parts)
-        done = [part for part, is_met in zip(parts, met, strict=True) if is_met]
-        broken = sorted((part for part, is_met in zip(parts, met, strict=True) if not is_met), key=limited.error)
-        while broken and (room := most - len(done) - len(broken) + 1) > 1:
-            done += self._cut_on(broken.pop(), limited, room)
-        done += broken
-        if len(done) == len(parts) or not self.options.merge:
-            return done
-        return merge_parts(done, limited, self.run, solid=self.model.solid)
-
-    def _cut_on(self, part: Part, limited: Criterion, most: float) -> list[Part]:
-        """Get at most so many pieces of a part that meet the criterion, scaled where that takes more."""
-        inside = self.model.solid.inside(part.hull)
-        if not inside.size:
-            return [part]
-        policy = make_policy(self.options.first_policy, SweepCache(), _scale(limited))
-        tree, best = CutTree(Component((inside.vertices, inside.faces)), policy, self.run), [part]
-        first = 0 if most == math.inf else FIRST_POWER
-        for power in range(first, -1, -1):  # the finest that fits, by way of cheap ones
-            criterion = limited.scaled(COARSER**power)
-            new = cut_and_merge(tree, criterion, self.run, merge=self.options.merge).parts
-            if len(new) > most:
-                break
-            best = new
-        return best
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion | None

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import trimesh
 
 import rlacd
+from fuzz.geometry import Polytope
 from rlacd.finish.report import engine_shortcomings
 from rlacd.options.presets import PRESETS, find_preset
 from rlacd.solid.hull import Hull
@@ -17,17 +20,58 @@ def ball() -> trimesh.Trimesh:
     return trimesh.creation.icosphere(subdivisions=2)
 
 
+def barrel() -> trimesh.Trimesh:
+    height, angle = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(0, 2 * np.pi, 48, endpoint=False))
+    radius = 0.75 - 0.2 * height**2
+    corners = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
+    return trimesh.PointCloud(corners.reshape(-1, 3)).convex_hull
+
+
+def cloud(points: int) -> trimesh.Trimesh:
+    return trimesh.PointCloud(np.random.default_rng(points).normal(size=(points, 3))).convex_hull
+
+
+CONVEX = {
+    "ball": trimesh.creation.icosphere(subdivisions=3),
+    "coarse ball": ball(),
+    "barrel": barrel(),
+    "capsule": trimesh.creation.capsule(1.0, 0.5),
+    "cloud of 100": cloud(100),
+    "cloud of 500": cloud(500),
+}
+LIMITS: list[dict[str, Any]] = [*({"preset": name} for name in PRESETS), {"max_vertices": 8}, {"max_faces": 4}]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CONVEX)
+@pytest.mark.promise("presets", "convex-input")
+def test_a_convex_body_is_one_hull_within_any_limits_and_a_warning_tells_how_far_it_sticks_out(name: str) -> None:
+    body = CONVEX[name]
+    for limits in LIMITS:
+        (hull,) = result = rlacd.decompose(body, threads=1, quality="fast", **limits)
+        preset = PRESETS.get(limits.get("preset", ""))
+        assert len(hull.vertices) <= (limits.get("max_vertices") or (preset and preset.max_vertices) or np.inf)
+        assert len(hull.faces) <= (limits.get("max_faces") or (preset and preset.max_faces) or np.inf)
+        assert Polytope(hull.vertices, hull.faces).height(np.asarray(body.vertices)).max() <= 1e-9
+        out = trimesh.proximity.closest_point(body, hull.vertices)[1].max() * 2 / body.extents.max()
+        told = [warning for warning in result.report["warnings"] if "sticks out by up to" in warning]
+        assert len(told) == (out > 0.0501) or out > 0.0499
+        assert result.report["hausdorff"]["over"] == pytest.approx(out, abs=0.003)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.promise("presets")
-def test_round_bodies_are_brought_inside_the_limits(name: str) -> None:
-    preset = PRESETS[name]
-    result = rlacd.decompose(ball(), preset=name, threads=1, quality="fast")
+def test_a_preset_takes_at_most_twice_the_hulls(name: str) -> None:
+    preset, mesh = PRESETS[name], trimesh.creation.torus(1.0, 0.35, 48, 32)
+    free = rlacd.decompose(mesh, threads=1, quality="fast")
+    result = rlacd.decompose(mesh, preset=name, threads=1, quality="fast")
     assert max(len(hull.vertices) for hull in result) <= (preset.max_vertices or np.inf)
     assert max(len(hull.faces) for hull in result) <= (preset.max_faces or np.inf)
     assert result.report["options"]["preset"] == name
-    assert result.report["warnings"] == []
-    assert result.report["concavity"]["max"] <= 0.05, "the threshold holds for limited hulls too"
+    assert len(free) <= len(result) <= 2 * len(free)
+    over = result.report["concavity"]["max"] > 0.05
+    assert over == any("stick" in warning for warning in result.report["warnings"])
 
 
 def test_options_given_go_before_the_preset() -> None:

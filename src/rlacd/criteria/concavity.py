@@ -3,7 +3,8 @@
 The distance of a part with convex hull CH is ``H_b``, the two-sided Hausdorff distance between the *surfaces* of the
 part and of its hull. Its concavity is ``max(H_b, 0.3 R_v)``, where ``R_v = cbrt(3 (|CH| - |part|) / 4 pi)`` is the
 radius of a ball with the volume between them (Wei et al., "Approximate Convex Decomposition for 3D Meshes with
-Collision-Aware Concavity and Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded.
+Collision-Aware Concavity and Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded. What limits on
+vertices and triangles add to a hull counts for ``H_b`` only.
 """
 
 from __future__ import annotations
@@ -203,8 +204,9 @@ class Distance(Criterion):
         return ConcavityValue(*found)
 
     def _volumes(self, part: Part) -> tuple[float, float]:
-        """Volumes of the part and its hull, as far as they matter: equal ones make ``R_v`` 0."""
-        return part.volume if self.weight else part.hull.volume, part.hull.volume
+        """Volumes of the part and its exact hull, as far as they matter: equal ones make ``R_v`` 0."""
+        hull = part.exact or part.hull
+        return part.volume if self.weight else hull.volume, hull.volume
 
 
 @dataclass(frozen=True)

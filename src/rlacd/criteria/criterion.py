@@ -79,6 +79,11 @@ class Criterion(Protocol):
         return math.inf
 
     @property
+    def of_facets(self) -> Criterion:
+        """What a part whose exact hull meets the criterion has to meet with the hull that limits make of it."""
+        return self
+
+    @property
     def obstacles(self) -> Balls | None:
         """Balls that no hull may touch, if the criterion is defined by balls."""
         return None

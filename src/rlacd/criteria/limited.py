@@ -17,9 +17,10 @@ from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING
-from rlacd.solid.hull import NO_LIMITS, keeps, limit_hull
+from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, keeps, limit_hull
 from rlacd.solid.passages import passage_balls
 from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.solid import Solid
@@ -57,12 +58,21 @@ CRITERIA: dict[str, type[Criterion]] = {
 }
 """By the name that options give them."""
 
-FEWEST = (24, 44)
-"""Vertices and triangles. Under lower limits, parts are found without them; those that then break the criterion are cut
-on. Cut for 8 vertices from the start, a cup is 40 hulls instead of 25."""
 
-BOX = (8, 12)
-"""Under limits lower than those of a box no part is cut on: next to no solid can be cut into such hulls."""
+CLEARLY = 0.99
+"""Of the distance allowed: criteria are decided to 0.1 % of it, and a part's surface lies inside its hull."""
+
+
+def limited_part(
+    part: Part, limits: HullLimits, enough: float = math.inf, tolerance: float = TOLERANCE, sides: FloatArray = NO_SIDES
+) -> Part:
+    """Get the part with a hull within limits; the same part if nothing changes (see `limit_hull`)."""
+    hull = limit_hull(part.hull, limits, tolerance, sides, CLEARLY * enough)
+    if hull is part.hull:
+        return part
+    limited = part.with_hull(hull)
+    limited.exact = part.exact if keeps(part.hull, limits) else part.hull
+    return limited
 
 
 @dataclass(frozen=True)
@@ -85,12 +95,11 @@ class LimitedCriterion(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
-        """The criterion that the options name, with their passages, within their limits if cutting can meet those."""
+        """The criterion that the options name, with their passages; limits come later (see `rlacd.limit`)."""
         criterion = CRITERIA[options.criterion_name].prepare(options, solid, run)
-        limits = options.hull_limits if options.hull_limits.allow(*FEWEST) else NO_LIMITS
         if run is not None and (options.keep_open is not None or options.keep_open_abs is not None):
-            return cls(criterion, limits, *_passages(criterion, options, solid, run))
-        return cls(criterion, limits) if any(limits) else criterion
+            return cls(criterion, NO_LIMITS, *_passages(criterion, options, solid, run))
+        return criterion
 
     @property
     def eliminates(self) -> bool:
@@ -122,19 +131,24 @@ class LimitedCriterion(Criterion):
 
     def is_met(self, part: Part) -> bool:
         """Decide for the exact hull first, then for the limited one: it stays out of the balls, and is tight."""
-        return self._is_met(part) and (keeps(part.hull, self.limits) or self._is_met(self._limited(part)))
+        return self._is_met(part) and (keeps(part.hull, self.limits) or self.of_facets.is_met(self._limited(part)))
+
+    @cached_property
+    def of_facets(self) -> LimitedCriterion:
+        """That of the underlying criterion; passages stay open."""
+        return replace(self, criterion=self.criterion.of_facets, limits=NO_LIMITS)
 
     def _is_met(self, part: Part) -> bool:
         narrows = len(self.kept) > 0 and self._intrusions.any_beyond(part, ROUNDING)
         return not narrows and self.criterion.is_met(part)
 
     def error(self, part: Part) -> float:
-        """Measure the part against its limited hull."""
+        """Measure the part against the hull that it ends with if it does not meet the criterion."""
         return self.criterion.error(self._limited(part))
 
     def settled(self, parts: Sequence[Part]) -> LimitedCriterion:
         """Settle it with the limited hulls; balls become as small as parts that cannot be cut leave them."""
-        limited = [self._limited(part) for part in parts]
+        limited = [part if keeps(part.hull, self.limits) else self._limited(part) for part in parts]
         kept = Balls(self.free.centres, np.maximum(self._intrusions.radii_left(limited), 0.0))
         return replace(self, criterion=self.criterion.settled(limited), kept=kept)
 
@@ -144,4 +158,4 @@ class LimitedCriterion(Criterion):
         return replace(self, criterion=self.criterion.scaled(factor), kept=Balls(self.free.centres, radii))
 
     def _limited(self, part: Part) -> Part:
-        return part if keeps(part.hull, self.limits) else part.with_hull(limit_hull(part.hull, self.limits))
+        return limited_part(part, self.limits, self.of_facets.overhang)

@@ -16,6 +16,7 @@ import trimesh
 
 from rlacd import _native
 from rlacd.criteria import Criterion
+from rlacd.criteria.limited import limited_part
 from rlacd.find_parts import Reached
 from rlacd.finish.overlap import Seams, overlap_parts
 from rlacd.finish.primitives import primitive_part
@@ -29,7 +30,7 @@ from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
-from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps, limit_hull
+from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
 from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.solid import Solid
@@ -208,12 +209,13 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
         return part
     growth = SHARE_OF_OVERHANG * criterion.overhang
     for _ in range(GROWTHS_TRIED):
-        hull = limit_hull(part.hull, limits, growth, sides)
-        if hull is part.hull:
+        simple = limited_part(part, limits, tolerance=growth, sides=sides)
+        if simple is part:
             return part
-        simple = part.with_hull(hull)
         if criterion.is_met(simple):
             return simple
+        if not _has_room(simple.hull, limits):
+            return part  # it grew because of the limits
         growth /= 2
     return part
 
@@ -226,15 +228,20 @@ def limit_part(
     Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
     For `sides` see `limit_hull`; if the limits leave no room for them, the criterion comes first.
     """
-    hull = limit_hull(part.hull, limits, sides=sides)
-    if hull is part.hull:
-        return part
-    limited = part.with_hull(hull)
-    if criterion is None or criterion.is_met(limited):
+    enough = math.inf if criterion is None else criterion.of_facets.overhang
+    limited = limited_part(part, limits, enough, sides=sides)
+    if limited is part or criterion is None:
+        return limited
+    if (criterion if limited.exact is None else criterion.of_facets).is_met(limited):
         return limited
     if len(sides):
         return limit_part(part, limits, criterion)
     return part if keeps(part.hull, limits) and criterion.is_met(part) else limited
+
+
+def _has_room(hull: Hull, limits: HullLimits) -> bool:
+    """Whether the limits allow one more corner."""
+    return limits.allow(len(hull.vertices) + 1, len(hull.faces) + 2)
 
 
 def limit_roughly(part: Part, limits: HullLimits) -> Part:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from rlacd._version import __version__
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import narrowed, too_narrow
 from rlacd.finish.overlap import Seams
-from rlacd.fit import Fit
+from rlacd.fit import Fit, told_apart
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
@@ -91,6 +92,7 @@ def make_report(
             warnings += _unmeasured(solid)
         if options.overlap > 0:
             warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
+        warnings += _stuck_out(parts, reached)
         missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
         warnings += [*summary.warnings, *missed]
         warnings += too_narrow(apart.passages if apart else [], reached, run.stopped_by is not None)
@@ -285,6 +287,23 @@ def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) ->
             f"(longest side = 2), farthest near {frame.place(points[distance.argmax()])}."
         ],
     )
+
+
+def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
+    """How far hulls stick out because of limits on their vertices and triangles, where that is too far."""
+    facets, limits, scale = reached.goal.of_facets, reached.options.hull_limits, reached.solid.frame.scale
+    if not math.isfinite(facets.overhang):
+        return []
+    beyond = [error for part in parts if part.exact and (error := facets.error(part)) > facets.overhang]
+    if not beyond:
+        return []
+    counts = zip(limits, ("vertices", "triangles"), strict=True)
+    most = " and ".join(f"{limit} {what}" for limit, what in counts if limit is not None)
+    farthest, allowed = told_apart(max(beyond) / scale, facets.overhang / scale)
+    return [
+        f"{_hulls(len(beyond), 'sticks', 'stick')} out by up to {farthest}, more than {allowed} (in the input's unit): "
+        f"with at most {most} they cannot fit closer unless there are many more."
+    ]
 
 
 def _is_undecided(interval: Interval, limit: float) -> bool:

@@ -154,10 +154,10 @@ class Options:
     max_hulls
         At most this many hulls, even if the threshold must be exceeded; the report says by how much.
     max_vertices
-        At most this many vertices per hull, such as 64 for PhysX on a GPU; below 24 that takes more hulls;
-        below 8 the threshold may be exceeded.
+        At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls, or
+        exceeds the threshold and says so.
     max_faces
-        At most this many triangles per hull; below 44 that takes more hulls; below 12 the threshold may be exceeded.
+        At most this many triangles per hull; a low limit acts as a low limit on vertices.
     detail
         simple leaves out corners of hulls that add little, within the threshold; full keeps the exact hulls.
     primitives

@@ -62,6 +62,8 @@ class Part:
     ----------
     within : Part or None
         A part whose hull contains this one's: the one it was cut from.
+    exact : Hull or None
+        Its hull before limits on vertices and triangles made that larger; None if they did not.
     tree : TreeCache or None
         Keeps the tree over the surface for the tests to come, whatever the hull; None forgets it after each.
     """
@@ -79,6 +81,7 @@ class Part:
         self.hull = hull
         self.piece_hulls = hull.volume if piece_hulls is None else piece_hulls
         self.within: Part | None = None
+        self.exact: Hull | None = None
         self.tree: _native.TreeCache | None = None
         self._size = len(faces)
         self._members: tuple[Component, ...] = ()
@@ -148,6 +151,7 @@ class _Union(Part):
         self.hull = hull
         self.piece_hulls = first.piece_hulls + second.piece_hulls
         self.within = None
+        self.exact = None
         self.tree = None
         self._size = first.size + second.size
         self._members = (*first.members, *second.members)

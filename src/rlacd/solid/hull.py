@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -79,7 +80,11 @@ def keeps(hull: Hull, limits: HullLimits) -> bool:
 
 
 def limit_hull(
-    hull: Hull, limits: HullLimits = NO_LIMITS, tolerance: float = TOLERANCE, sides: FloatArray = NO_SIDES
+    hull: Hull,
+    limits: HullLimits = NO_LIMITS,
+    tolerance: float = TOLERANCE,
+    sides: FloatArray = NO_SIDES,
+    enough: float = math.inf,
 ) -> Hull:
     """Enclose a hull in one with at most the given numbers of corners and triangles, adding little volume.
 
@@ -94,6 +99,9 @@ def limit_hull(
     sides : FloatArray
         Half-spaces n.x <= d that hold the hull, rows of unit n and d [P, 4]. The result stays in them, unless the
         limits leave no such hull.
+    enough : float
+        Without sides, a hull over the limits whose limited one would stick out farther than this gets one that sticks
+        out little instead.
 
     Returns
     -------
@@ -104,10 +112,11 @@ def limit_hull(
     -----
     Edges are collapsed outwards, cheapest first, each by solving a linear program (progressive hulls: Sander et al.,
     "Silhouette Clipping", SIGGRAPH 2000). Then the remaining corners are moved one at a time to minimise the volume
-    while the hull stays convex and contains the given one.
+    while the hull stays convex and contains the given one. If it sticks out too far, all corners are moved at once to
+    stick out about equally (``native/hull/even_out.hpp``).
     """
     most, most_faces = (min(limit or _NO_LIMIT, _NO_LIMIT) for limit in limits)
-    vertices, faces = _native.simplify_hull(hull.vertices, hull.faces, most, most_faces, tolerance, sides)
+    vertices, faces = _native.simplify_hull(hull.vertices, hull.faces, most, most_faces, tolerance, sides, enough)
     if len(vertices) == len(hull.vertices) and (vertices == hull.vertices).all():
         return hull
     return Hull(vertices, faces, _native.mesh_volume(vertices, faces))

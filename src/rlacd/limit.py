@@ -1,0 +1,121 @@
+"""Within the limits: parts whose hulls would have too many corners are cut on; parts are united until there are few."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+from rlacd._native import Stopped
+from rlacd.criteria import Criterion, LimitedCriterion
+from rlacd.cut import CutTree
+from rlacd.cut_and_merge import MOST_CUTTING, cut_and_merge
+from rlacd.merge import merge_parts
+from rlacd.merge.merge import united_in_turn
+from rlacd.options import Options
+from rlacd.planes.sweep import SweepCache
+from rlacd.policies import make_policy
+from rlacd.run import Run, Work
+from rlacd.search import SearchContext, eliminate_parts
+from rlacd.solid.component import Component, Part
+
+TIMES_PARTS = 2
+"""Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
+
+SHARE_OF_WORK, LEAST_WORK = 0.3, 0.2e6
+"""Of the work done so far, that cutting on may take, and as much again to merge; at least so many units."""
+
+PIECES = 2
+"""Cutting on stops at so many times the pieces that there is room for: merging leaves half of them."""
+
+NEARLY_EQUAL = 1.02
+"""Errors are measured to a fiftieth of the threshold."""
+
+
+def cut_to_limits(
+    parts: list[Part], limited: LimitedCriterion, solid: Component, options: Options, run: Run
+) -> list[Part]:
+    """Cut parts whose hulls do not meet the criterion only because of the limits, those that take few pieces first.
+
+    A part stays whole if its pieces would not meet it either, or if there would be too many parts. A body that is one
+    part, such as a ball, always stays one.
+    """
+    room = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf)) - len(parts)
+    if room < 1 or len(parts) == 1:
+        return parts
+    cut = parts
+    try:
+        met = run.map(limited.is_met, parts)
+        with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_WORK)):
+            pieces: dict[Part, list[Part]] = {}
+            for part, is_met in zip(parts, met, strict=True):
+                if not is_met and limited.criterion.is_met(part):
+                    pieces[part] = _cut_on(part, limited, solid, options, run, room)
+            kept = {part: [part] for part in parts}
+            for part, new in sorted(pieces.items(), key=lambda item: len(item[1])):
+                if 1 <= len(new) <= room + 1:
+                    room -= len(new) - 1
+                    kept[part] = new
+            cut = [piece for part in parts for piece in kept[part]]
+        if len(cut) > len(parts) and options.merge:
+            with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_WORK)):
+                cut = merge_parts(cut, limited, run, solid=solid)
+                context = SearchContext(solid, limited, options.seed, SweepCache(), first_policy=options.first_policy)
+                cut = eliminate_parts(context, cut, run)
+    except Stopped:
+        run.note_stop()
+    return cut
+
+
+def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, run: Run, room: int) -> list[Part]:
+    """The pieces of a part, all of which meet the criterion; none if there are too many."""
+    inside = solid.inside(part.hull)
+    if not inside.size:
+        return []
+    scale = limited.overhang if math.isfinite(limited.overhang) else None
+    policy = make_policy(options.first_policy, SweepCache(), scale)
+    tree = CutTree(Component((inside.vertices, inside.faces)), policy, run)
+    done = cut_and_merge(tree, limited, run, merge=options.merge, most=PIECES * (room + 1), strict=True)
+    is_done = not done.unmet and not run.is_over and len(done.parts) <= room + 1
+    return done.parts if is_done else []
+
+
+def at_most(
+    most: int,
+    decompositions: Iterable[Sequence[Part]],
+    unite: Callable[[Part, Part], Part],
+    whole: Part,
+    limited: LimitedCriterion,
+    run: Run,
+) -> list[Part]:
+    """Get the parts, at most so many, whose largest error is least.
+
+    Parameters
+    ----------
+    most : int
+        With a larger one, more of the same states are looked at, so the error is never larger.
+    decompositions : iterable of sequence of Part
+        Under coarser and coarser goals. Their parts are united two at a time, and every state on the way counts.
+    unite : callable
+        Returns the union of two parts.
+    whole : Part
+        The solid, which is left as one part if there is no time.
+    limited : LimitedCriterion
+        Measures the error of the hulls that parts end with; parts are united by that of their exact hulls.
+    run : Run
+    """
+    best, least, errors = [whole], math.inf, dict[Part, float]()
+    try:
+        for parts in itertools.chain([[whole]], decompositions):
+            for state, error in united_in_turn(parts, unite, limited.criterion, Work(MOST_CUTTING), run):
+                if error > NEARLY_EQUAL * least:
+                    break  # unions only make it larger
+                if len(state) > most:
+                    continue
+                new = [part for part in state if part not in errors]
+                errors.update(zip(new, run.map(limited.error, new), strict=True))
+                if (error := max(errors[part] for part in state)) < least:
+                    best, least = state, error
+    except Stopped:
+        run.note_stop()
+    return best
