@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -10,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd.criteria.limited import least_kept
+from rlacd.criteria.limited import LimitedCriterion, least_kept
 from rlacd.find_parts import Reached
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, dots
 from rlacd.solid.distance import hull_union
-from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.hull import Hull
-from rlacd.solid.passages import FACES, passage_balls
+from rlacd.solid.passages import FACES, Density, passage_balls
 from rlacd.solid.primitive import Balls
 
 NARROWEST = 8 * HALF_THICKNESS
@@ -29,11 +28,7 @@ LEAST_LOSS = 0.1
 MOSTLY = 2 / 3
 """Share of its radius below which there is a warning of a passage wider than the tolerance."""
 
-STARTS = 600
-"""Points of the surface from which balls start, beside the middles of its triangles."""
-
-SPACING = 0.5
-"""Share of their radius by which balls are apart."""
+DENSITY = Density(600, 0.5)
 
 MOST = 600
 """Balls that are looked at: the wide ones that lose most come first."""
@@ -41,17 +36,11 @@ MOST = 600
 MOST_NAMED = 3
 """Passages of which a warning says the place."""
 
-LOOKED_AT = 5
-"""Places along a passage at which what is left is measured."""
-
-ACCURACY = LEAST_LOSS / 2
-"""Share of its radius to within which what is left of a ball is measured; less counts as closed."""
+BETWEEN = 0.02
+"""Share of its radius that a passage kept open may lose more: its walls are kept off balls that are apart."""
 
 _NEIGHBOURS = 8
 _ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]
-_INSIDE = np.array(list(itertools.product(np.linspace(-0.5, 0.5, 5), repeat=3)))
-_AROUND = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
-_SEARCH = [(1.0, _INSIDE), *((2.0**-i, _AROUND) for i in (3, 4, 5, 6) for _ in range(2))]
 
 
 class Narrowed(NamedTuple):
@@ -60,48 +49,55 @@ class Narrowed(NamedTuple):
     Attributes
     ----------
     passages
-        One entry each: a ball of ``radius_abs`` around ``at_abs`` fits in the input, and in it one of ``left_abs``
-        between the hulls.
+        One entry each: around ``at_abs``, a ball of ``radius_abs`` fits in the input, one of ``left_abs`` between the
+        hulls.
     is_every
         Whether these are all: no triangle and no ball was left out.
+    by_limits
+        Whether a limit on hulls undid what cutting had kept open.
     """
 
     passages: list[dict[str, Any]]
-    is_every: bool
+    is_every: bool = True
+    by_limits: bool = False
 
 
 def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> Narrowed:
     """Find the passages that hulls narrow, which reach out by at most `over` in the frame: no passage loses more."""
     most = min(over / LEAST_LOSS, 2.0)
     if reached.root is None or most <= NARROWEST:
-        return Narrowed([], True)
+        return Narrowed([])
     threads, frame, solid = run.threads, reached.solid.frame, reached.solid.mesh
     surface, union = reached.root.filling.surface, hull_union(hulls, threads)
 
     def lose(balls: Balls) -> BoolArray:
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
 
-    balls = passage_balls(solid, surface, (NARROWEST, most), STARTS, SPACING, threads, lose)
+    balls = passage_balls(solid, surface, (NARROWEST, most), DENSITY, threads, lose)
     is_every = len(solid[1]) <= FACES and len(balls) <= MOST
     # Wide and narrow ones apart: neither hides what is left of the other.
     wide = (balls.radii[:, None] >= _wide(reached)).sum(axis=1)
     covered = union.distance(balls.centres, threads) / balls.radii
     kept = np.lexsort([covered, -wide])[:MOST]
     balls, wide, covered = balls.some(kept), wide[kept], covered[kept]
-    passage = _passages(balls, wide, surface, threads)
-    each = [_looked_at(balls, np.flatnonzero(passage == i), covered) for i in np.unique(passage)]
-    some = np.concatenate([np.empty(0, dtype=np.intp), *each])
-    passage, balls = passage[some], balls.some(some)
-    left = _left(balls, union, threads)
-    order = np.argsort(left / balls.radii, kind="stable")
-    worst = order[np.sort(np.unique(passage[order], return_index=True)[1])]  # of each passage
-    worst = worst[left[worst] < (1 - LEAST_LOSS) * balls.radii[worst]]
-    places, lengths = frame.to_input(balls.centres[worst]), np.stack([balls.radii, left])[:, worst] / frame.scale
+    order = np.argsort(covered, kind="stable")
+    passage = _passages(balls, wide, surface, threads)[order]
+    worst = order[np.sort(np.unique(passage, return_index=True)[1])]  # of each passage
+    worst = worst[covered[worst] < 1 - LEAST_LOSS]
+    left = np.where(covered[worst] > ROUNDING, covered[worst], 0.0) * balls.radii[worst]
+    places, lengths = frame.to_input(balls.centres[worst]), np.stack([balls.radii[worst], left]) / frame.scale
     entries = [
         {"at_abs": at, "radius_abs": radius, "left_abs": rest}
         for at, radius, rest in zip(places.tolist(), *lengths.tolist(), strict=True)
     ]
-    return Narrowed(entries, is_every)
+    return Narrowed(entries, is_every, _by_limits(reached, union, threads))
+
+
+def _by_limits(reached: Reached, union: _native.HullUnion, threads: int) -> bool:
+    options, goal = reached.options, reached.goal
+    if not isinstance(goal, LimitedCriterion) or (options.max_hulls is None and not any(options.hull_limits)):
+        return False
+    return bool((union.distance(goal.kept.centres, threads) < goal.kept.radii - ROUNDING).any())
 
 
 def _wide(reached: Reached) -> list[float]:
@@ -140,48 +136,17 @@ def _have_a_way(
     return free
 
 
-def _looked_at(balls: Balls, own: NDArray[np.intp], covered: FloatArray) -> NDArray[np.intp]:
-    """Those of a passage's balls of which least may be left.
-
-    Of balls whose centres are about as much covered, some along the passage are looked at: where it opens, part of a
-    ball is outside of it.
-    """
-    centres = balls.centres[own]
-    some = np.flatnonzero(covered[own] <= covered[own].min() + LEAST_LOSS)
-    along = own[some[np.argsort(centres[some, np.ptp(centres, axis=0).argmax()], kind="stable")]]
-    looked_at: NDArray[np.intp] = along[np.unique(np.linspace(0, len(along) - 1, LOOKED_AT).astype(int))]
-    return looked_at
-
-
-def _left(balls: Balls, union: _native.HullUnion, threads: int) -> FloatArray:
-    """Radius [B] of the largest ball that fits inside each ball and outside the hulls, to within `ACCURACY`.
-
-    Its centre is that of the ball to within half the radius: beside a plate thinner than the ball, much of it is free.
-    """
-    centres, radii = balls.centres[:, None], balls.radii[:, None]
-    at, left, each = balls.centres, np.zeros(len(balls)), np.arange(len(balls))
-    for step, around in _SEARCH:
-        there = at[:, None] + step * radii[..., None] * around
-        away = np.sqrt(dots(there - centres, there - centres))
-        free = union.distance(there.reshape(-1, 3), threads).reshape(away.shape)
-        fits = np.where(away <= radii / 2, np.minimum(free, radii - away), 0.0)
-        best = fits.argmax(axis=1)
-        better = fits[each, best] > left
-        at = np.where(better[:, None], there[each, best], at)
-        left = np.where(better, fits[each, best], left)
-    return left
-
-
 def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]:
     """Warn of passages that keep less than asked for, and of others wider than the tolerance that lose over a third."""
     options, scale, asked, others = reached.options, reached.solid.frame.scale, [], []
     for at, radius, left in (one.values() for one in found.passages):
         if radius * scale >= least_kept(options, scale):
-            if left < (options.keep_open or 0.0) * radius + (options.keep_open_abs or 0.0) - ACCURACY * radius:
+            if left < (options.keep_open or 0.0) * radius + (options.keep_open_abs or 0.0) - BETWEEN * radius:
                 asked.append((at, radius, left))
         elif radius * scale >= options.threshold and left < MOSTLY * radius:
             others.append((at, radius, left))
-    reason = "the work was stopped before" if is_stopped else ""
+    by_limits = "limits on the hulls leave no other way" if found.by_limits else ""
+    reason = "the work was stopped before" if is_stopped else by_limits
     cure = (
         f"--keep-open, or a smaller {'threshold' if 'threshold' in options.numbers else 'tolerance'}, keeps more open"
     )
@@ -193,8 +158,8 @@ def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]
 
 
 def _narrows(lost: list[tuple[list[float], float, float]], at_least: str, share: str, then: str) -> str:
-    closed = sum(left <= ACCURACY * radius for _, radius, left in lost)
-    lost = sorted(lost, key=lambda one: (max(one[2] / one[1], ACCURACY), -one[1]))
+    closed = sum(left == 0 for _, _, left in lost)
+    lost = sorted(lost, key=lambda one: (one[2] / one[1], -one[1]))
     named = [
         f"near ({', '.join(f'{x:.4g}' for x in at)}) from a radius of {radius:.4g} to {left:.4g}"
         for at, radius, left in lost[:MOST_NAMED]

@@ -8,6 +8,7 @@ nearest. Between walls it goes to and fro; where they leave it a way out it drif
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,9 @@ STEPS = (1 / 8, 1 / 32, 1 / 128)
 SHRINKS = 32
 """So often a ball shrinks at most. In the holes of a thin plate it halves each time."""
 
+GROWTH = 1.5
+"""A ball that touches walls beside its passage's middle is by less than this smaller than one in it."""
+
 FACES = 3000
 """Triangles of which each is a start; of more, those whose middles lie in different cells, or that face elsewhere."""
 
@@ -34,12 +38,26 @@ CELLS, COARSER = 256, 1.5
 """Cells along the longest side, and by how much larger ones are tried while there are too many."""
 
 
+class Density(NamedTuple):
+    """How densely passages are filled.
+
+    Attributes
+    ----------
+    starts : int
+        Points of the surface from which balls start, beside the middles of its triangles.
+    spacing : float
+        A ball is left out if the centre of a larger one is within this share of its radius.
+    """
+
+    starts: int
+    spacing: float
+
+
 def passage_balls(
     solid: tuple[FloatArray, IntArray],
     surface: _native.Surface,
     radii: tuple[float, float],
-    count: int,
-    spacing: float,
+    density: Density,
     threads: int,
     wanted: Callable[[Balls], BoolArray] | None = None,
 ) -> Balls:
@@ -53,18 +71,15 @@ def passage_balls(
         That of the solid.
     radii : (float, float)
         The least and the largest radius.
-    count : int
-        Number of points of the surface from which balls start, beside the middles of its triangles.
-    spacing : float
-        A ball is left out if the centre of a larger one is within this share of its radius.
+    density : Density
     threads : int
         The result does not depend on it.
     wanted : callable, optional
         Tells which of some balls, not quite in their place yet, matter.
     """
-    least, most = radii
-    points, normals = _starts(*solid, count)
-    balls = _shrunk(points, normals, surface, (least, most), threads)
+    (least, most), (starts, spacing) = radii, density
+    points, normals = _starts(*solid, starts)
+    balls = _shrunk(points, normals, surface, (least / GROWTH, most), threads)
     if wanted is not None:
         balls = balls.some(wanted(balls))
     balls = _pushed(spread(balls, spacing), surface, threads)
@@ -123,7 +138,7 @@ def _shrunk(
 
 
 def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
-    """The balls that are held, in the best place near theirs."""
+    """The balls that are held, in the best place near theirs; twice the drift is still within the first steps."""
     for step in STEPS:
         at, size = balls.centres, step * balls.radii
         begin, best, radii = at, at.copy(), np.zeros(len(at))
