@@ -41,7 +41,7 @@ SECTIONS = {"round": 16, "square": 4, "slot": 8}
 def perforated(
     kind: str, side: int, radius: float, thickness: float, turn: bool = False
 ) -> tuple[trimesh.Trimesh, Floats, float]:
-    """A plate 2 wide with side x side equal holes: its mesh, points on their axes [N, 5, 3], the radius that is free."""
+    """A plate 2 wide with side x side equal holes; points on their axes [N, 5, 3], and the radius that is free."""
     places = (np.arange(side) + 0.5) * 2 / side - 1
     sections = SECTIONS[kind]
     hole = Manifold.cylinder(1, radius, radius, sections, True).rotate((0, 0, 180 / sections))
@@ -161,7 +161,7 @@ def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     (slot,) = report["passages"]
     assert (slot["radius_abs"], slot["left_abs"]) == pytest.approx((0.5, 0.0), abs=0.01)
     assert report["warnings"] == []
-    report = rlacd.decompose(trimesh_of(block), threshold=0.01, max_hulls=1, quality="fast", threads=1).report
+    report = rlacd.decompose(trimesh_of(block), threshold=0.005, max_hulls=1, quality="fast", threads=1).report
     assert any(
         said.startswith("1 passage narrows by") and "1 to nothing" in said and "from a radius of 0.4997 to 0;" in said
         for said in report["warnings"]

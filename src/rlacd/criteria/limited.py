@@ -24,7 +24,7 @@ from rlacd.solid.passages import Density, passage_balls
 from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.solid import Solid
 
-SPACING = 0.25
+SPACING = 0.125
 """Share of their radius by which balls, and the points from which they start, are apart: an edge that comes between
 two reaches 1 % of the radius deeper than into either."""
 
@@ -41,7 +41,7 @@ def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) ->
     share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
     most = min((ball + criterion.overhang) / (1 - share), 2.0)
     least = least_kept(options, scale)
-    dense = _native.mesh_area(solid.vertices, solid.faces.astype(np.int64)) / (SPACING * least) ** 2
+    dense = _native.mesh_area(solid.vertices, solid.faces.astype(np.int64)) / (2 * SPACING * least) ** 2
     starts = int(np.clip(dense, FEWEST_STARTS, MOST_STARTS))
     with run.stage("space"):
         surface = _native.Surface(*solid.mesh, run.threads)

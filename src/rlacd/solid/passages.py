@@ -31,6 +31,9 @@ SHRINKS = 32
 GROWTH = 1.5
 """A ball that touches walls beside its passage's middle is by less than this smaller than one in it."""
 
+ALIKE = 1.02
+"""Times as large as another, a ball does not count as larger."""
+
 FACES = 3000
 """Triangles of which each is a start; of more, those whose middles lie in different cells, or that face elsewhere."""
 
@@ -82,7 +85,7 @@ def passage_balls(
     balls = _shrunk(points, normals, surface, (least / GROWTH, most), threads)
     if wanted is not None:
         balls = balls.some(wanted(balls))
-    balls = _pushed(spread(balls, spacing), surface, threads)
+    balls = _pushed(_one_a_cell(balls, spacing), surface, threads)
     balls = balls.some((balls.radii >= least) & (balls.radii <= most))
     return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5), spacing)
 
@@ -157,18 +160,21 @@ def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
 
 
 def spread(balls: Balls, spacing: float) -> Balls:
-    """Leave out balls beside a larger one, within a share of their own radius; the largest come first."""
-    balls = _one_a_cell(balls.some(np.argsort(-balls.radii, kind="stable")), spacing)
-    left = np.ones(len(balls), dtype=bool)
-    for i in range(len(balls)):
-        if left[i]:
-            away = balls.centres[i + 1 :] - balls.centres[i]
-            left[i + 1 :] &= dots(away, away) >= (spacing * balls.radii[i + 1 :]) ** 2
-    return balls.some(left)
+    """Leave out balls within a share of their own radius of one that is as large; the ends of passages come first."""
+    balls = balls.some(np.argsort(-balls.radii, kind="stable"))
+    away, chosen = np.full(len(balls), np.inf), []
+    while len(balls) and away[farthest := int(away.argmax())] >= spacing:
+        chosen.append(farthest)
+        way = balls.centres - balls.centres[farthest]
+        nearer = np.minimum(away, np.sqrt(dots(way, way)) / balls.radii)
+        away = np.where(balls.radii <= ALIKE * balls.radii[farthest], nearer, away)
+        away[farthest] = -1.0
+    return balls.some(np.array(chosen, dtype=np.intp))
 
 
 def _one_a_cell(balls: Balls, spacing: float) -> Balls:
-    """The first of those of about one size in each cell, which lie within the spacing of each other."""
+    """The largest of those of about one size in each cell, which lie within the spacing of each other."""
+    balls = balls.some(np.argsort(-balls.radii, kind="stable"))
     _, size = np.frexp(balls.radii)  # a radius of 0.5 to 1 times a power of 2
     cells = np.floor(balls.centres / np.ldexp(spacing / (2 * np.sqrt(3)), size)[:, None]).astype(np.int64)
     x, y, z = cells.T + (1 << 17)
