@@ -44,6 +44,8 @@ def draw_options(seed: int) -> dict[str, Any]:
         options["timeout"] = 30.0  # loose sheets and small balls may give tens of thousands of parts
     if chance(0.05):
         options["timeout"] = float(random.choice([1e-6, 0.05, 0.5]))
+    if chance(0.15):
+        options["keep_open"] = float(random.choice([0.5, 0.8, 0.9, 0.95]))
     return options
 
 

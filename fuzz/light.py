@@ -38,6 +38,9 @@ LARGEST_FILE = 10_000
 MOST_FACES = 48
 """Of a small shape."""
 
+MOST_OF_PLATES = 200
+"""Faces of a plate with holes."""
+
 SAMPLES = 100
 """Points of the input and of the hulls that the judges look at."""
 
@@ -102,7 +105,7 @@ class LightTrials:
         """Shape and options of a trial of the kind ``small``: the first of its shapes that is small enough."""
         for tries in range(100):
             shape = make_shape(self.seed * 10**12 + number * 100 + tries)
-            if len(shape.faces) <= MOST_FACES:
+            if len(shape.faces) <= (MOST_FACES if len(shape.axes) == 0 else MOST_OF_PLATES):
                 break
         return shape, _cheap(draw_options(self.seed * 10**12 + number))
 

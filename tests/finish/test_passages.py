@@ -119,7 +119,7 @@ def test_of_equal_holes_each_is_listed_once_and_only_wide_ones_are_warned_of(
     report, size = result.report, result.report["scale"]
     away = [np.linalg.norm(np.array(p["at_abs"]) - axes, axis=-1).min(axis=1) for p in report["passages"]]
     assert sorted(int(one.argmin()) for one in away) == list(range(side * side))
-    assert max(one.min() for one in away) <= max(radius, 0.1 * thickness)
+    assert max(one.min() for one in away) <= max(1.05 * radius, 0.1 * thickness)
     for passage in report["passages"]:
         assert passage["radius_abs"] == pytest.approx(free, rel=0.02)
         assert passage["left_abs"] == 0
@@ -127,7 +127,7 @@ def test_of_equal_holes_each_is_listed_once_and_only_wide_ones_are_warned_of(
     if free * size < 0.05:
         assert told == []
     else:
-        assert told[0].startswith(f"{side * side} passages narrow by over a third, {side * side} to nothing: near (")
+        assert told[0].startswith(f"{side * side} passages narrow by over half, {side * side} to nothing: near (")
 
 
 @pytest.mark.promise("passages")
@@ -148,9 +148,9 @@ def test_what_is_left_of_each_hole_is_measured() -> None:
         assert 0.97 * 5 <= passage["radius_abs"] <= 5
         assert passage["left_abs"] == pytest.approx(clearance(result.hulls, np.array([passage["at_abs"]]))[0], abs=1e-6)
     (warning,) = (said for said in result.report["warnings"] if "passages" in said)
-    assert f"{sum(share < 2 / 3 for share in shares)} passages narrow by over a third" in warning
+    assert f"{sum(share < 1 / 2 for share in shares)} passages narrow by over half" in warning
     assert warning.endswith("; --keep-open, or a smaller threshold, keeps more open.")
-    result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=1.0, threads=1)
+    result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=1.0, quality="fast", threads=1)
     assert result.report["warnings"][-1].endswith("; --keep-open, or a smaller tolerance, keeps more open.")
 
 
@@ -163,7 +163,7 @@ def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     assert report["warnings"] == []
     report = rlacd.decompose(trimesh_of(block), threshold=0.005, max_hulls=1, quality="fast", threads=1).report
     assert any(
-        said.startswith("1 passage narrows by") and "1 to nothing" in said and "from a radius of 0.4997 to 0;" in said
+        said.startswith("1 passage narrows by") and "1 to nothing" in said and "from a radius of 0.5 to 0;" in said
         for said in report["warnings"]
     )
     assert rlacd.decompose(trimesh_of(block), threshold_abs=0.3, quality="fast", threads=1).report["passages"] == []
@@ -190,6 +190,7 @@ def test_a_share_of_every_wide_hole_stays_open_whatever_decides_the_hulls(given:
     assert not any("Passage" in said for said in result.report["warnings"])
 
 
+@pytest.mark.slow
 @pytest.mark.promise("keep-open")
 @pytest.mark.parametrize(("kind", "side", "thickness", "turn"), PLATES)
 def test_of_equal_holes_each_keeps_its_share(kind: str, side: int, thickness: float, turn: bool) -> None:

@@ -25,7 +25,7 @@ NARROWEST = 8 * HALF_THICKNESS
 LEAST_LOSS = 0.1
 """Share of its radius that a passage has to lose to be listed."""
 
-MOSTLY = 2 / 3
+MOSTLY = 1 / 2
 """Share of its radius below which there is a warning of a passage wider than the tolerance."""
 
 DENSITY = Density(600, 0.5)
@@ -137,7 +137,7 @@ def _have_a_way(
 
 
 def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]:
-    """Warn of passages that keep less than asked for, and of others wider than the tolerance that lose over a third."""
+    """Warn of passages that keep less than asked for, and of others wider than the tolerance that lose over half."""
     options, scale, asked, others = reached.options, reached.solid.frame.scale, [], []
     for at, radius, left in (one.values() for one in found.passages):
         if radius * scale >= least_kept(options, scale):
@@ -152,7 +152,7 @@ def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]
     )
     return [
         _narrows(lost, "" if found.is_every else "At least ", by, then)
-        for lost, by, then in ((asked, "more than --keep-open allows", reason), (others, "over a third", cure))
+        for lost, by, then in ((asked, "more than --keep-open allows", reason), (others, "over half", cure))
         if lost
     ]
 
