@@ -46,6 +46,8 @@ def draw_options(seed: int) -> dict[str, Any]:
         options["timeout"] = float(random.choice([1e-6, 0.05, 0.5]))
     if "criterion" not in options and chance(0.1):
         options["keep_cavities"] = True
+    if chance(0.15):
+        options["keep_open"] = float(random.choice([0.5, 0.8, 0.9, 0.95]))
     return options
 
 

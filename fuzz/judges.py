@@ -92,6 +92,7 @@ def judge(case: Case, samples: int = SAMPLES) -> list[str]:
         found += coverage(case, where, faces, hulls, random, samples)
         found += left_out(case, where[np.unique(every_face)], hulls)
         found += overhang(case, where[every_face], hulls, random, samples)
+        found += passages(case)
     if case.shape.is_closed and len(faces) == len(every_face):  # a part may reach out to faces without area
         found += mass(case, where, faces)
         solid = filled_solid(where, faces)
@@ -174,6 +175,34 @@ def overhang(
     is_warned_of = any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete"))
     if reached.distance > allowed and not is_warned_of:
         found.append(f"the hulls reach {reached.distance:.6g} beyond the input, and no word of it")
+    return found
+
+
+def passages(case: Case) -> list[str]:
+    """Of a plate's equal holes, each keeps its share or is listed; those that lose much are listed, each once.
+
+    What is left of a hole is measured all along its axis, where a ball that passes has its centre.
+    """
+    axes, listed = case.shape.axes, case.report.get("passages")
+    if len(axes) == 0 or listed is None or not case.report["complete"]:
+        return []
+    size = np.ptp(case.shape.vertices, axis=0).max() / 2
+    hulls = [Polytope(vertices / size, faces) for vertices, faces in case.hulls]
+    along = axes[:, :1] + np.linspace(0.1, 0.9, 9)[:, None] * (axes[:, 1:] - axes[:, :1])
+    left = distance_to_union(along.reshape(-1, 3) / size, hulls).reshape(len(axes), -1).min(axis=1)
+    radius, found = case.shape.hole / size, []
+    named = np.zeros(len(axes), dtype=int)
+    for passage in listed:
+        away = np.linalg.norm(along - passage["at_abs"], axis=2).min(axis=1)
+        named[away.argmin()] += 1
+    is_asked = "keep_open" in case.options and radius > 1.01 * case.options.get("threshold", 0.05)
+    is_kept = not is_asked or left.min() >= (case.options["keep_open"] - 0.05) * radius
+    if not is_kept and "--keep-open allows" not in case.warned:
+        found.append(f"a hole of radius {radius:.4g} keeps {left.min():.4g}, and no word of it")
+    if radius > 0.009 and (missed := (left < 0.75 * radius) & (named == 0)).any():
+        found.append(f"{missed.sum()} of {len(axes)} holes narrow, one to {left[missed].min():.4g}, and are not listed")
+    if named.max() > 1:
+        found.append(f"a hole is listed {named.max()} times")
     return found
 
 

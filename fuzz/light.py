@@ -42,6 +42,9 @@ MOST_FACES = 48
 BALLS = 5
 """One in so many small shapes is round, under limits on its corners."""
 
+MOST_OF_PLATES = 200
+"""Faces of a plate with holes."""
+
 SAMPLES = 100
 """Points of the input and of the hulls that the judges look at."""
 
@@ -108,7 +111,7 @@ class LightTrials:
             return _under_limits(np.random.default_rng([self.seed, number, 22]))
         for tries in range(100):
             shape = make_shape(self.seed * 10**12 + number * 100 + tries)
-            if len(shape.faces) <= MOST_FACES:
+            if len(shape.faces) <= (MOST_FACES if len(shape.axes) == 0 else MOST_OF_PLATES):
                 break
         return shape, _cheap(draw_options(self.seed * 10**12 + number))
 

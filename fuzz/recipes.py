@@ -40,12 +40,18 @@ class Shape:
         The operations, in words.
     is_closed
         Whether the surface bounds a solid exactly: nothing was damaged.
+    axes : float64 [H, 2, 3]
+        From end to end of the holes in a plate, all equal, and nothing else is a passage; empty if that is unknown.
+    hole : float
+        Radius of the largest ball that passes them.
     """
 
     vertices: Floats
     faces: Ints
     steps: tuple[str, ...] = field(default=())
     is_closed: bool = False
+    axes: Floats = field(default_factory=lambda: np.empty((0, 2, 3)))
+    hole: float = 0.0
 
     def after(self, step: str, vertices: Floats, faces: Ints, is_closed: bool = False) -> Shape:
         return Shape(vertices, faces, (*self.steps, step), is_closed and self.is_closed)
@@ -54,6 +60,8 @@ class Shape:
 def make_shape(seed: int) -> Shape:
     """Make the shape of a seed."""
     random = np.random.default_rng([seed, 1])
+    if np.random.default_rng([seed, 3]).random() < PLATES:
+        return placed(perforated(random), random)
     compose = pick(random, COMPOSITIONS)
     shape = hollow(random) if np.random.default_rng([seed, 4]).random() < HOLLOW else compose(random)
     for _ in range(int(random.choice(4, p=[0.5, 0.25, 0.15, 0.1]))):
@@ -172,6 +180,25 @@ def triangles(random: Random) -> Shape:
     faces = random.integers(0, points, (int(random.choice([1, 2, 4, 8])), 3))
     return Shape(vertices, faces, (f"{len(faces)} triangles among {points} points",))
 
+
+def perforated(random: Random) -> Shape:
+    """A plate with equal holes: round ones, triangles, squares or slots, in rows."""
+    sides, thickness = int(random.choice([3, 4, 4, 8])), float(random.choice([0.02, 0.2, 1.0, 3.0]))
+    count = random.integers(1, 4, 2)
+    radius = float(random.uniform(0.1, 0.42))
+    long = float(random.choice([0.0, 0.0, 0.7]))
+    hole = manifold3d.Manifold.cylinder(2 * thickness, radius, radius, sides, True).rotate((0, 0, 180 / sides))
+    hole = manifold3d.Manifold.batch_hull([hole.translate((0, y, 0)) for y in (-long, long)])
+    places = np.array([(x + 0.5, 3 * y + 1.5, 0) for x in range(count[0]) for y in range(count[1])])
+    plate = manifold3d.Manifold.cube((int(count[0]), 3 * int(count[1]), thickness)).translate((0, 0, -thickness / 2))
+    solid = plate - manifold3d.Manifold.compose([hole.translate(place.tolist()) for place in places])
+    shape = from_manifold(solid, (f"plate {thickness:g} thick, {len(places)} holes of {sides} sides, {long:g} long",))
+    ends = places[:, None] + np.array([[0, 0, -thickness / 2], [0, 0, thickness / 2]])
+    return replace(shape, axes=ends, hole=radius * float(np.cos(np.pi / sides)))
+
+
+PLATES = 0.05
+"""Share of the shapes that are perforated plates."""
 
 COMPOSITIONS: dict[str, Callable[..., Shape]] = {
     "carved": carved,
@@ -336,18 +363,21 @@ FAULTS: dict[str, Callable[..., Shape]] = {
 
 def placed(shape: Shape, random: Random) -> Shape:
     """Rotate, scale and move the whole shape."""
-    vertices = shape.vertices
+    vertices, ends = shape.vertices, shape.axes.reshape(-1, 3)
     turn = float(random.choice([0.0, 0.0, 1.0, 1e-9]))
     if turn:
         with np.errstate(invalid="ignore"):
-            vertices = vertices @ rotation(random, turn).T
+            turned = rotation(random, turn).T
+            vertices, ends = vertices @ turned, ends @ turned
     scale = float(random.choice([1, 1, 1, 1e-3, 1e3, 1e-12, 1e12, 1e-30, 1e30]))
     offset = float(random.choice([0, 0, 0, 0, 1e3, 1e6, 1e8]))
     steps = tuple(
         f"{what} {x:g}" for what, x in (("turn", turn), ("scale", scale), ("offset", offset)) if x not in (0, 1)
     )
     closed = shape.is_closed and offset < 1e6  # far away, distinct vertices become equal
-    return Shape(vertices * scale + offset * scale * random.normal(size=3), shape.faces, (*shape.steps, *steps), closed)
+    away = offset * scale * random.normal(size=3)
+    axes = (ends * scale + away).reshape(-1, 2, 3)[: len(ends) if closed else 0]
+    return Shape(vertices * scale + away, shape.faces, (*shape.steps, *steps), closed, axes, shape.hole * scale)
 
 
 # --- helpers ----------------------------------------------------------------------------------------------------------

@@ -35,6 +35,7 @@ from rlacd.search.neighbourhood import CLUSTER, LEAST_TRIALS
 from rlacd.search.search import BOUNDED_PATIENCE, LEAST_WORK, MOST_WORK, TIMES_FIRST_PASS
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.passages import FACES
 from rlacd.view import connections, server
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -91,9 +92,8 @@ LIMITS = {
         f"localhost:{server.USUAL_PORT}",
     ],
     "docs/reference/report.md": [
-        f"at most {narrowed.MOST_LISTED}: a ball",
-        f"narrower than {50 * 2 * narrowed.NARROWEST:g} % of the longest side or shorter than "
-        f"{50 * narrowed.LEAST_EXTENT:g} % of it",
+        f"narrower than {50 * 2 * narrowed.NARROWEST:g} % of the longest side",
+        f"Over {FACES:,} triangles or {narrowed.MOST} places",
         f"at most {report.MOST_HOLES:,}: `body`",
     ],
     "docs/policies.md": [

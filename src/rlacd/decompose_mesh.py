@@ -142,8 +142,8 @@ def decompose(
         The same in the input's unit, instead of `overlap`.
     keep_open : float, optional
         Passages stay open: in a hole, slot or mouth that holds a ball of at least `threshold` in radius, a ball of this
-        share of its radius still fits between the hulls, at the same place. Passages are found from points spread over
-        the surface, so one with a tiny share of it can be missed; ``report["warnings"]`` names those not kept.
+        share of its radius still fits between the hulls, at the same place. ``report["warnings"]`` counts those not
+        kept and says what is left; ``report["passages"]`` lists them.
     keep_open_abs : float, optional
         Instead of a share, the radius of a ball in the input's unit that still passes wherever one 1 % larger does.
     merge : bool

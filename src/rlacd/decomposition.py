@@ -62,7 +62,7 @@ class Decomposition(Result):
             surface lies from the hulls' surface.
         ``passages`` : list of dict or None
             Holes, slots and mouths that the hulls narrow by over a tenth, the most narrowed first: around ``at_abs`` a
-            ball of ``radius_abs`` fits in the input, and in its middle one of ``left_abs`` between the hulls.
+            ball of ``radius_abs`` fits in the input, one of ``left_abs`` between the hulls.
         ``scale`` : float
             What one unit of the input measures in that frame: divide a length by it to have it in the input's unit.
         ``mass`` : dict

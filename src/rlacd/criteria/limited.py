@@ -21,12 +21,16 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, keeps, limit_hull
-from rlacd.solid.passages import passage_balls
+from rlacd.solid.passages import Density, passage_balls
 from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.solid import Solid
 
-STARTS_FOR_ALL = 5000
-"""Points from which balls start, one for each 0.02 % of the surface, and as many triangles."""
+SPACING = 0.125
+"""Share of their radius by which balls, and the points from which they start, are apart: an edge that comes between
+two reaches 1 % of the radius deeper than into either."""
+
+FEWEST_STARTS, MOST_STARTS = 5000, 50_000
+"""Points from which balls start."""
 
 PLAY = 1.01
 """Passages that are narrower than so many times a ball need not let it through: hulls around them cannot be exact."""
@@ -37,9 +41,12 @@ def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) ->
     scale = solid.frame.scale
     share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
     most = min((ball + criterion.overhang) / (1 - share), 2.0)
+    least = least_kept(options, scale)
+    dense = _native.mesh_area(solid.vertices, solid.faces.astype(np.int64)) / (2 * SPACING * least) ** 2
+    starts = int(np.clip(dense, FEWEST_STARTS, MOST_STARTS))
     with run.stage("space"):
         surface = _native.Surface(*solid.mesh, run.threads)
-        free = passage_balls(solid.mesh, surface, (least_kept(options, scale), most), STARTS_FOR_ALL, run.threads)
+        free = passage_balls(solid.mesh, surface, (least, most), Density(starts, SPACING), run.threads)
     return free, Balls(free.centres, np.minimum(share * free.radii + ball, free.radii))
 
 

@@ -13,7 +13,7 @@ import trimesh
 from rlacd import _native
 from rlacd._version import __version__
 from rlacd.find_parts import Reached
-from rlacd.finish.narrowed import narrowed, too_narrow
+from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
 from rlacd.fit import Fit, told_apart
 from rlacd.merge.slivers import is_sliver
@@ -58,7 +58,7 @@ class _Distances(NamedTuple):
     under: float
     over_at: str
     under_at: str
-    passages: list[dict[str, Any]]
+    narrowed: Narrowed
     left_out: Missed
 
 
@@ -95,7 +95,7 @@ def make_report(
         warnings += _stuck_out(parts, reached)
         missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
         warnings += [*summary.warnings, *missed]
-        warnings += too_narrow(apart.passages if apart else [], reached, run.stopped_by is not None)
+        warnings += too_narrow(apart.narrowed, reached, run.stopped_by is not None) if apart else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return {
@@ -110,7 +110,7 @@ def make_report(
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
             "hausdorff": {"over": apart and apart.over, "under": apart and max(apart.under, apart.left_out.distance)},
-            "passages": apart and apart.passages,
+            "passages": apart and apart.narrowed.passages,
             "scale": solid.frame.scale,
             "mass": mass_of(*concatenated(weighed), solid.frame).as_plain(),
             "repair": [{**vars(body)} for body in solid.bodies],
@@ -266,9 +266,9 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
         _, (face,) = surface.closest(np.array([point]))
         return solid.frame.place(point, int(solid.body_of[face]))
 
-    passages = narrowed(reached, hulls, found.over[1], run)
+    less_open = narrowed(reached, hulls, found.over[1], run)
     left_out = missed(solid.left_out, hulls, solid.frame, run)
-    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at), passages, left_out)
+    return _Distances(found.over[1], found.under[1], place(found.over_at), place(found.under_at), less_open, left_out)
 
 
 def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) -> Missed:

@@ -8,6 +8,7 @@ nearest. Between walls it goes to and fro; where they leave it a way out it drif
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,21 +19,48 @@ from rlacd.solid.primitive import Balls
 LARGEST_DRIFT = 0.25
 """Share of its way by which a held ball may drift: the walls that hold it open by up to 30 degrees."""
 
-PUSHES = 8
-"""To and fro, with steps of each of these shares of the radius. Balls shrink so often before, which is enough."""
+APPROACH, PUSHES = 4, 8
+"""Pushes to the middle between walls, and to and fro there, with steps of each of these shares of the radius: four of a
+step are one of the step before."""
 
 STEPS = (1 / 8, 1 / 32, 1 / 128)
 
-SPACING = 0.25
-"""A ball is left out if the centre of a larger one is within this share of its radius: an edge that comes between both
-reaches 1 % of the radius deeper than into either."""
+SHRINKS = 32
+"""So often a ball shrinks at most. In the holes of a thin plate it halves each time."""
+
+GROWTH = 1.5
+"""A ball that touches walls beside its passage's middle is by less than this smaller than one in it."""
+
+ALIKE = 1.02
+"""Times as large as another, a ball does not count as larger."""
+
+FACES = 3000
+"""Triangles of which each is a start; of more, those whose middles lie in different cells, or that face elsewhere."""
+
+CELLS, COARSER = 256, 1.5
+"""Cells along the longest side, and by how much larger ones are tried while there are too many."""
+
+
+class Density(NamedTuple):
+    """How densely passages are filled.
+
+    Attributes
+    ----------
+    starts : int
+        Points of the surface from which balls start, beside the middles of its triangles.
+    spacing : float
+        A ball is left out if the centre of a larger one is within this share of its radius.
+    """
+
+    starts: int
+    spacing: float
 
 
 def passage_balls(
     solid: tuple[FloatArray, IntArray],
     surface: _native.Surface,
     radii: tuple[float, float],
-    count: int,
+    density: Density,
     threads: int,
     wanted: Callable[[Balls], BoolArray] | None = None,
 ) -> Balls:
@@ -46,33 +74,43 @@ def passage_balls(
         That of the solid.
     radii : (float, float)
         The least and the largest radius.
-    count : int
-        Number of points of the surface from which balls start, and of triangles.
+    density : Density
     threads : int
         The result does not depend on it.
     wanted : callable, optional
         Tells which of some balls, not quite in their place yet, matter.
     """
-    least, most = radii
-    points, normals = _starts(*solid, count)
-    balls = _shrunk(points, normals, surface, (least, most), threads)
+    (least, most), (starts, spacing) = radii, density
+    points, normals = _starts(*solid, starts)
+    balls = _shrunk(points, normals, surface, (least / GROWTH, most), threads)
     if wanted is not None:
         balls = balls.some(wanted(balls))
-    balls = _pushed(spread(balls), surface, threads)
+    balls = _pushed(_one_a_cell(balls, spacing), surface, threads)
     balls = balls.some((balls.radii >= least) & (balls.radii <= most))
-    return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5))
+    return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5), spacing)
 
 
 def _starts(vertices: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
     """Points spread over the surface and in the middle of triangles, of which small holes have many; their normals."""
     points, of = _native.sample_surface(vertices, faces, count, 0)
-    some = np.arange(0, len(faces), 1 + len(faces) // count)
-    points = np.concatenate([points, vertices[faces[some]].mean(axis=1)])
-    a, b, c = vertices[faces[np.concatenate([of, some])]].transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
+    middles, normals = vertices[faces].mean(axis=1), _native.long_normals(vertices, faces.astype(np.int64))
+    some = _apart(middles, normals)
+    points, normals = np.concatenate([points, middles[some]]), normals[np.concatenate([of, some])]
     areas = np.sqrt(dots(normals, normals))
     sound = areas > 0
     return np.ascontiguousarray(points[sound]), normals[sound] / areas[sound, None]
+
+
+def _apart(middles: FloatArray, normals: FloatArray) -> IntArray:
+    """Numbers of triangles: all if they are few, else one in each cell and octant of directions."""
+    some, size = np.arange(len(middles)), 2 / CELLS
+    while len(some) > FACES:
+        cells = np.floor(middles / size).astype(np.int64) + CELLS
+        x, y, z = cells.T
+        octants = ((normals > 0) * np.array([1, 2, 4])).sum(axis=1)
+        _, some = np.unique(((x * 2 * CELLS + y) * 2 * CELLS + z) * 8 + octants, return_index=True)
+        size *= COARSER
+    return some.astype(np.int32)
 
 
 def _shrunk(
@@ -85,7 +123,7 @@ def _shrunk(
     least, most = radii
     radius, is_held = np.full(len(points), most), np.zeros(len(points), dtype=bool)
     active = np.arange(len(points))
-    for _ in range(PUSHES):
+    for _ in range(SHRINKS):
         centres = points[active] + radius[active, None] * normals[active]
         touched, _ = surface.closest(centres, threads)
         chord, gap = touched - points[active], touched - centres
@@ -97,6 +135,8 @@ def _shrunk(
         going = across & (smaller >= least)
         active = active[going]
         radius[active] = smaller[going]
+        if not len(active):
+            break
     return Balls(points[is_held] + radius[is_held, None] * normals[is_held], radius[is_held])
 
 
@@ -104,25 +144,39 @@ def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
     """The balls that are held, in the best place near theirs; twice the drift is still within the first steps."""
     for step in STEPS:
         at, size = balls.centres, step * balls.radii
-        best, radii = at.copy(), np.zeros(len(at))
-        for _ in range(PUSHES):
+        begin, best, radii = at, at.copy(), np.zeros(len(at))
+        for push in range(APPROACH + PUSHES):
+            if push == APPROACH:
+                begin = at
             touched, _ = surface.closest(at, threads)
             away = at - touched
             distance = np.sqrt(dots(away, away))
             better = distance > radii
             best[better], radii[better] = at[better], distance[better]
             at = at + (size / np.where(distance > 0, distance, 1.0))[:, None] * away
-        way, most = at - balls.centres, LARGEST_DRIFT * (1 if step == STEPS[-1] else 2)
+        way, most = at - begin, LARGEST_DRIFT * (1 if step == STEPS[-1] else 2)
         balls = Balls(best, radii).some(np.sqrt(dots(way, way)) <= most * PUSHES * size)
     return balls
 
 
-def spread(balls: Balls) -> Balls:
-    """Leave out balls that stand beside a larger one (see `SPACING`); the largest come first."""
+def spread(balls: Balls, spacing: float) -> Balls:
+    """Leave out balls within a share of their own radius of one that is as large; the ends of passages come first."""
     balls = balls.some(np.argsort(-balls.radii, kind="stable"))
-    left = np.ones(len(balls), dtype=bool)
-    for i in range(len(balls)):
-        if left[i]:
-            away = balls.centres[i + 1 :] - balls.centres[i]
-            left[i + 1 :] &= dots(away, away) >= (SPACING * balls.radii[i + 1 :]) ** 2
-    return balls.some(left)
+    away, chosen = np.full(len(balls), np.inf), []
+    while len(balls) and away[farthest := int(away.argmax())] >= spacing:
+        chosen.append(farthest)
+        way = balls.centres - balls.centres[farthest]
+        nearer = np.minimum(away, np.sqrt(dots(way, way)) / balls.radii)
+        away = np.where(balls.radii <= ALIKE * balls.radii[farthest], nearer, away)
+        away[farthest] = -1.0
+    return balls.some(np.array(chosen, dtype=np.intp))
+
+
+def _one_a_cell(balls: Balls, spacing: float) -> Balls:
+    """The largest of those of about one size in each cell, which lie within the spacing of each other."""
+    balls = balls.some(np.argsort(-balls.radii, kind="stable"))
+    _, size = np.frexp(balls.radii)  # a radius of 0.5 to 1 times a power of 2
+    cells = np.floor(balls.centres / np.ldexp(spacing / (2 * np.sqrt(3)), size)[:, None]).astype(np.int64)
+    x, y, z = cells.T + (1 << 17)
+    _, first = np.unique(((x << 18 | y) << 18 | z) << 6 | (size & 63), return_index=True)
+    return balls.some(np.sort(first))
