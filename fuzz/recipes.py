@@ -144,7 +144,7 @@ def hollow(random: Random) -> Shape:
             solid = PRIMITIVES["box"](random)
             around = manifold3d.Manifold(manifold3d.Mesh64(within + middle, one.faces.astype(np.uint64)))
             inner = manifold3d.Manifold.cube([0.1 * size] * 3, True).translate(middle)
-            if (inner - around).is_empty():
+            if (inner ^ around).volume() > 0.999 * inner.volume():
                 found.append(Shape(0.1 * size * solid[0] + middle, solid[1], ("with a body in it",)))
     joined = concatenated(found)
     return replace(joined, vertices=joined.vertices * random.integers(1, 4, 3), is_closed=True)
