@@ -55,7 +55,7 @@ def make_shape(seed: int) -> Shape:
     """Make the shape of a seed."""
     random = np.random.default_rng([seed, 1])
     compose = pick(random, COMPOSITIONS)
-    shape = hollow(random) if np.random.default_rng([seed, 4]).random() < HOLLOW else compose(random)
+    shape = hollow(random) if np.random.default_rng([seed, 5]).random() < HOLLOW else compose(random)
     for _ in range(int(random.choice(4, p=[0.5, 0.25, 0.15, 0.1]))):
         shape = pick(random, FAULTS)(shape, random)
     return placed(shape, random)
