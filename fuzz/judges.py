@@ -145,8 +145,8 @@ def left_out(case: Case, corners: Floats, hulls: list[Polytope]) -> list[str]:
 
 def mass(case: Case, where: Floats, faces: Ints) -> list[str]:
     """Volume, centre and inertia are those that trimesh finds for the closed input, less its cavities."""
-    said, kept = case.report.get("mass"), ("closed", "reoriented")
-    if said is None or any(body["step"] not in kept for body in case.report.get("repair", [{"step": ""}])):
+    said, steps = case.report.get("mass"), {body["step"] for body in case.report.get("repair", [])}
+    if said is None or not steps or not steps <= {"closed", "reoriented"}:
         return []
     body = trimesh.Trimesh(where, faces, process=False)
     unit = 2 / np.ptp(case.shape.vertices[np.unique(finite_faces(case.shape))], axis=0).max()

@@ -18,9 +18,6 @@ from rlacd.pool import Blobs, Values
 
 SERVER = "rlacd.io.read.cad:triangulate"
 
-FINEST = 5e-5
-"""Share of the longest side that triangles may be from the surface at least: a tenth of the least threshold."""
-
 MOST = 500_000
 """Triangles, about: with a smaller deviation their number grows in proportion, and the time faster."""
 
@@ -83,7 +80,7 @@ def triangulate(values: Values, blobs: Blobs) -> Answered:
     usual = USUAL.share * whole
     wanted = values["share"] * (least if values["of_nodes"] else whole)
     wanted = wanted if values["metres"] is None else values["metres"]
-    deviation = sought = min(max(wanted, FINEST * whole), usual)
+    deviation = sought = min(wanted, usual)
     if usual > 0:
         glb = converted(tol_linear=usual / UNITS["mm"])
     if sought < usual:
