@@ -290,6 +290,8 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
         ("decompose {dir}/no/chair.glb", "{dir}/no/chair.glb does not exist: check the spelling and the folder"),
         ("decompose {dir}/ell.stl {dir}/ell.stl", "rlacd batch {dir} -o hulls/ --glob '*.stl'"),
         ("decompose {dir}", "rlacd batch {dir} -o hulls/"),
+        ("decompose {dir}/ell.stl {dir}/out.obj", "rlacd decompose {dir}/ell.stl -o {dir}/out.obj"),
+        ("batch {dir}", "a batch needs -o"),
     ],
 )
 def test_what_a_command_is_not_for_is_one_sentence(mesh: Path, words: str, says: str) -> None:
@@ -408,7 +410,7 @@ def test_a_mesh_from_stdin_becomes_hulls_on_stdout(mesh: Path, words: list[str],
     [
         ([], b"no mesh at all", "add --from obj"),
         ([], b"", "stdin is empty"),
-        (["mug.obj"], b"", "takes one mesh, not 2; for many, put them in a folder: rlacd batch . "),
+        (["mug.obj"], b"", "the name of the output follows -o: rlacd decompose - -o mug.obj"),
         (["--from", "stl"], b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "stdin is not stl but obj: use --from obj"),
         (["--report", "-", "--from", "obj"], b"v 0 0 0\n", "--report - would overwrite the hulls"),
         (["--from", "obj"], b"v 0 0 0\nf 1 2 9\n", "stdin cannot be read as obj"),
