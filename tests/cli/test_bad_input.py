@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 from pathlib import Path
@@ -158,7 +159,10 @@ class BytesPath:
         pytest.param(BytesPath(), MeshDataError, id="path of bytes"),
         pytest.param(3, MeshDataError, id="int"),
         pytest.param(None, MeshDataError, id="None"),
-        pytest.param(b"solid", MeshDataError, id="bytes"),
+        pytest.param(b"solid", OptionError, id="bytes of no format"),
+        pytest.param(io.StringIO("v 0 0 0"), MeshDataError, id="open as text"),
+        pytest.param([], MeshDataError, id="no meshes"),
+        pytest.param([trimesh.Trimesh(), 3], MeshDataError, id="not all meshes"),
         pytest.param((np.zeros((0, 3)), NO_FACES), EmptyMeshError, id="no points"),
         pytest.param(trimesh.Trimesh(), EmptyMeshError, id="empty mesh"),
         pytest.param(trimesh.Scene(), EmptyMeshError, id="empty scene"),
@@ -172,6 +176,13 @@ def test_what_is_no_mesh_is_one_sentence(mesh: Any, error: type[RlacdError]) -> 
     with pytest.raises(error) as caught:
         rlacd.decompose(mesh)
     assert is_one_sentence(str(caught.value))
+
+
+def test_what_is_given_beside_a_mesh_is_told_how_to_give_it() -> None:
+    with pytest.raises(MeshDataError, match="give options by their names"):
+        rlacd.decompose(creation.box(), 0.02)  # a threshold
+    with pytest.raises(OptionError, match="file_type is 'obj'; it has to be left out"):
+        rlacd.decompose(creation.box(), file_type="obj")
 
 
 # --- options ----------------------------------------------------------------------------------------------------------

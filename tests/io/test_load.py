@@ -44,6 +44,32 @@ def test_every_format_gives_the_same_triangles(tmp_path, extension):
 
 
 @pytest.mark.parametrize("extension", FORMATS)
+def test_bytes_and_open_files_are_read_as_files(tmp_path, extension):
+    path = write_mesh(BOX, tmp_path / f"box.{extension}")
+    content = path.read_bytes()
+    with path.open("rb") as file:
+        opened = load_mesh(file)
+    assert opened.asset is None or opened.asset.path == path, "with what lies beside it"
+    alone = [] if extension == "gltf" else [io.BytesIO(content), content]  # without the buffers beside it
+    for mesh in (opened, *(load_mesh(one, file_type=extension.upper()) for one in alone), *map(load_mesh, alone[1:])):
+        np.testing.assert_array_equal(mesh.vertices, load_mesh(path).vertices)
+        np.testing.assert_array_equal(mesh.faces, load_mesh(path).faces)
+    wrong = "off" if extension != "off" else "stl"
+    with pytest.raises(MeshFileError, match=rf"mesh is not {wrong} but {extension}: use file_type={extension}"):
+        load_mesh(content, file_type=wrong)
+    with path.open("rb") as file, pytest.raises(MeshFileError, match=re.escape(f"{path} is not ")):
+        load_mesh(file, file_type=wrong)
+
+
+def test_meshes_in_a_list_are_bodies_of_one_object_and_arrays_may_be_two_arguments():
+    other = BOX.copy().apply_translation((9, 0, 0))
+    both = load_mesh([BOX, other])
+    np.testing.assert_allclose(triangles(both), triangles(BOX + other))
+    assert len(both.nodes) == 2
+    np.testing.assert_array_equal(load_mesh(BOX.vertices, BOX.faces.tolist()).faces, BOX.faces)
+
+
+@pytest.mark.parametrize("extension", FORMATS)
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.7, 0.9])
 @pytest.mark.promise("refused")
 def test_a_file_cut_off_is_an_error_or_usable(tmp_path, extension, share):

@@ -61,7 +61,9 @@ class BatchOptions:
 
     def __post_init__(self) -> None:
         if self.output in ("", "-"):
-            raise OptionError("a batch is not written to stdout; give -o a folder.")
+            raise OptionError(
+                "a batch needs -o with a folder for its results, or an address; it is not written to stdout."
+            )
         check_fields(self)
 
 

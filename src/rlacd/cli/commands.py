@@ -34,7 +34,8 @@ class Option(click.Option):
     """An option under a heading of the help; None unless it is given."""
 
     def __init__(self, *words: str, panel: str = OPTIONS, **known: Any) -> None:
-        super().__init__(list(words), **{"default": None, **known})
+        usual = {} if known.get("required") else {"default": None}  # to click, None is a value
+        super().__init__(list(words), **{**usual, **known})
         self.panel = panel
 
 

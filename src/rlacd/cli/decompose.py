@@ -60,6 +60,8 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
     """
     asked = OutputOptions(**taken(how, OutputOptions))
     if more := click.get_current_context().args:
+        if len(more) == 1 and not os.path.exists(more[0]):
+            raise OptionError(f"the name of the output follows -o: rlacd decompose {mesh} -o {more[0]}")
         many = f"rlacd batch {mesh.parent} -o hulls/ --glob '*{mesh.suffix or '.obj'}'"
         raise OptionError(f"decompose takes one mesh, not {1 + len(more)}; for many, put them in a folder: {many}.")
     if asked.output is None and str(mesh) == STDIO:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from rlacd.options import Options
+from rlacd.options import Options, with_criterion
 from rlacd.view.controls import read_controls, read_subject
 from rlacd.view.picture import check_up
 from rlacd.view.server import ViewServer
@@ -62,7 +62,7 @@ def open_viewer(
     """
     check_up(up)
     controls = read_controls(options or {})
-    Options(threads=threads)
+    Options.of({**with_criterion(options or {}), "threads": threads})
     subject = read_subject(mesh, up)
     session = Session(lambda **given: decompose(**given, threads=threads))
     try:

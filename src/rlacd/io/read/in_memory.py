@@ -1,7 +1,8 @@
-"""Files that are not on the disk, as files: what reads meshes needs names, and some formats a process of their own."""
+"""Contents and open files, as files with a name, which readers need."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -60,6 +61,9 @@ def opened(source: Any, file_type: str | None) -> Iterator[Path]:
     OptionError
         Its format cannot be told.
     """
+    if file_type is None and (path := _path_of(source)) is not None:
+        yield path
+        return
     content, name = source, getattr(source, "name", None)
     if hasattr(source, "read"):
         content = source.read(LARGEST_FILE + 1)  # one more is refused as too large
@@ -68,3 +72,12 @@ def opened(source: Any, file_type: str | None) -> Iterator[Path]:
     name = name if isinstance(name, str) and Path(name).stem else "mesh"
     with as_file(bytes(content), file_type or Path(name).suffix or None, name, "file_type=") as place:
         yield place
+
+
+def _path_of(source: Any) -> Path | None:
+    """Where a file lies that is open at its begin, if it does: others beside it may belong to it."""
+    try:
+        lies_there = os.path.samestat(os.fstat(source.fileno()), os.stat(source.name))
+        return Path(source.name) if lies_there and source.tell() == 0 and "b" in source.mode else None
+    except (AttributeError, OSError, TypeError, ValueError):
+        return None

@@ -75,8 +75,8 @@ def required_hull(hull: Triangulated, name: str, where: str) -> tuple[Triangles,
         rounded = rounded_hull(hull, shift)
     if rounded is None:
         size = float(np.ptp(hull.vertices, axis=0).max())
-        single = np.finfo(np.float32)
-        misfit = "large" if size / 2 > single.max else "small" if size < single.tiny else "thin"
+        least, most = float(np.finfo(np.float32).tiny), float(np.finfo(np.float32).max)
+        misfit = "large" if size / 2 > most else "small" if size < least else "thin"
         said = f"cannot write {name} {where}: it is too {misfit} for single precision"
         raise OutputError(f"{said}; scale the mesh, or write .obj, .ply or .stl in double precision.")
     return rounded, shift
