@@ -22,7 +22,7 @@ from rlacd.solid.component import Component, Part
 TIMES_PARTS = 2
 """Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
 
-SHARE_OF_WORK, LEAST_WORK = 0.3, 0.2e6
+SHARE_OF_WORK, LEAST_WORK = 0.3, 0.4e6
 """Of the work done so far, that cutting on may take, and as much again to merge; at least so many units."""
 
 PIECES = 2
