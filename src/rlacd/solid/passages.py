@@ -23,8 +23,8 @@ STEPS = (1 / 2, 1 / 8, 1 / 32, 1 / 128)
 """Shares of its radius by which a ball is pushed to the middle between walls, ..."""
 
 PUSHES, MORE = 12, 8
-"""... so often by each, since in the corner of two walls it goes a third of its way; and then to and fro by the last, to
-see whether it drifts."""
+"""... so often by each, since in the corner of two walls it goes a third of its way; and then to and fro by the last,
+to see whether it drifts."""
 
 SHRINKS = 32
 """So often a ball shrinks at most. In the holes of a thin plate it halves each time."""
