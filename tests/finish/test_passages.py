@@ -166,7 +166,7 @@ def test_a_slot_that_closes_is_one_passage_and_named() -> None:
         said.startswith("1 passage narrows by") and "1 to nothing" in said and "from a radius of 0.5 to 0;" in said
         for said in report["warnings"]
     )
-    assert rlacd.decompose(trimesh_of(block), threshold_abs=0.3, quality="fast", threads=1).report["passages"] == []
+    assert rlacd.decompose(trimesh_of(block), threshold_abs=0.05, quality="fast", threads=1).report["passages"] == []
 
 
 CRITERIA: list[dict[str, Any]] = [

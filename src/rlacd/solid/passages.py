@@ -19,11 +19,12 @@ from rlacd.solid.primitive import Balls
 LARGEST_DRIFT = 0.25
 """Share of its way by which a held ball may drift: the walls that hold it open by up to 30 degrees."""
 
-APPROACH, PUSHES = 4, 8
-"""Pushes to the middle between walls, and to and fro there, with steps of each of these shares of the radius: four of a
-step are one of the step before."""
+STEPS = (1 / 2, 1 / 8, 1 / 32, 1 / 128)
+"""Shares of its radius by which a ball is pushed to the middle between walls, ..."""
 
-STEPS = (1 / 8, 1 / 32, 1 / 128)
+PUSHES, MORE = 12, 8
+"""... so often by each, since in the corner of two walls it goes a third of its way; and then to and fro by the last,
+to see whether it drifts."""
 
 SHRINKS = 32
 """So often a ball shrinks at most. In the holes of a thin plate it halves each time."""
@@ -85,7 +86,7 @@ def passage_balls(
     balls = _shrunk(points, normals, surface, (least / GROWTH, most), threads)
     if wanted is not None:
         balls = balls.some(wanted(balls))
-    balls = _pushed(_one_a_cell(balls, spacing), surface, threads)
+    balls = _pushed(_one_a_cell(balls, 2 * spacing), surface, threads)
     balls = balls.some((balls.radii >= least) & (balls.radii <= most))
     return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5), spacing)
 
@@ -141,22 +142,27 @@ def _shrunk(
 
 
 def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
-    """The balls that are held, in the best place near theirs; twice the drift is still within the first steps."""
+    """The balls that are held, in the best place near theirs."""
     for step in STEPS:
-        at, size = balls.centres, step * balls.radii
-        begin, best, radii = at, at.copy(), np.zeros(len(at))
-        for push in range(APPROACH + PUSHES):
-            if push == APPROACH:
-                begin = at
-            touched, _ = surface.closest(at, threads)
-            away = at - touched
-            distance = np.sqrt(dots(away, away))
-            better = distance > radii
-            best[better], radii[better] = at[better], distance[better]
-            at = at + (size / np.where(distance > 0, distance, 1.0))[:, None] * away
-        way, most = at - begin, LARGEST_DRIFT * (1 if step == STEPS[-1] else 2)
-        balls = Balls(best, radii).some(np.sqrt(dots(way, way)) <= most * PUSHES * size)
-    return balls
+        balls, _ = _pushed_by(step * balls.radii, PUSHES, balls.centres, surface, threads)
+    size = STEPS[-1] * balls.radii
+    balls, ways = _pushed_by(size, MORE, balls.centres, surface, threads)
+    return balls.some(np.sqrt(dots(ways, ways)) <= LARGEST_DRIFT * MORE * size)
+
+
+def _pushed_by(
+    size: FloatArray, times: int, at: FloatArray, surface: _native.Surface, threads: int
+) -> tuple[Balls, FloatArray]:
+    """The best balls on the ways of points that are pushed, and those ways from begin to end."""
+    begin, best, radii = at, at.copy(), np.zeros(len(at))
+    for _ in range(times):
+        touched, _ = surface.closest(at, threads)
+        away = at - touched
+        distance = np.sqrt(dots(away, away))
+        better = distance > radii
+        best[better], radii[better] = at[better], distance[better]
+        at = at + (size / np.where(distance > 0, distance, 1.0))[:, None] * away
+    return Balls(best, radii), at - begin
 
 
 def spread(balls: Balls, spacing: float) -> Balls:
@@ -173,7 +179,7 @@ def spread(balls: Balls, spacing: float) -> Balls:
 
 
 def _one_a_cell(balls: Balls, spacing: float) -> Balls:
-    """The largest of those of about one size in each cell, which lie within the spacing of each other."""
+    """The largest of those of about one size in each cell, which lie within that share of their radius."""
     balls = balls.some(np.argsort(-balls.radii, kind="stable"))
     _, size = np.frexp(balls.radii)  # a radius of 0.5 to 1 times a power of 2
     cells = np.floor(balls.centres / np.ldexp(spacing / (2 * np.sqrt(3)), size)[:, None]).astype(np.int64)
