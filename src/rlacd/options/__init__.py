@@ -41,7 +41,7 @@ VolumeOf = Literal["part", "whole"]
 OpenName = Literal["auto", "solid", "thin"]
 DetailName = Literal["simple", "full"]
 QualityName = Literal["fast", "balanced", "best"]
-RelativeTo = Literal["scene", "node"]
+RelativeTo = Literal["scene", "node", "mesh"]
 UnitName = Literal["mm", "cm", "m", "in", "file"]
 
 Policy: TypeAlias = Any
@@ -199,7 +199,8 @@ class Options:
     per_node
         Decompose each node of a scene separately, such as doors and drawers, which move.
     relative_to
-        With --per-node, whether --threshold is relative to the size of the whole scene or of each node.
+        What --threshold is relative to: with --per-node the whole scene or each node; of a robot all of it (scene) or
+        each mesh, whose criterion is then concavity.
     unit
         The unit of the mesh, which is converted to metres; file takes what the file says.
     scale
