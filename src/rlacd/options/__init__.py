@@ -141,7 +141,7 @@ class Options:
     threshold
         The concavity a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with more hulls:
         0.02 is fine, 0.2 coarse. Also as a share of the longest side (2.5%) or, where the file says its unit, as a
-        length (0.05m), which is a distance.
+        length (0.05m), which is a distance. For a robot by default 1.5% of its longest side, as a distance.
     threshold_abs
         The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance.
     volume_tolerance

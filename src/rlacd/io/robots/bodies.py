@@ -7,7 +7,7 @@ replace.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -140,11 +140,14 @@ class Body:
         ``[4, 4]``, where it stands with all joints at zero.
     colliders
         Its solids; their meshes are those that are replaced.
+    is_world
+        Whether it belongs to no body, and never moves.
     """
 
     name: str
     pose: FloatArray
     colliders: Sequence[Collider]
+    is_world: bool = False
 
     def mesh(self) -> trimesh.Trimesh:
         """All meshes that are replaced, in the body's frame."""
@@ -157,15 +160,18 @@ class Body:
         return [trimesh.Trimesh(*_turned(pose, hull.vertices, hull.faces), process=False) for pose, hull in each]
 
 
-def size_of(bodies: Iterable[Body]) -> float:
-    """The longest side of the box around all meshes that are replaced, with all joints at zero."""
-    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-    for body in bodies:
-        for mesh in (mesh for collider in body.colliders for mesh in collider.meshes):
-            points = mesh.points[np.unique(mesh.faces)] if len(mesh.faces) else mesh.points
-            points = moved(product(body.pose, mesh.to_body), points)
-            lower, upper = np.minimum(lower, points.min(axis=0)), np.maximum(upper, points.max(axis=0))
-    return float((upper - lower).max())
+def size_of(bodies: Sequence[Body]) -> float:
+    """The longest side of the box around all meshes that are replaced, with all joints at zero; 0 without any.
+
+    The world's count only if there is nothing else: a robot may stand on a terrain of any size.
+    """
+    moving = [body for body in bodies if not body.is_world] or bodies
+    used = [moved(body.pose, _used(body.mesh())) for body in moving]
+    return float(np.ptp(np.concatenate(used), axis=0).max()) if used else 0.0
+
+
+def _used(mesh: trimesh.Trimesh) -> FloatArray:
+    return np.asarray(mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices)
 
 
 def _joined(meshes: Sequence[PlacedMesh], poses: Sequence[FloatArray]) -> trimesh.Trimesh:

@@ -154,7 +154,7 @@ def _bodies(
         placed = [replace(meshes[g.mesh].placed, to_body=compiler.to_body(g.element, g.attributes)) for g in own]
         uses = [(None if apart else geom.kind, at, geom) for geom, at in zip(own, placed, strict=True)]
         joined = colliders(name, uses)
-        bodies.append(Body(name, compiler.pose(element.up()), [*joined]))
+        bodies.append(Body(name, compiler.pose(element.up()), [*joined], element.tag == "worldbody"))
         found |= joined
     return bodies, found
 

@@ -15,7 +15,7 @@ from rlacd.io.read.contents import Triangles
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
-from rlacd.io.robots.bodies import Body, Collider, Surface
+from rlacd.io.robots.bodies import Body, Collider, Surface, size_of
 from rlacd.io.robots.decomposed import check_options, decompose_bodies
 from rlacd.io.robots.mjcf import plan_mjcf
 from rlacd.io.robots.mjcf_model import mujoco_reads, read_model
@@ -74,8 +74,8 @@ def rewrite_robot(
         For the links whose whole name matches a regular expression, another `threshold_abs`: ``{"finger.*": 0.001}``.
         The last that matches counts.
     **options
-        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and `threshold` 1 % of the
-        robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
+        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
+        the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
         ``relative_to="mesh"`` to each solid, whose criterion and threshold are then those of `rlacd.decompose`. Lengths
         such as `threshold_abs` are in the robot's unit, after the scale of a mesh. A `timeout` applies to each solid.
 
@@ -106,7 +106,7 @@ def rewrite_robot(
     if not plan.bodies:
         write_file(place, root.file.data)
         said = [f"{source} has no collision mesh, so this is a copy.", *warnings]
-        return Rewritten(place, folder, [], said, time.perf_counter() - began)
+        return Rewritten(place, folder, [], said, time.perf_counter() - began, 0.0)
     results = decompose_bodies(plan.bodies, options, asked)
     stem = file_stem(place.stem)
     files, names = _hull_files(stem, results)
@@ -117,7 +117,7 @@ def rewrite_robot(
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
     made = [RewrittenLink.of(body, results, names) for body in plan.bodies]
-    return Rewritten(place, folder, made, warnings, time.perf_counter() - began)
+    return Rewritten(place, folder, made, warnings, time.perf_counter() - began, size_of(plan.bodies))
 
 
 def rewrite_stage(
@@ -136,7 +136,7 @@ def rewrite_stage(
     if not made:
         warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
-    return Rewritten(place, place, made, warnings, time.perf_counter() - began, stage.metres)
+    return Rewritten(place, place, made, warnings, time.perf_counter() - began, size_of(bodies), stage.metres)
 
 
 def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:

@@ -69,6 +69,8 @@ class Rewritten:
         What the user should know: one sentence each.
     seconds
         Wall time.
+    size
+        The longest side of the box around all meshes that were replaced, with all joints at zero.
     metres
         The robot's unit of length.
     """
@@ -78,6 +80,7 @@ class Rewritten:
     links: list[RewrittenLink]
     warnings: list[str]
     seconds: float
+    size: float
     metres: float = 1.0
 
     @property
@@ -95,6 +98,7 @@ class Rewritten:
         return {
             "robot": str(self.path),
             "metres": self.metres,
+            "size_abs": self.size,
             "complete": self.complete,
             "meshes": sum(len(link.meshes) for link in self.links),
             "hulls": sum(len(link.files) for link in self.links),

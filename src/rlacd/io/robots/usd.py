@@ -102,7 +102,7 @@ def bodies_of(stage: Colliders, *, apart: bool) -> tuple[list[Body], dict[Collid
             mesh = PlacedMesh(surface, np.array(node["scale"]), placed, np.eye(4))
             uses.append((None if apart or not node["body"] else node["kind"], mesh, index))
         joined = colliders(name, uses)
-        bodies.append(Body(name, pose, [*joined]))
+        bodies.append(Body(name, pose, [*joined], not first["body"]))
         prims |= joined
     return bodies, prims
 
