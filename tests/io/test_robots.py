@@ -343,6 +343,24 @@ def test_a_robot_is_rewritten_on_the_command_line(ear: Path) -> None:
         assert run.stderr.count("\n") == 1
 
 
+def test_warnings_of_a_kind_are_one_that_names_the_worst(tmp_path: Path) -> None:
+    """Rings whose holes close, in another number and size each, from files whose y axis points up."""
+    links = []
+    for index, (width, count) in enumerate([(0.02, 1), (0.06, 3), (0.04, 1)]):
+        rings = [trimesh.creation.annulus(width, width + 0.05, 0.05, sections=24) for _ in range(count)]
+        mesh = trimesh.util.concatenate([ring.apply_translation((i, 0, 0)) for i, ring in enumerate(rings)])
+        (tmp_path / f"ring{index}.dae").write_bytes(trimesh.exchange.dae.export_collada(mesh))
+        mesh = f'<mesh filename="ring{index}.dae"/>'
+        links.append(f'<link name="l{index}"><collision><geometry>{mesh}</geometry></collision></link>')
+    (tmp_path / "r.urdf").write_text(f"<robot name='r'>{''.join(links)}</robot>")
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.2, threads=1)
+    said = [warning for warning in done.warnings if "passage" in warning]
+    assert len(said) == 1
+    assert said[0].startswith("ring1 and 2 others: 3 passages narrow by over a third, such as")
+    assert sum("Y_UP" in warning for warning in done.warnings) == 1
+    assert len(done.warnings) == 2
+
+
 def test_going_elsewhere_says_which_files_will_be_missed(ear: Path, tmp_path: Path) -> None:
     (tmp_path / "far").mkdir()
     done = rlacd.rewrite_robot(ear, tmp_path / "far" / "out.urdf", threads=1)

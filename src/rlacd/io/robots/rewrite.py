@@ -21,7 +21,7 @@ from rlacd.io.robots.mjcf import plan_mjcf
 from rlacd.io.robots.mjcf_model import mujoco_reads, read_model
 from rlacd.io.robots.plan import Plan, Sources
 from rlacd.io.robots.references import References
-from rlacd.io.robots.rewritten import Rewritten, RewrittenLink, grouped
+from rlacd.io.robots.rewritten import Rewritten, RewrittenLink, grouped, warnings_of
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
 from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import file_stem, write_file
@@ -113,7 +113,7 @@ def rewrite_robot(
     copies = _copies(stem, plan.bodies) if kind == "mjcf" else {}
     files |= {name: encode_plain_obj(Triangles(mesh.vertices, mesh.faces)) for mesh, name in copies.items()}
     data = edited(root, plan.edit(names, {mesh.path: name for mesh, name in copies.items()}))
-    warnings += [warning for warning in plan.warnings if warning not in warnings] + grouped(results)
+    warnings += [warning for warning in plan.warnings if warning not in warnings] + warnings_of(results)
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
     made = [RewrittenLink.of(body, results, names) for body in plan.bodies]
@@ -130,7 +130,7 @@ def rewrite_stage(
     bodies, prims = usd.bodies_of(stage, apart=robot.per == "mesh")
     results = decompose_bodies(bodies, options, robot)
     data, warnings, files = usd.encode_layer(stage, place, prims, results, flat=keep_input)
-    warnings += [*grouped(results), *_left_behind(files, stage.source.parent, place)]
+    warnings += [*warnings_of(results), *_left_behind(files, stage.source.parent, place)]
     names = {collider: [*map(hull_name, range(len(result)))] for collider, result in results.items()}
     made = [RewrittenLink.of(body, results, names) for body in bodies]
     if not made:
@@ -166,7 +166,7 @@ def _opened(source: Path, place: Path) -> tuple[str, Element, Path]:
 def _plan(
     root: Element, kind: str, references: References, place: Path, folder: Path, *, apart: bool
 ) -> tuple[Plan, list[str]]:
-    source, said = root.file.folder, list[str]()
+    source, said = root.file.folder, list[tuple[str, str, float]]()
     load = cache(lambda path: _surface(path, said))
     if kind == "urdf":
         sources = Sources(references, load, lambda old, hull: _reference(old, hull, references, folder), apart)
@@ -176,21 +176,21 @@ def _plan(
         within = os.path.relpath(source / compiler.mesh_folder, source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
         plan = plan_mjcf(compiler, Sources(references, load, lambda _, hull: (Path(target) / hull).as_posix(), apart))
-    return plan, [*plan.warnings, *_left_behind(plan.relative, source, place), *said]
+    return plan, [*plan.warnings, *_left_behind(plan.relative, source, place), *grouped(said)]
 
 
-def _surface(path: Path, said: list[str]) -> Surface:
+def _surface(path: Path, said: list[tuple[str, str, float]]) -> Surface:
     """Read a mesh file, in the unit that a COLLADA file states: ROS, Gazebo and Bullet apply it.
 
     Whether such a file whose y axis points up is turned differs between them, so that is a warning.
     """
     mesh = load_mesh(path)
-    said += [f"{path.name}: {warning}" for warning in mesh.warnings]
+    said += [(path.name, warning, 0.0) for warning in mesh.warnings]
     if path.suffix.lower() != ".dae":
         return Surface(path, mesh.vertices, mesh.faces)
     if mesh.up != "z":
-        turned = f"{path.name} declares {mesh.up.upper()}_UP, and some programs rotate such a file when they read it"
-        said.append(f"{turned}; its hulls keep its coordinates.")
+        turned = f"{mesh.up.upper()}_UP is declared, and some programs rotate such a file when they read it"
+        said.append((path.name, f"{turned}; hulls keep its coordinates.", 0.0))
     return Surface(path, mesh.vertices * (mesh.metres or 1.0), mesh.faces)
 
 

@@ -119,18 +119,22 @@ class Rewritten:
         }
 
 
-def grouped(results: Mapping[Collider, Decomposition]) -> list[str]:
-    """The warnings of all solids, those of a kind as one: that of the solid with the widest lost passage, or in which
-    hulls reach farthest."""
-    kinds: dict[str, dict[int, tuple[str, str, Decomposition]]] = {}
-    for collider, result in results.items():
-        for said in result.report["warnings"]:
-            kinds.setdefault(_kind(said), {}).setdefault(id(result), (collider.name, said, result))
+def warnings_of(results: Mapping[Collider, Decomposition]) -> list[str]:
+    """What the reports of all solids warn of; the worst lost the widest passage, or has hulls that reach farthest."""
+    solids = {id(result): (collider.name, result) for collider, result in results.items()}
+    each = [(name, result, said) for name, result in solids.values() for said in result.report["warnings"]]
+    return grouped([(name, said, _widest(r) if "passage" in said else _reach(r) or 0.0) for name, r, said in each])
+
+
+def grouped(warnings: Sequence[tuple[str, str, float]]) -> list[str]:
+    """One sentence for all warnings of a kind: the worst, by what it is about, what it says, and how bad that is."""
+    kinds: dict[str, list[tuple[str, str, float]]] = {}
+    for one in warnings:
+        kinds.setdefault(_kind(one[1]), []).append(one)
     sentences = []
-    for kind, each in kinds.items():
-        worth = _widest if kind.startswith("passage") else _reach
-        name, said, _ = max(each.values(), key=lambda one: worth(one[2]) or 0.0)
-        others = f", worst of {len(each)} such solids" if len(each) > 1 else ""
+    for each in kinds.values():
+        name, said, _ = max(each, key=lambda one: one[2])
+        others = {1: "", 2: " and 1 other"}.get(len(each), f" and {len(each) - 1} others")
         sentences.append(f"{name}{others}: {said}")
     return sentences
 
