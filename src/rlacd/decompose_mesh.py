@@ -32,13 +32,14 @@ from rlacd.options import (
     VolumeOf,
 )
 from rlacd.options.fields import check_callback
-from rlacd.options.names import UNITS, PrimitiveKind
+from rlacd.options.names import UNITS, PrimitiveKind, mesh_name
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.provenance import owners
 
 MeshLike: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | tuple[ArrayLike, ArrayLike]"
@@ -61,6 +62,7 @@ def decompose(
     overlap_abs: float | None = None,
     keep_open: float | None = None,
     keep_open_abs: float | None = None,
+    avoid: Sequence[MeshLike] = (),
     merge: bool = True,
     policy: str | Policy | None = None,
     resolution: int = 100,
@@ -129,6 +131,10 @@ def decompose(
         the surface, so one with a tiny share of it can be missed; ``report["warnings"]`` names those not kept.
     keep_open_abs : float, optional
         Instead of a share, the radius of a ball in the input's unit that still passes wherever one 1 % larger does.
+    avoid : list of meshes
+        Meshes, each like `mesh`, in its frame and unit, that no hull enters: parts that would are cut finer, down to a
+        hundredth of the threshold. Where the input itself crosses them, or limits on the hulls leave no way,
+        ``report["warnings"]`` says so.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy, optional
@@ -200,6 +206,8 @@ def decompose(
     with Run(options.threads, options.timeout, progress, options.seed) as run:
         with run.stage("load"):
             source = in_metres(load_mesh(mesh), options)
+            obstacles = tuple(_obstacle(one).scaled(source.factor) for one in options.avoid)
+        options = replace(options, avoid=obstacles)
         apart = options.per_node and len(source.nodes) > 1
         source = replace(source, warnings=(*source.warnings, *_without_effect(options, source, apart)))
         done = _each_node(source, options, run) if apart else _as_one(source, options, run)
@@ -213,6 +221,14 @@ def decompose(
     }
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
+
+
+def _obstacle(mesh: MeshLike | Obstacle) -> Obstacle:
+    """Read a mesh that hulls are to avoid."""
+    if isinstance(mesh, Obstacle):
+        return mesh
+    found = load_mesh(mesh)
+    return Obstacle(mesh_name(mesh), found.vertices, found.faces.astype(np.int32))
 
 
 def _without_effect(options: Options, source: InputMesh, apart: bool) -> list[str]:

@@ -153,7 +153,7 @@ class _Decomposer:
 
         `free` is that without a limit, which has more. If there is no time, the solid stays one part.
         """
-        run, whole, limited = self.run, self.model.solid, LimitedCriterion(goal, self.options.hull_limits)
+        run, whole, limited = self.run, self.model.solid, LimitedCriterion.of(goal, self.options.hull_limits)
         best, least = list[Part]([whole]), math.inf
         factor, begin = 1.0, run.work.done
         try:
@@ -176,7 +176,7 @@ class _Decomposer:
 
     def cut_to_limits(self, parts: list[Part], goal: Criterion) -> list[Part]:
         """Cut parts that limits too low for the criterion make break it, the worst first, while hulls are left."""
-        limited, most = LimitedCriterion(goal, self.options.hull_limits), self.options.max_hulls or math.inf
+        limited, most = LimitedCriterion.of(goal, self.options.hull_limits), self.options.max_hulls or math.inf
         met = self.run.map(limited.is_met, parts)
         done = [part for part, is_met in zip(parts, met, strict=True) if is_met]
         broken = sorted((part for part, is_met in zip(parts, met, strict=True) if not is_met), key=limited.error)

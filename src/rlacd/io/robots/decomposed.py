@@ -34,6 +34,8 @@ def check_options(options: Mapping[str, Any]) -> None:
     for name in ("unit", "scale", "per_node"):
         if options.get(name):
             raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
+    if options.get("avoid"):
+        raise OptionError("avoid is for a single mesh; the links of a robot stay clear of each other.")
     if options.get("relative_to") == "node":
         raise OptionError("relative_to is 'node'; for a robot it has to be 'scene', all of it, or 'mesh'.")
     Options(**{name: options[name] for name in OPTION_NAMES if name in options})
