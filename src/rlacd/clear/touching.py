@@ -1,0 +1,227 @@
+"""Where hulls of two bodies touch, though the bodies do not: exact tests by coal.
+
+The hulls of a body hold its surface, so bodies whose hulls are apart need no test of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rlacd import _native
+from rlacd.clear.bodies import Body, Surface, overlapping, placed_boxes
+from rlacd.clear.motion import Motion
+from rlacd.errors import import_extra
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
+
+TOUCH = 1e-6
+"""Share of the size of all bodies at rest up to which an overlap of hulls, or a gap between bodies, means nothing."""
+
+SAME = 1e-9
+"""Poses of one body seen from another that differ by no more, in shares of that size, are one."""
+
+
+@dataclass(frozen=True)
+class Offence:
+    """Hulls that touch though the bodies do not, at one place of one body seen from the other.
+
+    Attributes
+    ----------
+    sample : int
+        The first at which the bodies are so.
+    pose : float64 [4, 4]
+        From the second body's frame to the first's.
+    depth : float
+        How far the hulls would have to move apart.
+    gap : float
+        How far the bodies are apart.
+    """
+
+    sample: int
+    pose: FloatArray
+    depth: float
+    gap: float
+
+
+@dataclass(frozen=True)
+class Touching:
+    """What two bodies do at all samples.
+
+    Attributes
+    ----------
+    hulls, meshes : bool [S]
+        Whether their hulls touch, and whether they themselves do.
+    offences : tuple of Offence
+        The deepest first.
+    """
+
+    hulls: BoolArray
+    meshes: BoolArray
+    offences: tuple[Offence, ...]
+
+
+def check(
+    bodies: list[Body], motion: Motion, pairs: Collection[tuple[int, int]] | None = None
+) -> dict[tuple[int, int], Touching]:
+    """Find the pairs of bodies whose hulls touch at some sample, by the numbers of the two, the lower first.
+
+    Parameters
+    ----------
+    bodies : list of Body
+        In the order of the motion's links.
+    motion : Motion
+    pairs : collection of (int, int), optional
+        Look at no others.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra ``clear`` is not installed.
+    """
+    import_extra("coal", "checking that bodies stay clear of each other", "clear")
+    filled = [i for i, body in enumerate(bodies) if body.hulls]
+    if len(filled) < 2:
+        return {}
+    boxes = np.stack([bodies[i].box for i in filled])
+    placed = placed_boxes(boxes, motion.poses[:, filled])
+    size = float(np.ptp(placed[0].reshape(-1, 3), axis=0).max())
+    shapes = {i: _Shapes(bodies[i]) for i in filled}
+    near, numbers = overlapping(placed), np.array(filled)
+    near[:, 1:] = numbers[near[:, 1:]]
+    order = np.lexsort((near[:, 0], near[:, 2], near[:, 1]))
+    near = near[order]
+    cuts = np.flatnonzero((np.diff(near[:, 1:], axis=0) != 0).any(axis=1)) + 1
+    found = {}
+    for rows in np.split(near, cuts) if len(near) else []:
+        first, second = rows[0, 1:].tolist()
+        if pairs is None or (first, second) in pairs:
+            poses = _seen_from(motion.poses[rows[:, 0], first], motion.poses[rows[:, 0], second])
+            touching = _touching(shapes[first], shapes[second], rows[:, 0], poses, len(motion.poses), size)
+            if touching.hulls.any():
+                found[first, second] = touching
+    return found
+
+
+def _seen_from(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Poses [K, 4, 4] of second frames in first ones."""
+    back = np.transpose(first[:, :3, :3], (0, 2, 1))
+    poses = np.tile(np.eye(4), (len(first), 1, 1))
+    poses[:, :3, :3] = np.matmul(back, second[:, :3, :3])
+    poses[:, :3, 3] = np.matmul(back, (second[:, :3, 3] - first[:, :3, 3])[..., None])[..., 0]
+    return poses
+
+
+def _touching(
+    first: _Shapes, second: _Shapes, samples: Int64Array, poses: FloatArray, count: int, size: float
+) -> Touching:
+    """What two bodies do, looked at once for each way in which they are to each other."""
+    rounded = np.round(poses / (SAME * np.array([1, 1, 1, size])))
+    _, chosen, same = np.unique(rounded.reshape(len(poses), 16), axis=0, return_index=True, return_inverse=True)
+    depths, meets, offences = np.zeros(len(chosen)), np.zeros(len(chosen), dtype=bool), []
+    for place, (a, b) in _near_hulls(first, second, poses[chosen]):
+        depths[place] = max(depths[place], _depth(first.hulls[a], second.hulls[b], poses[chosen[place]]))
+    for place in np.flatnonzero(depths > TOUCH * size).tolist():
+        pose = poses[chosen[place]]
+        gap = _gap(first, second, pose)
+        meets[place] = gap <= TOUCH * size
+        if not meets[place]:
+            offences.append(Offence(int(samples[chosen[place]]), pose, float(depths[place]), gap))
+    hulls, meshes = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    hulls[samples], meshes[samples] = (depths > TOUCH * size)[same.ravel()], meets[same.ravel()]
+    return Touching(hulls, meshes, tuple(sorted(offences, key=lambda one: (-one.depth, one.sample))))
+
+
+def _near_hulls(first: _Shapes, second: _Shapes, poses: FloatArray) -> Iterator[tuple[int, tuple[int, int]]]:
+    """Hulls whose boxes overlap, by the number of the pose."""
+    theirs = placed_boxes(second.boxes, poses[:, None])[:, None]
+    ours = first.boxes[None, :, None]
+    meets = (ours[..., 0, :] <= theirs[..., 1, :]).all(axis=-1) & (theirs[..., 0, :] <= ours[..., 1, :]).all(axis=-1)
+    for place, a, b in np.argwhere(meets).tolist():
+        yield place, (a, b)
+
+
+class _Place(NamedTuple):
+    fixed: Any
+    moved: Any
+
+
+def _place(pose: FloatArray) -> _Place:
+    coal = import_extra("coal", "", "clear")
+    return _Place(coal.Transform3s.Identity(), coal.Transform3s(pose[:3, :3], pose[:3, 3]))
+
+
+def _depth(first: Any, second: Any, pose: FloatArray) -> float:
+    """How deep two convex polytopes overlap; 0 if they do not."""
+    coal = import_extra("coal", "", "clear")
+    at, result = _place(pose), coal.CollisionResult()
+    if not coal.collide(first, at.fixed, second, at.moved, coal.CollisionRequest(), result):
+        return 0.0
+    return max(0.0, -float(result.getContact(0).penetration_depth))
+
+
+def _gap(first: _Shapes, second: _Shapes, pose: FloatArray) -> float:
+    """How far two bodies are apart; 0 if their surfaces cross or one holds the other."""
+    coal = import_extra("coal", "", "clear")
+    at, request, result = _place(pose), coal.CollisionRequest(), coal.CollisionResult()
+    request.enable_contact = False
+    if coal.collide(first.mesh, at.fixed, second.mesh, at.moved, request, result):
+        return 0.0
+    if _holds(first, second.body.mesh[0] @ pose[:3, :3].T + pose[:3, 3]):
+        return 0.0
+    if _holds(second, (first.body.mesh[0] - pose[:3, 3]) @ pose[:3, :3]):
+        return 0.0
+    return float(
+        coal.distance(first.mesh, at.fixed, second.mesh, at.moved, coal.DistanceRequest(), coal.DistanceResult())
+    )
+
+
+def _holds(shapes: _Shapes, points: FloatArray) -> bool:
+    """Whether a body holds another whose surface does not cross its own: it then holds any of its points."""
+    vertices = shapes.body.mesh[0]
+    if (points.min(axis=0) < vertices.min(axis=0)).any() or (points.max(axis=0) > vertices.max(axis=0)).any():
+        return False
+    return bool(shapes.surface.winding(np.ascontiguousarray(points[:1]), accuracy=4.0, threads=1)[0] > 0.5)
+
+
+class _Shapes:
+    """A body as coal's shapes, made when first needed."""
+
+    def __init__(self, body: Body) -> None:
+        self.body = body
+        self.boxes = np.stack([np.stack([v.min(axis=0), v.max(axis=0)]) for v, _ in body.hulls])
+
+    @cached_property
+    def mesh(self) -> Any:
+        return _mesh(self.body.mesh)
+
+    @cached_property
+    def hulls(self) -> list[Any]:
+        return [_convex(hull) for hull in self.body.hulls]
+
+    @cached_property
+    def surface(self) -> _native.Surface:
+        vertices, faces = self.body.mesh
+        return _native.Surface(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, np.int32))
+
+
+def _mesh(surface: Surface) -> Any:
+    coal = import_extra("coal", "", "clear")
+    vertices, faces = surface
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), len(vertices))
+    model.addVertices(np.asarray(vertices, dtype=np.float64))
+    model.addTriangles(np.asarray(faces, dtype=np.int64))
+    model.endModel()
+    return model
+
+
+def _convex(surface: Surface) -> Any:
+    coal = import_extra("coal", "", "clear")
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    points.extend([np.asarray(vertex, dtype=np.float64) for vertex in surface[0]])
+    triangles.extend([coal.Triangle(*face) for face in surface[1].tolist()])
+    return coal.Convex(points, triangles)
