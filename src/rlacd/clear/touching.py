@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rlacd import _native
-from rlacd.clear.bodies import Body, Surface, overlapping, placed_boxes
+from rlacd.clear.bodies import Body, Surface, inverse, moved, overlapping, placed_boxes
 from rlacd.clear.motion import Motion
 from rlacd.errors import import_extra
-from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 
 TOUCH = 1e-6
 """Share of the size of all bodies at rest up to which an overlap of hulls, or a gap between bodies, means nothing."""
@@ -37,14 +37,11 @@ class Offence:
         From the second body's frame to the first's.
     depth : float
         How far the hulls would have to move apart.
-    gap : float
-        How far the bodies are apart.
     """
 
     sample: int
     pose: FloatArray
     depth: float
-    gap: float
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,7 @@ def check(
     boxes = np.stack([bodies[i].box for i in filled])
     placed = placed_boxes(boxes, motion.poses[:, filled])
     size = float(np.ptp(placed[0].reshape(-1, 3), axis=0).max())
-    shapes = {i: _Shapes(bodies[i]) for i in filled}
+    shapes = {i: Shapes(bodies[i]) for i in filled}
     near, numbers = overlapping(placed), np.array(filled)
     near[:, 1:] = numbers[near[:, 1:]]
     order = np.lexsort((near[:, 0], near[:, 2], near[:, 1]))
@@ -108,15 +105,15 @@ def check(
 
 def _seen_from(first: FloatArray, second: FloatArray) -> FloatArray:
     """Poses [K, 4, 4] of second frames in first ones."""
-    back = np.transpose(first[:, :3, :3], (0, 2, 1))
+    columns = np.transpose(first[:, :3, :3], (0, 2, 1))[:, :, None, :]
     poses = np.tile(np.eye(4), (len(first), 1, 1))
-    poses[:, :3, :3] = np.matmul(back, second[:, :3, :3])
-    poses[:, :3, 3] = np.matmul(back, (second[:, :3, 3] - first[:, :3, 3])[..., None])[..., 0]
+    poses[:, :3, :3] = dots(columns, np.transpose(second[:, :3, :3], (0, 2, 1))[:, None])
+    poses[:, :3, 3] = dots(columns[:, :, 0], (second[:, :3, 3] - first[:, :3, 3])[:, None])
     return poses
 
 
 def _touching(
-    first: _Shapes, second: _Shapes, samples: Int64Array, poses: FloatArray, count: int, size: float
+    first: Shapes, second: Shapes, samples: Int64Array, poses: FloatArray, count: int, size: float
 ) -> Touching:
     """What two bodies do, looked at once for each way in which they are to each other."""
     rounded = np.round(poses / (SAME * np.array([1, 1, 1, size])))
@@ -126,16 +123,15 @@ def _touching(
         depths[place] = max(depths[place], _depth(first.hulls[a], second.hulls[b], poses[chosen[place]]))
     for place in np.flatnonzero(depths > TOUCH * size).tolist():
         pose = poses[chosen[place]]
-        gap = _gap(first, second, pose)
-        meets[place] = gap <= TOUCH * size
+        meets[place] = first.meets(second, pose, TOUCH * size)
         if not meets[place]:
-            offences.append(Offence(int(samples[chosen[place]]), pose, float(depths[place]), gap))
+            offences.append(Offence(int(samples[chosen[place]]), pose, float(depths[place])))
     hulls, meshes = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     hulls[samples], meshes[samples] = (depths > TOUCH * size)[same.ravel()], meets[same.ravel()]
     return Touching(hulls, meshes, tuple(sorted(offences, key=lambda one: (-one.depth, one.sample))))
 
 
-def _near_hulls(first: _Shapes, second: _Shapes, poses: FloatArray) -> Iterator[tuple[int, tuple[int, int]]]:
+def _near_hulls(first: Shapes, second: Shapes, poses: FloatArray) -> Iterator[tuple[int, tuple[int, int]]]:
     """Hulls whose boxes overlap, by the number of the pose."""
     theirs = placed_boxes(second.boxes, poses[:, None])[:, None]
     ours = first.boxes[None, :, None]
@@ -163,31 +159,7 @@ def _depth(first: Any, second: Any, pose: FloatArray) -> float:
     return max(0.0, -float(result.getContact(0).penetration_depth))
 
 
-def _gap(first: _Shapes, second: _Shapes, pose: FloatArray) -> float:
-    """How far two bodies are apart; 0 if their surfaces cross or one holds the other."""
-    coal = import_extra("coal", "", "clear")
-    at, request, result = _place(pose), coal.CollisionRequest(), coal.CollisionResult()
-    request.enable_contact = False
-    if coal.collide(first.mesh, at.fixed, second.mesh, at.moved, request, result):
-        return 0.0
-    if _holds(first, second.body.mesh[0] @ pose[:3, :3].T + pose[:3, 3]):
-        return 0.0
-    if _holds(second, (first.body.mesh[0] - pose[:3, 3]) @ pose[:3, :3]):
-        return 0.0
-    return float(
-        coal.distance(first.mesh, at.fixed, second.mesh, at.moved, coal.DistanceRequest(), coal.DistanceResult())
-    )
-
-
-def _holds(shapes: _Shapes, points: FloatArray) -> bool:
-    """Whether a body holds another whose surface does not cross its own: it then holds any of its points."""
-    vertices = shapes.body.mesh[0]
-    if (points.min(axis=0) < vertices.min(axis=0)).any() or (points.max(axis=0) > vertices.max(axis=0)).any():
-        return False
-    return bool(shapes.surface.winding(np.ascontiguousarray(points[:1]), accuracy=4.0, threads=1)[0] > 0.5)
-
-
-class _Shapes:
+class Shapes:
     """A body as coal's shapes, made when first needed."""
 
     def __init__(self, body: Body) -> None:
@@ -196,16 +168,46 @@ class _Shapes:
 
     @cached_property
     def mesh(self) -> Any:
+        """The surface as it was read."""
         return _mesh(self.body.mesh)
 
     @cached_property
     def hulls(self) -> list[Any]:
+        """The hulls as convex polytopes."""
         return [_convex(hull) for hull in self.body.hulls]
 
-    @cached_property
-    def surface(self) -> _native.Surface:
+    def meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
+        """Whether the bodies are within reach of each other, the other seen at a pose, or one holds the other."""
+        coal = import_extra("coal", "", "clear")
+        at, request = _place(pose), coal.CollisionRequest()
+        request.enable_contact, request.security_margin = False, reach
+        if coal.collide(self.mesh, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()):
+            return True
+        theirs = moved(other.body.mesh[0], pose)
+        return self._holds(theirs) or other._holds(moved(self.body.mesh[0], inverse(pose)))
+
+    def gap(self, other: Shapes, pose: FloatArray) -> float:
+        """How far the surfaces of the bodies are apart, the other seen at a pose."""
+        coal = import_extra("coal", "", "clear")
+        at, request = _place(pose), coal.DistanceRequest()
+        return float(coal.distance(self.mesh, at.fixed, other.mesh, at.moved, request, coal.DistanceResult()))
+
+    def enters(self, other: Shapes, pose: FloatArray) -> bool:
+        """Whether a hull touches the other body's surface, seen at a pose."""
+        coal = import_extra("coal", "", "clear")
+        at, request = _place(pose), coal.CollisionRequest()
+        request.enable_contact = False
+        return any(
+            coal.collide(hull, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()) for hull in self.hulls
+        )
+
+    def _holds(self, points: FloatArray) -> bool:
+        """Whether the body holds another whose surface does not cross its own: it then holds any of its points."""
         vertices, faces = self.body.mesh
-        return _native.Surface(np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, np.int32))
+        if (points.min(axis=0) < vertices.min(axis=0)).any() or (points.max(axis=0) > vertices.max(axis=0)).any():
+            return False
+        surface = _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
+        return bool(surface.winding(np.ascontiguousarray(points[:1]), accuracy=4.0, threads=1)[0] > 0.5)
 
 
 def _mesh(surface: Surface) -> Any:
