@@ -7,14 +7,16 @@ one stays out of the other's surface and leaves half the gap, then the other out
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from rlacd.clear.bodies import Body, Surface, inverse, moved
 from rlacd.clear.motion import Motion
-from rlacd.clear.touching import TOUCH, Offence, Shapes, Touching, check
+from rlacd.clear.touching import TOUCH, Offence, Shapes, Touching, check, size_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import concatenated
 from rlacd.solid.obstacle import Obstacle
@@ -50,13 +52,45 @@ class Cleared:
     mended: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass
-class _Asked:
-    """What one body stays out of on account of another: where that was, seen from it, and the least gap."""
+class _Wish(NamedTuple):
+    """One body stays out of another, of its surface or of its hulls."""
 
-    poses: list[FloatArray] = field(default_factory=list)
-    of_mesh: bool = False
-    gap: float = np.inf
+    body: int
+    other: int
+    of_mesh: bool
+
+
+@dataclass
+class _Wishes:
+    """What bodies are to stay out of, and where, seen from them.
+
+    Attributes
+    ----------
+    places : dict
+        Poses of the other body, by their digits.
+    gaps : dict
+        The least gap between the two there.
+    tried : set
+        Places with the hulls that the other body had: the same again would not help.
+    renewed : dict
+        How often a body was decomposed again.
+    """
+
+    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)
+    gaps: dict[_Wish, float] = field(default_factory=dict)
+    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)
+    renewed: Counter[int] = field(default_factory=Counter)
+
+    def add(self, wish: _Wish, poses: Sequence[FloatArray]) -> bool:
+        """Add places; returns whether any is new."""
+        version = 0 if wish.of_mesh else self.renewed[wish.other]
+        keys = [(wish, version, pose.round(9).tobytes()) for pose in poses]
+        is_new = not self.tried.issuperset(keys)
+        if is_new:
+            self.tried.update(keys)
+            known = self.places.setdefault(wish, {})
+            known.update(zip((key[2] for key in keys), poses, strict=True))
+        return is_new
 
 
 def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
@@ -71,18 +105,18 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
     """
     bodies = list(bodies)
     touching = check(bodies, motion)
-    first = {pair for pair, found in touching.items() if _is_wrong(found)}
-    asked: dict[tuple[int, int], _Asked] = {}
+    first, wishes = {pair for pair, found in touching.items() if _is_wrong(found)}, _Wishes()
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if _is_wrong(found)}
-        again = _asked_of(bodies, wrong, asked)
+        again = _wish(bodies, wrong, wishes)
         if not again:
             break
         for body in sorted(again):
-            obstacles = [_obstacle(bodies, pair, what, motion) for pair, what in asked.items() if pair[0] == body]
+            obstacles = [_obstacle(bodies, wish, wishes, motion) for wish in wishes.places if wish.body == body]
             bodies[body] = bodies[body].with_hulls(redo(body, obstacles))
-        near = {(i, j) for i in again for j in range(len(bodies)) if j != i}
-        renewed = check(bodies, motion, {(min(pair), max(pair)) for pair in near})
+            wishes.renewed[body] += 1
+        near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
+        renewed = check(bodies, motion, near)
         touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
     mended = sorted(pair for pair in first if pair not in touching or not _is_wrong(touching[pair]))
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))
@@ -92,31 +126,27 @@ def _is_wrong(found: Touching) -> bool:
     return len(found.offences) > 0 and not found.meshes[0]
 
 
-def _asked_of(
-    bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], asked: dict[tuple[int, int], _Asked]
-) -> set[int]:
-    """Add what bodies are asked to stay out of, and return those to decompose again: not both of a pair at once."""
+def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:
+    """Add what bodies are to stay out of, and return those to decompose again: not both of a pair at once."""
     shapes = {i: Shapes(bodies[i]) for pair in wrong for i in pair}
     again, fixed = set[int](), set[int]()
     for (i, j), found in sorted(wrong.items(), key=lambda one: (-one[1].offences[0].depth, one[0])):
-        places = _spread(found.offences)
-        ours = any(shapes[i].enters(shapes[j], place.pose) for place in places)
-        theirs = any(shapes[j].enters(shapes[i], inverse(place.pose)) for place in places)
-        of_mesh = ours and theirs
-        if of_mesh and (i, j) in asked:  # it is the other's turn
-            i, j, of_mesh = j, i, False
-        elif theirs and not ours:
-            i, j = j, i
-        if i in fixed or j in again:
-            continue
-        again.add(i)
-        fixed.add(j)
-        is_second = (i, j) not in wrong
-        what = asked.setdefault((i, j), _Asked())
-        what.poses += [inverse(place.pose) if is_second else place.pose for place in places]
-        what.of_mesh |= of_mesh
-        if what.of_mesh:
-            what.gap = min([what.gap, *(shapes[i].gap(shapes[j], pose) for pose in what.poses)])
+        seen = [place.pose for place in _spread(found.offences)]
+        poses = {i: seen, j: [inverse(pose) for pose in seen]}
+        ours, theirs = (any(shapes[a].enters(shapes[b], pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
+        ways = [_Wish(i, j, False), _Wish(j, i, False)]
+        if theirs:
+            ways.reverse()
+        if ours and theirs:
+            ways.insert(0, _Wish(i, j, True))
+        for wish in ways:
+            if wish.body not in fixed and wish.other not in again and wishes.add(wish, poses[wish.body]):
+                again.add(wish.body)
+                fixed.add(wish.other)
+                if wish.of_mesh:
+                    gap = min(shapes[i].gap(shapes[j], pose) for pose in seen)
+                    wishes.gaps[wish] = min(gap, wishes.gaps.get(wish, gap))
+                break
     return again
 
 
@@ -131,17 +161,20 @@ def _spread(offences: Sequence[Offence]) -> list[Offence]:
     return [offences[i] for i in chosen]
 
 
-def _obstacle(bodies: Sequence[Body], pair: tuple[int, int], what: _Asked, motion: Motion) -> Obstacle:
-    """The second body of a pair at all places, seen from the first, as far as it comes near that."""
-    own, other = bodies[pair[0]], bodies[pair[1]]
-    size = float(np.ptp(np.concatenate([motion.poses[0, :, :3, 3], own.box, other.box]), axis=0).max())
-    vertices, faces = other.mesh if what.of_mesh else concatenated([(v, f.astype(np.int32)) for v, f in other.hulls])
-    margin = what.gap / 2 if what.of_mesh else OFF_HULLS * size
+def _obstacle(bodies: Sequence[Body], wish: _Wish, wishes: _Wishes, motion: Motion) -> Obstacle:
+    """The other body at all places, seen from the one that stays out of it, as far as it comes near that."""
+    own, other = bodies[wish.body], bodies[wish.other]
+    if wish.of_mesh:
+        (vertices, faces), margin = other.mesh, wishes.gaps[wish] / 2
+    else:
+        vertices, faces = concatenated([(v, f.astype(np.int32)) for v, f in other.hulls])
+        margin = OFF_HULLS * size_of(bodies, motion)
     lower, upper = own.box[0] - margin, own.box[1] + margin
     near = []
-    for pose in what.poses:
+    for pose in wishes.places[wish].values():
         triangles = moved(vertices, pose)[faces]
         meets = (triangles.min(axis=1) <= upper).all(axis=1) & (triangles.max(axis=1) >= lower).all(axis=1)
         near.append(triangles[meets])
     corners = np.ascontiguousarray(np.concatenate(near).reshape(-1, 3))
-    return Obstacle(other.name, corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3), margin)
+    numbers = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    return Obstacle(other.name, corners, numbers, margin, is_told=False)

@@ -5,7 +5,7 @@ The hulls of a body hold its surface, so bodies whose hulls are apart need no te
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -62,13 +62,13 @@ class Touching:
 
 
 def check(
-    bodies: list[Body], motion: Motion, pairs: Collection[tuple[int, int]] | None = None
+    bodies: Sequence[Body], motion: Motion, pairs: Collection[tuple[int, int]] | None = None
 ) -> dict[tuple[int, int], Touching]:
     """Find the pairs of bodies whose hulls touch at some sample, by the numbers of the two, the lower first.
 
     Parameters
     ----------
-    bodies : list of Body
+    bodies : sequence of Body
         In the order of the motion's links.
     motion : Motion
     pairs : collection of (int, int), optional
@@ -85,7 +85,7 @@ def check(
         return {}
     boxes = np.stack([bodies[i].box for i in filled])
     placed = placed_boxes(boxes, motion.poses[:, filled])
-    size = float(np.ptp(placed[0].reshape(-1, 3), axis=0).max())
+    size = size_of(bodies, motion)
     shapes = {i: Shapes(bodies[i]) for i in filled}
     near, numbers = overlapping(placed), np.array(filled)
     near[:, 1:] = numbers[near[:, 1:]]
@@ -101,6 +101,13 @@ def check(
             if touching.hulls.any():
                 found[first, second] = touching
     return found
+
+
+def size_of(bodies: Sequence[Body], motion: Motion) -> float:
+    """The longest side of the box around all bodies at rest."""
+    filled = [i for i, body in enumerate(bodies) if len(body.mesh[0])]
+    boxes = np.stack([bodies[i].box for i in filled])
+    return float(np.ptp(placed_boxes(boxes, motion.poses[:1, filled]).reshape(-1, 3), axis=0).max())
 
 
 def _seen_from(first: FloatArray, second: FloatArray) -> FloatArray:

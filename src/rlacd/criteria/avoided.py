@@ -38,12 +38,15 @@ class Kept:
         How far hulls stay off it, in the frame.
     is_crossed : bool
         Whether the solid crosses it; those triangles are left out.
+    is_told : bool
+        Whether the report says what became of it.
     """
 
     name: str
     filling: _native.Filling | None
     margin: float
     is_crossed: bool
+    is_told: bool
 
     @classmethod
     def of(cls, obstacle: Obstacle, frame: Frame, surface: _native.Surface | None, threads: int) -> Kept:
@@ -51,7 +54,7 @@ class Kept:
         triangles = frame.to_frame(obstacle.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
         triangles, is_crossed = (triangles, False) if surface is None else _outside(triangles, surface)
         filling = _native.Filling(*_mesh(triangles), threads) if len(triangles) else None
-        return cls(obstacle.name, filling, obstacle.margin * frame.scale, is_crossed)
+        return cls(obstacle.name, filling, obstacle.margin * frame.scale, is_crossed, obstacle.is_told)
 
     def is_entered(self, hull: Hull) -> bool:
         """Whether a hull comes nearer than the margin."""
@@ -85,14 +88,17 @@ class Avoided:
         """Whether a hull enters any of them."""
         return any(kept.is_entered(hull) for kept in self.kept)
 
-    def found(self, parts: Sequence[Part], scale: float) -> dict[str, Any]:
+    def found(self, parts: Sequence[Part], scale: float) -> dict[str, Any] | None:
         """The report's entry: what finished hulls enter, how many and how deep, and what the input crosses."""
-        depths = np.array([[kept.depth(part.hull) for part in parts] for kept in self.kept])
+        told = [kept for kept in self.kept if kept.is_told]
+        if not told:
+            return None
+        depths = np.array([[kept.depth(part.hull) for part in parts] for kept in told])
         return {
-            "crossed": [kept.name for kept in self.kept if kept.is_crossed],
+            "crossed": [kept.name for kept in told if kept.is_crossed],
             "entered": [
                 {"name": kept.name, "hulls": int(np.count_nonzero(own)), "depth_abs": float(own.max()) / scale}
-                for kept, own in zip(self.kept, depths, strict=True)
+                for kept, own in zip(told, depths, strict=True)
                 if own.any()
             ],
         }

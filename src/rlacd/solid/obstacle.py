@@ -20,12 +20,15 @@ class Obstacle:
     faces : int32 [F, 3]
     margin : float
         How far hulls stay off it, in the input's unit.
+    is_told : bool
+        Whether the report says what became of it.
     """
 
     name: str
     vertices: FloatArray
     faces: IntArray
     margin: float = 0.0
+    is_told: bool = True
 
     def scaled(self, factor: float) -> Obstacle:
         """Multiply all lengths."""
