@@ -3,17 +3,21 @@
 from rlacd.clear.bodies import Body
 from rlacd.clear.mend import Cleared, kept_clear
 from rlacd.clear.motion import Motion, at_rest, mjcf_motion, urdf_motion
+from rlacd.clear.pairs import LinkPair, link_pairs, warnings_of
 from rlacd.clear.touching import Offence, Touching, check
 
 __all__ = [
     "Body",
     "Cleared",
+    "LinkPair",
     "Motion",
     "Offence",
     "Touching",
     "at_rest",
     "check",
     "kept_clear",
+    "link_pairs",
     "mjcf_motion",
     "urdf_motion",
+    "warnings_of",
 ]

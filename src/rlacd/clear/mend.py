@@ -94,9 +94,7 @@ class _Wishes:
 
 
 def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
-    """Decompose bodies again until no hulls touch where the bodies themselves do not, or that does not help.
-
-    Bodies that touch each other at rest are left as they are.
+    """Decompose bodies again until no hulls touch mostly where the bodies do not, or that does not help.
 
     Raises
     ------
@@ -105,9 +103,9 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
     """
     bodies = list(bodies)
     touching = check(bodies, motion)
-    first, wishes = {pair for pair, found in touching.items() if _is_wrong(found)}, _Wishes()
+    first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
     for _ in range(MOST_ROUNDS):
-        wrong = {pair: found for pair, found in touching.items() if _is_wrong(found)}
+        wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
         again = _wish(bodies, wrong, wishes)
         if not again:
             break
@@ -118,12 +116,8 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
         near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
         renewed = check(bodies, motion, near)
         touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
-    mended = sorted(pair for pair in first if pair not in touching or not _is_wrong(touching[pair]))
+    mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))
-
-
-def _is_wrong(found: Touching) -> bool:
-    return len(found.offences) > 0 and not found.meshes[0]
 
 
 def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -41,6 +41,8 @@ class Motion:
         Links that one joint connects, the lower number first.
     warnings : tuple of str
         What a joint's range was taken to be, where the file does not say.
+    fixed : frozenset of int
+        Links that never move: of two of them, hulls may touch.
     """
 
     links: tuple[str, ...]
@@ -49,6 +51,7 @@ class Motion:
     positions: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
     adjacent: frozenset[tuple[int, int]] = frozenset()
     warnings: tuple[str, ...] = ()
+    fixed: frozenset[int] = frozenset()
 
     def some(self, links: Sequence[str]) -> Motion:
         """Of some of the links, in the given order. Those between two of them do not keep them from being adjacent."""
@@ -84,9 +87,10 @@ class Motion:
         return "at " + ", ".join(f"{name} = {value:.4g}" for name, value in moved)
 
 
-def at_rest(links: Sequence[str]) -> Motion:
-    """Links that share a frame and do not move."""
-    return Motion(tuple(links), np.tile(np.eye(4), (1, len(links), 1, 1)))
+def at_rest(links: Sequence[str], fixed: Collection[str] = ()) -> Motion:
+    """Links that share a frame and are looked at where they are; those that are fixed may touch each other."""
+    places = frozenset(i for i, name in enumerate(links) if name in fixed)
+    return Motion(tuple(links), np.tile(np.eye(4), (1, len(links), 1, 1)), fixed=places)
 
 
 class _Joint(NamedTuple):

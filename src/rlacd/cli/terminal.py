@@ -134,6 +134,12 @@ def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
         lines.append(f"  {link.name:{width}} {sizes}  {_farthest(link.farthest, done.metres, unit)}")
     each = f"{hulls / len(done.links):.1f} hulls a link for {counted(meshes, 'mesh', 'meshes')}"
     lines.append(f"  {each}; {_farthest(done.farthest, done.metres, unit)}")
+    if done.samples:
+        kept = sum(pair.kept_clear for pair in done.pairs)
+        looked = (
+            f"{counted(len(done.pairs), 'pair', 'pairs')} of links at {counted(done.samples, 'position', 'positions')}"
+        )
+        lines.append(f"  {looked}: {kept} kept clear by finer hulls")
     lines += [f"  warning: {warning}" for warning in done.warnings]
     return "\n".join(lines)
 

@@ -37,6 +37,9 @@ class RobotOptions:
     links
         Another distance for the links whose whole name matches a regular expression, such as 'finger.*=1mm', or in the
         robot's own unit. May be repeated; the last that matches counts.
+    samples
+        Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
+        extra rlacd[clear].
 
     Raises
     ------
@@ -48,6 +51,7 @@ class RobotOptions:
     links: Mapping[str, float] | None = option(
         None, kind=_LINKS, flags=("--link",), metavar="REGEX=LENGTH", repeated=True
     )
+    samples: int = option(500, least=0, most=100_000)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -58,18 +58,22 @@ def decompose_bodies(
     OptionError
         An option is out of range, or a pattern of `links` matches none.
     """
-    whole = relative_to_robot(options, bodies)
-    lengths = _lengths(bodies, robot.links or {})
+    each = options_of_bodies(bodies, options, robot)
     done: dict[Hashable, Decomposition] = {}
     results = {}
-    for body in bodies:
-        own = whole | ({"threshold_abs": lengths[body.name]} if body.name in lengths else {})
+    for body, own in zip(bodies, each, strict=True):
         for collider in body.colliders:
             key = collider.key, own.get("threshold_abs")
             if key not in done:
-                done[key] = _decomposed(body, collider, own)
+                done[key] = decomposed(body, collider, own)
             results[collider] = done[key]
     return results
+
+
+def options_of_bodies(bodies: Sequence[Body], options: Mapping[str, Any], robot: RobotOptions) -> list[dict[str, Any]]:
+    """The options of each body; raises as `decompose_bodies`."""
+    whole, lengths = relative_to_robot(options, bodies), _lengths(bodies, robot.links or {})
+    return [whole | ({"threshold_abs": lengths[body.name]} if body.name in lengths else {}) for body in bodies]
 
 
 def relative_to_robot(options: Mapping[str, Any], bodies: Sequence[Body]) -> dict[str, Any]:
@@ -98,7 +102,8 @@ def _lengths(bodies: Sequence[Body], links: Mapping[str, float]) -> dict[str, fl
     return lengths
 
 
-def _decomposed(body: Body, collider: Collider, options: Mapping[str, Any]) -> Decomposition:
+def decomposed(body: Body, collider: Collider, options: Mapping[str, Any]) -> Decomposition:
+    """Decompose one collider of a body, with lengths that are larger than it cut to it."""
     mesh, path = collider.mesh(), collider.meshes[0].surface.path
     try:
         return decompose((mesh.vertices, mesh.faces), **_fitting(mesh, options, body))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
 from rlacd.io.robots.bodies import Body, Collider, Surface, size_of
+from rlacd.io.robots.clearance import checked_links, motion_of, resting
 from rlacd.io.robots.decomposed import check_options, decompose_bodies
 from rlacd.io.robots.mjcf import plan_mjcf
 from rlacd.io.robots.mjcf_model import mujoco_reads, read_model
@@ -49,6 +50,7 @@ def rewrite_robot(
     keep_input: bool = False,
     per: Per = "link",
     links: Mapping[str, float] | None = None,
+    samples: int = 500,
     **options: Any,
 ) -> Rewritten:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
@@ -73,6 +75,10 @@ def rewrite_robot(
     links : dict, optional
         For the links whose whole name matches a regular expression, another `threshold_abs`: ``{"finger.*": 0.001}``.
         The last that matches counts.
+    samples : int
+        Joint positions within their limits, beside that at rest, at which links are looked at: those whose meshes do
+        not touch there do not touch as hulls either, and are cut finer where they would, or a warning names both. Needs
+        the extra ``clear``. USD stages are looked at as they stand.
     **options
         Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
         the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
@@ -93,7 +99,7 @@ def rewrite_robot(
         The place cannot be written to.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
-    asked = RobotOptions(per, links)
+    asked = RobotOptions(per, links, samples)
     if source.suffix.lower() in usd.ENDINGS:
         _check_place(source, place, usd.ENDINGS)
         return rewrite_stage(usd.read_colliders(source), place, options, asked, keep_input=keep_input)
@@ -108,16 +114,20 @@ def rewrite_robot(
         said = [f"{source} has no collision mesh, so this is a copy.", *warnings]
         return Rewritten(place, folder, [], said, time.perf_counter() - began, 0.0)
     results = decompose_bodies(plan.bodies, options, asked)
-    stem = file_stem(place.stem)
+    motion = partial(motion_of, kind, source, plan.bodies, asked, options.get("seed") or 0)
+    clear = checked_links(plan.bodies, results, motion, options, asked)
+    results, stem = clear.results, file_stem(place.stem)
     files, names = _hull_files(stem, results)
     copies = _copies(stem, plan.bodies) if kind == "mjcf" else {}
     files |= {name: encode_plain_obj(Triangles(mesh.vertices, mesh.faces)) for mesh, name in copies.items()}
     data = edited(root, plan.edit(names, {mesh.path: name for mesh, name in copies.items()}))
-    warnings += [warning for warning in plan.warnings if warning not in warnings] + warnings_of(results)
+    warnings += [warning for warning in plan.warnings if warning not in warnings]
+    warnings += [*warnings_of(results), *clear.warnings]
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
     made = [RewrittenLink.of(body, results, names) for body in plan.bodies]
-    return Rewritten(place, folder, made, warnings, time.perf_counter() - began, size_of(plan.bodies))
+    seconds, size = time.perf_counter() - began, size_of(plan.bodies)
+    return Rewritten(place, folder, made, warnings, seconds, size, 1.0, clear.pairs, clear.samples)
 
 
 def rewrite_stage(
@@ -129,14 +139,18 @@ def rewrite_stage(
     check_options(options)
     bodies, prims = usd.bodies_of(stage, apart=robot.per == "mesh")
     results = decompose_bodies(bodies, options, robot)
+    fixed = {node["path"] for node in stage.nodes if not node["body"]}
+    clear = checked_links(bodies, results, lambda: (resting(bodies, fixed), []), options, robot, stage.metres)
+    results = clear.results
     data, warnings, files = usd.encode_layer(stage, place, prims, results, flat=keep_input)
-    warnings += [*warnings_of(results), *_left_behind(files, stage.source.parent, place)]
+    warnings += [*warnings_of(results), *clear.warnings, *_left_behind(files, stage.source.parent, place)]
     names = {collider: [*map(hull_name, range(len(result)))] for collider, result in results.items()}
     made = [RewrittenLink.of(body, results, names) for body in bodies]
     if not made:
         warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
-    return Rewritten(place, place, made, warnings, time.perf_counter() - began, size_of(bodies), stage.metres)
+    seconds, size = time.perf_counter() - began, size_of(bodies)
+    return Rewritten(place, place, made, warnings, seconds, size, stage.metres, clear.pairs, clear.samples)
 
 
 def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:

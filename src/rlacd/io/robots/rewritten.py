@@ -10,6 +10,7 @@ from typing import Any
 
 import trimesh
 
+from rlacd.clear import LinkPair
 from rlacd.decomposition import Decomposition
 from rlacd.io.robots.bodies import Body, Collider
 
@@ -73,6 +74,10 @@ class Rewritten:
         The longest side of the box around all meshes that were replaced, with all joints at zero.
     metres
         The robot's unit of length.
+    pairs
+        What each two of the links do at the joint positions that were looked at; empty if none were.
+    samples
+        How many those are.
     """
 
     path: Path
@@ -82,6 +87,8 @@ class Rewritten:
     seconds: float
     size: float
     metres: float = 1.0
+    pairs: Sequence[LinkPair] = ()
+    samples: int = 0
 
     @property
     def complete(self) -> bool:
@@ -115,6 +122,8 @@ class Rewritten:
                 }
                 for link in self.links
             ],
+            "samples": self.samples,
+            "pairs": [pair.as_plain() for pair in self.pairs],
             "warnings": self.warnings,
         }
 
