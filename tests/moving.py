@@ -119,25 +119,20 @@ def oven(play: float = 0.002) -> Robot:
 
 
 def gripper(left: float = 0.0005) -> Robot:
-    """Two fingers that close on a plate of 5 mm until `left` is between each and the plate."""
+    """Two fingers that close on a plate of 5 mm until `left` is between; a ridge of it stands in their grooves."""
     palm = block((-0.06, -0.02, -0.03), (0.06, 0.02, 0))
     plate = block((-0.0025, -0.03, 0.05), (0.0025, 0.03, 0.12))
     stem = block((-0.0025, -0.005, -0.001), (0.0025, 0.005, 0.06))
-    links, joints = {"palm": trimesh.boolean.union([palm, plate, stem])}, []
-    for side, name in ((-1, "left"), (1, "right")):
+    ridge = block((-0.0035, -0.03, 0.072), (0.0035, 0.03, 0.076))
+    links, joints = {"palm": trimesh.boolean.union([palm, plate, stem, ridge])}, []
+    for side, name in ((-1.0, "left"), (1.0, "right")):
         near = 0.0025 + left
-        pad = sorted((side * near, side * (near + 0.01)))
-        bar = sorted((side * (near + 0.02), side * (near + 0.03)))
-        tip = block((pad[0], -0.01, 0.06), (pad[1], 0.01, 0.09))
-        wide = sorted((side * (near + 0.005), side * (near + 0.03)))
-        links[name] = trimesh.boolean.union(
-            [
-                tip,
-                block((bar[0], -0.01, 0.002), (bar[1], 0.01, 0.09)),
-                block((wide[0], -0.01, 0.08), (wide[1], 0.01, 0.09)),
-            ]
-        )
-        joints.append(Joint("prismatic", "palm", name, (float(side), 0, 0), (0, 0, 0), (0.0, 0.02)))
+        tip = block((side * near, -0.01, 0.06), (side * (near + 0.01), 0.01, 0.09))
+        groove = block((side * (near - 0.001), -0.02, 0.07), (side * (near + 0.001 + left), 0.02, 0.078))
+        bar = block((side * (near + 0.02), -0.01, 0.002), (side * (near + 0.03), 0.01, 0.09))
+        across = block((side * (near + 0.005), -0.01, 0.08), (side * (near + 0.03), 0.01, 0.09))
+        links[name] = trimesh.boolean.union([trimesh.boolean.difference([tip, groove]), bar, across])
+        joints.append(Joint("prismatic", "palm", name, (side, 0, 0), (0, 0, 0), (0.0, 0.02)))
     return Robot("gripper", links, tuple(joints))
 
 

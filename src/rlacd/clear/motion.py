@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -43,6 +43,8 @@ class Motion:
         What a joint's range was taken to be, where the file does not say.
     fixed : frozenset of int
         Links that never move: of two of them, hulls may touch.
+    carrier : tuple of int
+        For each link, the last below it, or itself, whose joint was looked at only at rest; -1 if there is none.
     """
 
     links: tuple[str, ...]
@@ -52,6 +54,7 @@ class Motion:
     adjacent: frozenset[tuple[int, int]] = frozenset()
     warnings: tuple[str, ...] = ()
     fixed: frozenset[int] = frozenset()
+    carrier: tuple[int, ...] = ()
 
     def some(self, links: Sequence[str]) -> Motion:
         """Of some of the links, in the given order. Those between two of them do not keep them from being adjacent."""
@@ -59,7 +62,9 @@ class Motion:
         chosen = [place[name] for name in links]
         new = {old: i for i, old in enumerate(chosen)}
         pairs = {(min(new[a], new[b]), max(new[a], new[b])) for a, b in self._joined(set(chosen))}
-        return Motion(tuple(links), self.poses[:, chosen], self.joints, self.positions, frozenset(pairs), self.warnings)
+        carrier = tuple(self.carrier[i] for i in chosen)
+        own = tuple(links), self.poses[:, chosen], self.joints, self.positions, frozenset(pairs), self.warnings
+        return Motion(*own, frozenset(new[i] for i in self.fixed & {*chosen}), carrier)
 
     def _joined(self, kept: set[int]) -> set[tuple[int, int]]:
         """Pairs of kept links that are adjacent, directly or across links that are not kept."""
@@ -90,7 +95,8 @@ class Motion:
 def at_rest(links: Sequence[str], fixed: Collection[str] = ()) -> Motion:
     """Links that share a frame and are looked at where they are; those that are fixed may touch each other."""
     places = frozenset(i for i, name in enumerate(links) if name in fixed)
-    return Motion(tuple(links), np.tile(np.eye(4), (1, len(links), 1, 1)), fixed=places)
+    poses = np.tile(np.eye(4), (1, len(links), 1, 1))
+    return Motion(tuple(links), poses, fixed=places, carrier=tuple(range(len(links))))
 
 
 class _Joint(NamedTuple):
@@ -144,9 +150,29 @@ def urdf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
         robot.update_cfg(dict(zip((joint.name for joint in joints), values, strict=True)))
         for place, name in enumerate(links):
             sample[place] = robot.get_transform(name)
-    ends = [(links.index(joint.parent), links.index(joint.child)) for joint in robot.robot.joints]
-    pairs = {(min(pair), max(pair)) for pair in ends}
-    return Motion(tuple(links), poses, tuple(j.name for j in joints), positions, frozenset(pairs), tuple(said))
+    parents = {links.index(joint.child): links.index(joint.parent) for joint in robot.robot.joints}
+    sampled = {joint.name for joint in joints}
+    held = {j.child for j in robot.actuated_joints if j.name not in sampled}
+    carrier = _carriers(parents, {links.index(child) for child in held}, len(links))
+    names = tuple(joint.name for joint in joints)
+    return Motion(tuple(links), poses, names, positions, _pairs(parents), tuple(said), carrier=carrier)
+
+
+def _pairs(parents: Mapping[int, int]) -> frozenset[tuple[int, int]]:
+    return frozenset((min(pair), max(pair)) for pair in parents.items())
+
+
+def _carriers(parents: Mapping[int, int], held: Collection[int], count: int) -> tuple[int, ...]:
+    """For each link, the last of those held at rest on the way down to it; -1 if there is none."""
+
+    def carrier(link: int) -> int:
+        while link not in held:
+            if link not in parents:
+                return -1
+            link = parents[link]
+        return link
+
+    return tuple(carrier(link) for link in range(count))
 
 
 def _urdf_limits(joint: Any) -> tuple[str, str, tuple[float, float] | None]:
@@ -173,7 +199,7 @@ def mjcf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
     model = mujoco.MjModel.from_xml_path(str(path))
     data, said = mujoco.MjData(model), list[str]()
     driven = _driven(model, mujoco)
-    joints, at = [], []
+    joints, at, sampled = [], [], {*driven}
     for j in range(model.njnt):
         name, kind = model.joint(j).name or f"number {j}", int(model.jnt_type[j])
         if j in driven:
@@ -184,6 +210,7 @@ def mjcf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
         if joint is not None:
             joints.append(joint)
             at.append(int(model.jnt_qposadr[j]))
+            sampled.add(j)
     positions = _positions(joints, samples, seed)
     poses = np.tile(np.eye(4), (len(positions), model.nbody, 1, 1))
     for row, (sample, values) in enumerate(zip(poses, positions, strict=True)):
@@ -198,8 +225,10 @@ def mjcf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
         sample[:, :3, :3], sample[:, :3, 3] = data.xmat.reshape(-1, 3, 3), data.xpos
     positions[0] = model.qpos0[at]
     links = [model.body(i).name or f"body {i}" for i in range(model.nbody)]
-    pairs = frozenset((int(min(p, i)), int(max(p, i))) for i, p in enumerate(model.body_parentid) if i)
-    return Motion(tuple(links), poses, tuple(j.name for j in joints), positions, pairs, tuple(said))
+    parents = {i: int(p) for i, p in enumerate(model.body_parentid) if i}
+    held = {int(model.jnt_bodyid[j]) for j in range(model.njnt)} - {int(model.jnt_bodyid[j]) for j in sampled}
+    names, carrier = tuple(joint.name for joint in joints), _carriers(parents, held, model.nbody)
+    return Motion(tuple(links), poses, names, positions, _pairs(parents), tuple(said), carrier=carrier)
 
 
 def _driven(model: Any, mujoco: Any) -> dict[int, tuple[int, list[float]]]:

@@ -32,6 +32,8 @@ class LinkPair:
         How deep hulls overlap where the meshes do not touch, at most; 0 if they nowhere do.
     kept_clear : bool
         Whether their hulls were made finer so that they do not.
+    loose : bool
+        Whether a joint that was looked at only at rest lies between them: at other places they may do otherwise.
     """
 
     first: str
@@ -42,11 +44,12 @@ class LinkPair:
     meshes: float
     new_depth: float
     kept_clear: bool
+    loose: bool
 
     @property
     def kind(self) -> Contact:
-        """As in the matrix: adjacent comes first."""
-        return "adjacent" if self.adjacent else self.contact
+        """As in the matrix: adjacent comes first; loose links sometimes touch."""
+        return "adjacent" if self.adjacent else "sometimes" if self.loose else self.contact
 
     def as_plain(self) -> dict[str, Any]:
         """Plain values."""
@@ -69,7 +72,8 @@ def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:
             meshes = float(touching.meshes.mean()) if touching else 0.0
             depth = touching.offences[0].depth if touching and touching.offences else 0.0
             names, is_kept = (first.name, bodies[j].name), (i, j) in cleared.mended
-            pairs.append(LinkPair(*names, (i, j) in motion.adjacent, contact, share, meshes, depth, is_kept))
+            joined, loose = (i, j) in motion.adjacent, motion.carrier[i] != motion.carrier[j]
+            pairs.append(LinkPair(*names, joined and not loose, contact, share, meshes, depth, is_kept, loose))
     return pairs
 
 

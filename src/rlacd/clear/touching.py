@@ -196,8 +196,7 @@ class Shapes:
         request.enable_contact, request.security_margin = False, reach
         if coal.collide(self.mesh, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()):
             return True
-        theirs = moved(other.body.mesh[0], pose)
-        return self._holds(theirs) or other._holds(moved(self.body.mesh[0], inverse(pose)))
+        return self._holds(moved(other.corner, pose)) or other._holds(moved(self.corner, inverse(pose)))
 
     def gap(self, other: Shapes, pose: FloatArray) -> float:
         """How far the surfaces of the bodies are apart, the other seen at a pose."""
@@ -214,13 +213,23 @@ class Shapes:
             coal.collide(hull, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()) for hull in self.hulls
         )
 
-    def _holds(self, points: FloatArray) -> bool:
-        """Whether the body holds another whose surface does not cross its own: it then holds any of its points."""
+    @property
+    def corner(self) -> FloatArray:
+        """A point [1, 3] of the surface."""
         vertices, faces = self.body.mesh
-        if (points.min(axis=0) < vertices.min(axis=0)).any() or (points.max(axis=0) > vertices.max(axis=0)).any():
+        return vertices[faces[:1, 0]]
+
+    @cached_property
+    def _surface(self) -> _native.Surface:
+        vertices, faces = self.body.mesh
+        return _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
+
+    def _holds(self, point: FloatArray) -> bool:
+        """Whether the body holds a point [1, 3] of another whose surface does not cross its own, and so all of it."""
+        vertices = self.body.mesh[0]
+        if (point < vertices.min(axis=0)).any() or (point > vertices.max(axis=0)).any():
             return False
-        surface = _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
-        return bool(surface.winding(np.ascontiguousarray(points[:1]), accuracy=4.0, threads=1)[0] > 0.5)
+        return bool(self._surface.winding(point, accuracy=4.0, threads=1)[0] > 0.5)
 
 
 def _mesh(surface: Surface) -> Any:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rlacd.options.fields import check_fields, custom, number, option, stated
+from rlacd.options.fields import check_fields, custom, number, one_of, option, path_like, stated
 
 Per = Literal["link", "mesh"]
+PairKind = Literal["adjacent", "always", "never"]
 
 _length = number(above=0).read
 
@@ -22,6 +23,14 @@ def _links(given: Any) -> dict[str, float]:
     return {pattern: _length(length) for pattern, length in given.items()}
 
 
+def _kinds(given: Any) -> tuple[str, ...]:
+    words = given.split(",") if isinstance(given, str) else given
+    if not isinstance(words, (list, tuple)):
+        raise TypeError
+    return tuple(one_of(PairKind).read(word.strip()) for word in words)
+
+
+_KINDS = custom("some of adjacent, always, never", _kinds, "adjacent always never")
 _LINKS = custom("positive lengths by regular expressions of link names, such as {'finger.*': 0.001}", _links)
 
 
@@ -40,6 +49,11 @@ class RobotOptions:
     samples
         Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
         extra rlacd[clear].
+    exclude
+        Pairs of bodies of an MJCF model whose contacts MuJoCo need not find: adjacent, always or never in contact at
+        these positions.
+    srdf
+        Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.
 
     Raises
     ------
@@ -52,6 +66,8 @@ class RobotOptions:
         None, kind=_LINKS, flags=("--link",), metavar="REGEX=LENGTH", repeated=True
     )
     samples: int = option(500, least=0, most=100_000)
+    exclude: str | Sequence[PairKind] = option((), kind=_KINDS, metavar="adjacent,always,…", usual="none")
+    srdf: str | None = option(None, kind=path_like(), metavar="FILE")
 
     def __post_init__(self) -> None:
         check_fields(self)

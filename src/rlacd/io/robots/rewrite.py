@@ -18,6 +18,8 @@ from rlacd.io.robots import usd
 from rlacd.io.robots.bodies import Body, Collider, Surface, size_of
 from rlacd.io.robots.clearance import checked_links, motion_of, resting
 from rlacd.io.robots.decomposed import check_options, decompose_bodies
+from rlacd.io.robots.matrix import chosen, excludes
+from rlacd.io.robots.matrix import srdf as srdf_of
 from rlacd.io.robots.mjcf import plan_mjcf
 from rlacd.io.robots.mjcf_model import mujoco_reads, read_model
 from rlacd.io.robots.plan import Plan, Sources
@@ -31,7 +33,7 @@ from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
-from rlacd.options.robots import Per, RobotOptions
+from rlacd.options.robots import PairKind, Per, RobotOptions
 
 ENDINGS = {".urdf": "urdf", ".xml": "mjcf"}
 ROOTS = {"urdf": "robot", "mjcf": "mujoco"}
@@ -51,6 +53,8 @@ def rewrite_robot(
     per: Per = "link",
     links: Mapping[str, float] | None = None,
     samples: int = 500,
+    exclude: str | Sequence[PairKind] = (),
+    srdf: str | os.PathLike[str] | None = None,
     **options: Any,
 ) -> Rewritten:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
@@ -79,6 +83,10 @@ def rewrite_robot(
         Joint positions within their limits, beside that at rest, at which links are looked at: those whose meshes do
         not touch there do not touch as hulls either, and are cut finer where they would, or a warning names both. Needs
         the extra ``clear``. USD stages are looked at as they stand.
+    exclude : sequence of "adjacent", "always" and "never"
+        Pairs of bodies of an MJCF model to add as ``<exclude>``, by when their hulls touch at these positions.
+    srdf : path-like, optional
+        For a URDF, where to write them as ``<disable_collisions>`` for MoveIt.
     **options
         Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
         the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
@@ -99,7 +107,8 @@ def rewrite_robot(
         The place cannot be written to.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
-    asked = RobotOptions(per, links, samples)
+    asked = RobotOptions(per, links, samples, exclude, None if srdf is None else os.fspath(srdf))
+    _check_matrix(source, asked)
     if source.suffix.lower() in usd.ENDINGS:
         _check_place(source, place, usd.ENDINGS)
         return rewrite_stage(usd.read_colliders(source), place, options, asked, keep_input=keep_input)
@@ -120,11 +129,14 @@ def rewrite_robot(
     files, names = _hull_files(stem, results)
     copies = _copies(stem, plan.bodies) if kind == "mjcf" else {}
     files |= {name: encode_plain_obj(Triangles(mesh.vertices, mesh.faces)) for mesh, name in copies.items()}
-    data = edited(root, plan.edit(names, {mesh.path: name for mesh, name in copies.items()}))
+    edits, said = excludes(root, chosen(clear.pairs, asked.exclude))
+    data = edited(root, [*plan.edit(names, {mesh.path: name for mesh, name in copies.items()}), *edits])
     warnings += [warning for warning in plan.warnings if warning not in warnings]
-    warnings += [*warnings_of(results), *clear.warnings]
+    warnings += [*warnings_of(results), *clear.warnings, *said]
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
+    if asked.srdf is not None:
+        write_file(Path(asked.srdf), srdf_of(root.attributes.get("name", "robot"), clear.pairs))
     made = [RewrittenLink.of(body, results, names) for body in plan.bodies]
     seconds, size = time.perf_counter() - began, size_of(plan.bodies)
     return Rewritten(place, folder, made, warnings, seconds, size, 1.0, clear.pairs, clear.samples)
@@ -151,6 +163,17 @@ def rewrite_stage(
     write_file(place, data)
     seconds, size = time.perf_counter() - began, size_of(bodies)
     return Rewritten(place, place, made, warnings, seconds, size, stage.metres, clear.pairs, clear.samples)
+
+
+def _check_matrix(source: Path, robot: RobotOptions) -> None:
+    """Check that what is asked about pairs of links is for this kind of file."""
+    ending = source.suffix.lower()
+    if robot.exclude and ending != ".xml":
+        raise OptionError("exclude (--exclude) is for MJCF; for a URDF give srdf (--srdf).")
+    if robot.srdf is not None:
+        if ending != ".urdf":
+            raise OptionError("srdf (--srdf) is for a URDF; for MJCF give exclude (--exclude).")
+        check_file(Path(robot.srdf))
 
 
 def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:
