@@ -12,10 +12,10 @@ import trimesh
 from lxml import etree
 
 import rlacd
-from rlacd.clear import Body, check, mjcf_motion, urdf_motion
+from rlacd.clear import Body, at_rest, check, mjcf_motion, urdf_motion
 from rlacd.clear.bodies import overlapping, placed_boxes
 from rlacd.errors import OptionError
-from tests.moving import ALL, Joint, Robot, block, fork_and_lug
+from tests.moving import ALL, Joint, Robot, block, drawer, fork_and_lug
 
 mujoco = pytest.importorskip("mujoco", reason="extra sim")
 pytest.importorskip("coal", reason="extra clear")
@@ -181,8 +181,6 @@ def test_a_body_inside_another_touches_it_and_one_in_its_hollow_does_not() -> No
         hull = mesh.convex_hull
         return Body(name, surface, [(np.asarray(hull.vertices), np.asarray(hull.faces, np.int32))])
 
-    from rlacd.clear import at_rest
-
     (found,) = check([body("a", outer), body("b", inner)], at_rest("ab")).values()
     assert (found.hulls.tolist(), found.meshes.tolist(), found.offences) == ([True], [True], ())
     (found,) = check([body("a", hollow), body("b", inner)], at_rest("ab")).values()
@@ -203,3 +201,22 @@ def test_what_is_not_for_a_kind_of_file_is_refused(arm: Path, tmp_path: Path) ->
         rlacd.rewrite_robot(fork_and_lug().write(tmp_path), tmp_path / "out.urdf", exclude="always")
     with pytest.raises(OptionError, match="some of adjacent, always, never"):
         rlacd.rewrite_robot(arm, arm.with_name("out.xml"), exclude="sometimes")
+
+
+@pytest.mark.promise("links-clear")
+def test_nodes_of_a_scene_that_do_not_touch_do_not_as_hulls() -> None:
+    scene, parts = trimesh.Scene(), drawer(0.004).links
+    for name, mesh in parts.items():
+        scene.add_geometry(mesh, node_name=name)
+    done = rlacd.decompose(scene, per_node=True, threshold=0.06, quality="fast", threads=1)
+    hulls = {name: [hull for hull in done if hull.metadata["node"] == name] for name in parts}
+    assert {name for name, own in hulls.items() if own} == set(parts)
+    bodies = [
+        Body(name, (mesh.vertices, mesh.faces), [(h.vertices, h.faces) for h in hulls[name]])
+        for name, mesh in parts.items()
+    ]
+    assert check(bodies, at_rest(list(parts))) == {}
+    apart = [rlacd.decompose(mesh, threshold_abs=0.03 * 0.413, quality="fast", threads=1) for mesh in parts.values()]
+    alone = [Body(b.name, b.mesh, [(h.vertices, h.faces) for h in one]) for b, one in zip(bodies, apart, strict=True)]
+    assert len(check(alone, at_rest(list(parts)))) == 1, "each for itself, their hulls touch"
+    assert not [warning for warning in done.report["warnings"] if "touch" in warning]

@@ -13,8 +13,9 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
+from rlacd.clear import Body, Surface, at_rest, kept_clear, may_touch, warnings_of
 from rlacd.decomposition import Decomposition
-from rlacd.errors import OptionError
+from rlacd.errors import MissingExtraError, OptionError
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report
@@ -175,7 +176,8 @@ def decompose(
         given, and ``report["warnings"]`` says what the engine will not accept; see `rlacd.PRESETS`.
     per_node : bool
         Decompose each node of a scene separately, such as the doors and drawers of a cupboard, which move. The limits
-        on hulls hold for each. Every hull's ``metadata`` names its node, with or without this.
+        on hulls hold for each. Nodes that do not touch do not touch as hulls either, or a warning names them (extra
+        ``clear``). Every hull's ``metadata`` names its node, with or without this.
     relative_to : "scene" or "node"
         With `per_node`, what `threshold` is relative to: the size of the whole scene, or of each node.
     unit : "mm", "cm", "m", "in" or "file", optional
@@ -266,12 +268,14 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()
     meshes = [source.of_node(index) for index in used]
+    each = [options.for_node(scale, Frame.of(mesh.vertices).scale) for mesh in meshes]
     reached = []
-    for mesh in meshes:
-        of_node = options.for_node(scale, Frame.of(mesh.vertices).scale)
-        reached.append(_whole(find_parts(mesh, of_node, run), mesh, of_node, run))
+    for mesh, own in zip(meshes, each, strict=True):
+        reached.append(_whole(find_parts(mesh, own, run), mesh, own, run))
     run.begin_finishing()
     done = [finish(one, run) for one in reached]
+    names = [source.nodes[place].name for place in used]
+    said = [] if run.stopped_by is not None else _clear_of_each_other(names, meshes, each, done, run)
     bodies = 0
     for place, one in zip(used, done, strict=True):
         for hull in one.hulls:
@@ -279,11 +283,40 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
             whose = {"node": source.nodes[place].name, "node_index": place}
             hull.metadata |= whose | {"body": None if body is None else body + bodies}
         bodies += len(one.report["repair"])
-    names = [source.nodes[place].name for place in used]
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
     report["options"] |= {name: getattr(options, name) for name in ("threshold", "threshold_abs")}
-    report["warnings"][:0] = source.warnings
+    report["warnings"] = [*source.warnings, *report["warnings"], *said]
     return Finished([hull for one in done for hull in one.hulls], report)
+
+
+def _clear_of_each_other(
+    names: Sequence[str], meshes: Sequence[InputMesh], options: Sequence[Options], done: list[Finished], run: Run
+) -> list[str]:
+    """Decompose nodes again whose hulls touch though they do not; returns what to say of those that still do."""
+
+    def body(number: int) -> Body:
+        mesh, hulls = meshes[number], [(hull.vertices, hull.faces) for hull in done[number].hulls]
+        surface = mesh.vertices, mesh.faces.astype(np.int32)
+        return Body(names[number], surface, [(v, f.astype(np.int32)) for v, f in hulls])
+
+    def redo(number: int, obstacles: Sequence[Obstacle]) -> list[Surface]:
+        own = replace(options[number], avoid=(*options[number].avoid, *obstacles))
+        reached = find_parts(meshes[number], own, run)
+        if run.stopped_by is None:
+            done[number] = finish(reached, run)
+        return body(number).hulls
+
+    bodies, rest = [body(number) for number in range(len(names))], at_rest(names)
+    if not may_touch(bodies):
+        return []
+    try:
+        with run.stage("clear"):
+            cleared = run.if_in_time(lambda: kept_clear(bodies, rest, redo), lambda: None)
+    except MissingExtraError as error:
+        return [f"Nodes were not checked against each other: {error}"]
+    if cleared is None:
+        return ["There was no time to check nodes against each other."]
+    return warnings_of(cleared, rest, lambda length: f"{length:.4g}")
 
 
 def in_metres(source: InputMesh, options: Options) -> InputMesh:

@@ -57,6 +57,14 @@ def inverse(pose: FloatArray) -> FloatArray:
     return back
 
 
+def may_touch(bodies: Sequence[Body]) -> bool:
+    """Whether boxes of hulls of two bodies that share a frame overlap."""
+    owner = np.array([i for i, body in enumerate(bodies) for _ in body.hulls])
+    boxes = [np.stack([v.min(axis=0), v.max(axis=0)]) for body in bodies for v, _ in body.hulls]
+    pairs = overlapping(np.stack(boxes)[None])[:, 1:]
+    return bool((owner[pairs[:, 0]] != owner[pairs[:, 1]]).any())
+
+
 def placed_boxes(boxes: FloatArray, poses: FloatArray) -> FloatArray:
     """Boxes [N, 2, 3] around boxes placed by poses [S, N, 4, 4], or all by each of [S, 1, 4, 4]: [S, N, 2, 3]."""
     middle, half = boxes.mean(axis=1), np.ptp(boxes, axis=1) / 2
