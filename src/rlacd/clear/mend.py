@@ -102,7 +102,8 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
         The extra ``clear`` is not installed.
     """
     bodies = list(bodies)
-    touching = check(bodies, motion)
+    known: dict[tuple[int, int, bytes], bool] = {}
+    touching = check(bodies, motion, known=known)
     first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
@@ -114,7 +115,7 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
             bodies[body] = bodies[body].with_hulls(redo(body, obstacles))
             wishes.renewed[body] += 1
         near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
-        renewed = check(bodies, motion, near)
+        renewed = check(bodies, motion, near, known)
         touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
     mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))

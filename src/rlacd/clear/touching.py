@@ -68,7 +68,10 @@ class Touching:
 
 
 def check(
-    bodies: Sequence[Body], motion: Motion, pairs: Collection[tuple[int, int]] | None = None
+    bodies: Sequence[Body],
+    motion: Motion,
+    pairs: Collection[tuple[int, int]] | None = None,
+    known: dict[tuple[int, int, bytes], bool] | None = None,
 ) -> dict[tuple[int, int], Touching]:
     """Find the pairs of bodies whose hulls touch at some sample, by the numbers of the two, the lower first.
 
@@ -79,6 +82,8 @@ def check(
     motion : Motion
     pairs : collection of (int, int), optional
         Look at no others.
+    known : dict, optional
+        Keeps which bodies touch, for other hulls of the same bodies.
 
     Raises
     ------
@@ -92,7 +97,7 @@ def check(
     boxes = np.stack([bodies[i].box for i in filled])
     placed = placed_boxes(boxes, motion.poses[:, filled])
     size = size_of(bodies, motion)
-    shapes = {i: Shapes(bodies[i]) for i in filled}
+    shapes = {i: Shapes(bodies[i], known) for i in filled}
     near, numbers = overlapping(placed), np.array(filled)
     near[:, 1:] = numbers[near[:, 1:]]
     order = np.lexsort((near[:, 0], near[:, 2], near[:, 1]))
@@ -173,10 +178,10 @@ def _depth(first: Any, second: Any, pose: FloatArray) -> float:
 
 
 class Shapes:
-    """A body as coal's shapes, made when first needed."""
+    """A body as coal's shapes, made when first needed; `known` keeps which bodies touch."""
 
-    def __init__(self, body: Body) -> None:
-        self.body = body
+    def __init__(self, body: Body, known: dict[tuple[int, int, bytes], bool] | None = None) -> None:
+        self.body, self._known = body, {} if known is None else known
         self.boxes = np.stack([np.stack([v.min(axis=0), v.max(axis=0)]) for v, _ in body.hulls])
 
     @cached_property
@@ -191,6 +196,12 @@ class Shapes:
 
     def meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
         """Whether the bodies are within reach of each other, the other seen at a pose, or one holds the other."""
+        key = id(self.body.mesh[0]), id(other.body.mesh[0]), pose.tobytes()
+        if key not in self._known:
+            self._known[key] = self._meets(other, pose, reach)
+        return self._known[key]
+
+    def _meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
         coal = import_extra("coal", "", "clear")
         at, request = _place(pose), coal.CollisionRequest()
         request.enable_contact, request.security_margin = False, reach
@@ -213,11 +224,20 @@ class Shapes:
             coal.collide(hull, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()) for hull in self.hulls
         )
 
-    @property
-    def corner(self) -> FloatArray:
-        """A point [1, 3] of the surface."""
+    @cached_property
+    def box(self) -> FloatArray:
+        """Lower and upper corner of the box around the body [2, 3]."""
         vertices, faces = self.body.mesh
-        return vertices[faces[:1, 0]]
+        used = vertices[np.unique(faces)]
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    @cached_property
+    def corner(self) -> FloatArray:
+        """The point [1, 3] of the surface farthest from its middle: hardly ever in the box of another body."""
+        vertices, faces = self.body.mesh
+        used = vertices[np.unique(faces)]
+        away = used - self.box.mean(axis=0)
+        return used[[dots(away, away).argmax()]]
 
     @cached_property
     def _surface(self) -> _native.Surface:
@@ -226,8 +246,7 @@ class Shapes:
 
     def _holds(self, point: FloatArray) -> bool:
         """Whether the body holds a point [1, 3] of another whose surface does not cross its own, and so all of it."""
-        vertices = self.body.mesh[0]
-        if (point < vertices.min(axis=0)).any() or (point > vertices.max(axis=0)).any():
+        if (point < self.box[0]).any() or (point > self.box[1]).any():
             return False
         return bool(self._surface.winding(point, accuracy=4.0, threads=1)[0] > 0.5)
 
