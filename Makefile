@@ -38,7 +38,7 @@ $(VENV)/installed: $(VENV)/tools $(NATIVE_SOURCES)
 	@touch $@
 
 $(VENV)/test-extras: $(VENV)/installed
-	$(RLACD_INSTALL) --editable '.[view,train,usd,draco,fbx,cad,sim,fleet]' --group test --group bench
+	$(RLACD_INSTALL) --editable '.[view,train,usd,draco,fbx,cad,sim,clear,fleet]' --group test --group bench
 	touch $@
 
 demo: install

@@ -15,6 +15,7 @@ COMMANDS = {
     "replay": "what a traced decomposition would take on other numbers of cores",
     "batch": "the overhead of a batch beside its meshes",
     "physics": "the hulls in a simulator: piles, balls dropped into holes; primitives",
+    "robots": "whole robots: hulls a link, farthest, MuJoCo's speed, each mesh at its own scale and links as solids",
     "training": "the paper's experiments that train: rewards, discounts",
     "prices": "the prices of rlacd.work against measured times",
 }

@@ -145,3 +145,12 @@ def assert_stands(rest: Rest, result: Decomposition, density: float = 1000.0) ->
     assert rest.hulls == len(result)
     assert abs(rest.lowest) < 2e-3
     assert rest.speed < 1e-2
+
+
+def inside(hulls: list[trimesh.Trimesh], points: np.ndarray, slack: float) -> np.ndarray:
+    """Whether each point lies in one of the hulls, or no farther than `slack` from it."""
+    each = []
+    for hull in hulls:
+        heights = (points @ hull.face_normals.T) - (hull.triangles[:, 0] * hull.face_normals).sum(axis=1)
+        each.append(heights.max(axis=1) <= slack)
+    return np.any(each, axis=0)

@@ -12,6 +12,7 @@ from rlacd.options import Options
 from rlacd.options.fields import About
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
+from rlacd.options.robots import RobotOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "options.md"
 
@@ -24,7 +25,7 @@ PROGRESS = "| `progress` | – | | a function called between steps; returning `F
 
 def options_table() -> str:
     """All options in Markdown, one per row."""
-    rows = [*_rows(Options), PROGRESS, *_rows(NavigableSpace), *_rows(OutputOptions)]
+    rows = [*_rows(Options), PROGRESS, *_rows(NavigableSpace), *_rows(OutputOptions), *_rows(RobotOptions)]
     return "\n".join([*HEAD, *rows, ""])
 
 

@@ -109,6 +109,7 @@ FAST: list[dict[str, Any]] = [
     {"primitives": True},
     {"overlap": 0.02},
     {"keep_open": 0.9},
+    {"avoid": [trimesh.creation.cylinder(0.02, 10)]},
     {"max_hulls": 4, "max_vertices": 12},
     {"policy": "learned", "merge": False},
 ]

@@ -3,6 +3,7 @@
 #include "bind/released.hpp"
 #include "distance/apart.hpp"
 #include "distance/concavity.hpp"
+#include "distance/crossings.hpp"
 #include "distance/filling.hpp"
 #include "distance/glue.hpp"
 #include "distance/surface.hpp"
@@ -76,6 +77,14 @@ void bind_surface(nb::module_& m) {
            }),
            "points"_a, "threads"_a = 0,
            "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
+      .def(
+          "crossing", released([](const Surface& self, const Mesh& mesh, double slack) {
+            require(slack >= 0, "the slack must not be negative");
+            return crossing(self.bvh(), mesh, slack);
+          }),
+          "vertices"_a, "faces"_a, "slack"_a,
+          "The faces [K] of a mesh that cross the surface, ascending; those that overlap it by no more than `slack` do "
+          "not.")
       .def("winding",
            released(
                [](const Surface& self, const std::vector<Vec3>& points, double accuracy, int threads, bool is_closed) {

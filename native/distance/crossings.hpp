@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/geometry.hpp"
+#include "distance/bvh.hpp"
 
 namespace rlacd {
 
@@ -21,5 +22,9 @@ struct Crossings {
 
 // Stops to count once there are more than `most` pairs; both are too low then.
 Crossings crossings(const Mesh& mesh, const std::vector<std::int64_t>& body, std::int64_t most);
+
+// The faces of a mesh that cross a surface: along every axis that could separate two triangles they overlap by more
+// than `slack`.
+std::vector<std::int32_t> crossing(const Bvh& surface, const Mesh& mesh, double slack);
 
 }  // namespace rlacd

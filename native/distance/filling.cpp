@@ -57,37 +57,29 @@ class Depths {
   // Whether some point of a triangle is in the region.
   bool meets(Vec3 a, Vec3 b, Vec3 c) {
     if (std::max({planes_.depth(last_, a), planes_.depth(last_, b), planes_.depth(last_, c)}) <= t_) return false;
-    constexpr int kMost = 24;  // a plane adds at most one corner, and most planes none
-    Vec3 polygon[kMost] = {a, b, c}, clipped[kMost];
-    int count = 3;
+    polygon_.assign({a, b, c});
     for (std::size_t i = 0; i < planes_.size(); ++i) {
       const auto plane = static_cast<std::int32_t>(i);
-      double depth[kMost];
-      bool cuts = false;
-      for (int k = 0; k < count; ++k) {
-        depth[k] = planes_.depth(plane, polygon[k]) - t_;
-        cuts |= depth[k] <= 0;
-      }
-      if (!cuts) continue;
-      int kept = 0;
-      for (int k = 0; k < count; ++k) {
-        const int next = k + 1 < count ? k + 1 : 0;
-        if (kept + 2 > kMost) return false;  // undecided
-        if (depth[k] > 0) clipped[kept++] = polygon[k];
-        if ((depth[k] > 0) != (depth[next] > 0)) {
-          const double share = depth[k] / (depth[k] - depth[next]);
-          clipped[kept++] = polygon[k] + share * (polygon[next] - polygon[k]);
+      depth_.clear();
+      for (const Vec3 corner : polygon_) depth_.push_back(planes_.depth(plane, corner) - t_);
+      if (std::all_of(depth_.begin(), depth_.end(), [](double depth) { return depth > 0; })) continue;
+      clipped_.clear();
+      for (std::size_t k = 0; k < polygon_.size(); ++k) {
+        const std::size_t next = k + 1 < polygon_.size() ? k + 1 : 0;
+        if (depth_[k] > 0) clipped_.push_back(polygon_[k]);
+        if ((depth_[k] > 0) != (depth_[next] > 0)) {
+          const double share = depth_[k] / (depth_[k] - depth_[next]);
+          clipped_.push_back(polygon_[k] + share * (polygon_[next] - polygon_[k]));
         }
       }
-      if (kept == 0) {
+      if (clipped_.empty()) {
         last_ = plane;
         return false;
       }
-      std::copy(clipped, clipped + kept, polygon);
-      count = kept;
+      polygon_.swap(clipped_);
     }
     Vec3 middle{0, 0, 0};
-    for (int k = 0; k < count; ++k) middle = middle + (1.0 / count) * polygon[k];
+    for (const Vec3 corner : polygon_) middle = middle + (1.0 / static_cast<double>(polygon_.size())) * corner;
     return planes_.nearest(middle).depth > t_;
   }
 
@@ -95,6 +87,8 @@ class Depths {
   const ConvexPlanes& planes_;
   const double t_;
   std::int32_t last_ = 0;  // the plane that excluded the last object
+  std::vector<Vec3> polygon_, clipped_;
+  std::vector<double> depth_;
 };
 
 struct Cell {

@@ -13,8 +13,9 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
+from rlacd.clear import Body, Surface, at_rest, kept_clear, may_touch, warnings_of
 from rlacd.decomposition import Decomposition
-from rlacd.errors import OptionError
+from rlacd.errors import MissingExtraError, OptionError
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report, missed
@@ -34,7 +35,7 @@ from rlacd.options import (
 )
 from rlacd.options.fields import check_callback
 from rlacd.options.keywords import suggesting
-from rlacd.options.names import UNITS, PrimitiveKind
+from rlacd.options.names import UNITS, PrimitiveKind, mesh_name
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy
@@ -42,6 +43,7 @@ from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.provenance import owners
 
 MeshLike: TypeAlias = (
@@ -70,6 +72,7 @@ def decompose(
     overlap_abs: float | None = None,
     keep_open: float | None = None,
     keep_open_abs: float | None = None,
+    avoid: Sequence[MeshLike] = (),
     merge: bool = True,
     policy: str | Policy | None = None,
     resolution: int = 100,
@@ -146,6 +149,10 @@ def decompose(
         kept and says what is left; ``report["passages"]`` lists them.
     keep_open_abs : float, optional
         Instead of a share, the radius of a ball in the input's unit that still passes wherever one 1 % larger does.
+    avoid : list of meshes
+        Meshes, each like `mesh`, in its frame and unit, that no hull enters: parts that would are cut finer, down to a
+        hundredth of the threshold. Where the input itself crosses them, or limits on the hulls leave no way,
+        ``report["warnings"]`` says so.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy, optional
@@ -189,7 +196,8 @@ def decompose(
         given, and ``report["warnings"]`` says what the engine will not accept; see `rlacd.PRESETS`.
     per_node : bool
         Decompose each node of a scene separately, such as the doors and drawers of a cupboard, which move. The limits
-        on hulls hold for each. Every hull's ``metadata`` names its node, with or without this.
+        on hulls hold for each. Nodes that do not touch do not touch as hulls either, or a warning names them (extra
+        ``clear``). Every hull's ``metadata`` names its node, with or without this.
     relative_to : "scene" or "node", optional
         With `per_node`, what `threshold` is relative to: the size of the whole scene, the default, or of each node.
     unit : "mm", "cm", "m", "in" or "file", optional
@@ -220,6 +228,8 @@ def decompose(
     with Run(options.threads, options.timeout, progress, options.seed) as run:
         with run.stage("load"):
             source = in_metres(load_mesh(mesh, faces, file_type, _fineness(options)), options)
+            obstacles = tuple(_obstacle(one).scaled(source.factor) for one in options.avoid)
+        options = replace(options, avoid=obstacles)
         apart = options.per_node and len(source.nodes) > 1
         if options.per_node and not apart:
             alone = f"per_node had no effect: {source.name} was read as one node"
@@ -251,6 +261,14 @@ def _fineness(options: Options) -> Fineness:
     return Fineness((share or 0.0) / 10, None if length is None else length / factor / 10, of_nodes)
 
 
+def _obstacle(mesh: MeshLike | Obstacle) -> Obstacle:
+    """Read a mesh that hulls are to avoid."""
+    if isinstance(mesh, Obstacle):
+        return mesh
+    found = load_mesh(mesh)
+    return Obstacle(mesh_name(mesh), found.vertices, found.faces.astype(np.int32))
+
+
 def _as_one(source: InputMesh, options: Options, run: Run) -> Finished:
     reached = _whole(find_parts(source, options, run), source, options, run)
     run.begin_finishing()
@@ -274,12 +292,14 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()
     meshes = [source.of_node(index) for index in used]
+    each = [options.for_node(scale, Frame.of(mesh.vertices).scale) for mesh in meshes]
     reached = []
-    for mesh in meshes:
-        of_node = options.for_node(scale, Frame.of(mesh.vertices).scale)
-        reached.append(_whole(find_parts(mesh, of_node, run), mesh, of_node, run))
+    for mesh, own in zip(meshes, each, strict=True):
+        reached.append(_whole(find_parts(mesh, own, run), mesh, own, run))
     run.begin_finishing()
     done = [finish(one, run) for one in reached]
+    names = [source.nodes[place].name for place in used]
+    said = [] if run.stopped_by is not None else _clear_of_each_other(names, meshes, each, done, run)
     bodies = 0
     for place, one in zip(used, done, strict=True):
         for hull in one.hulls:
@@ -287,7 +307,6 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
             whose = {"node": source.nodes[place].name, "node_index": place}
             hull.metadata |= whose | {"body": None if body is None else body + bodies}
         bodies += len(one.report["repair"])
-    names = [source.nodes[place].name for place in used]
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
     report["options"] |= {name: getattr(options, name) for name in ("threshold", "threshold_abs")}
     if report["hausdorff"]["under"] is not None:
@@ -295,8 +314,38 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
         left_out = missed(frame.to_frame(source.specks), found, frame, run)
         report["hausdorff"]["under"] = max(report["hausdorff"]["under"], left_out.distance)
         report["warnings"] += left_out.said
-    report["warnings"][:0] = source.warnings
+    report["warnings"] = [*source.warnings, *report["warnings"], *said]
     return Finished([hull for one in done for hull in one.hulls], report)
+
+
+def _clear_of_each_other(
+    names: Sequence[str], meshes: Sequence[InputMesh], options: Sequence[Options], done: list[Finished], run: Run
+) -> list[str]:
+    """Decompose nodes again whose hulls touch though they do not; returns what to say of those that still do."""
+
+    def body(number: int) -> Body:
+        mesh, hulls = meshes[number], [(hull.vertices, hull.faces) for hull in done[number].hulls]
+        surface = mesh.vertices, mesh.faces.astype(np.int32)
+        return Body(names[number], surface, [(v, f.astype(np.int32)) for v, f in hulls])
+
+    def redo(number: int, obstacles: Sequence[Obstacle]) -> list[Surface]:
+        own = replace(options[number], avoid=(*options[number].avoid, *obstacles))
+        reached = find_parts(meshes[number], own, run)
+        if run.stopped_by is None:
+            done[number] = finish(reached, run)
+        return body(number).hulls
+
+    bodies, rest = [body(number) for number in range(len(names))], at_rest(names)
+    if not may_touch(bodies):
+        return []
+    try:
+        with run.stage("clear"):
+            cleared = run.if_in_time(lambda: kept_clear(bodies, rest, redo), lambda: None)
+    except MissingExtraError as error:
+        return [f"Nodes were not checked against each other: {error}"]
+    if cleared is None:
+        return ["There was no time to check nodes against each other."]
+    return warnings_of(cleared, rest, lambda length: f"{length:.4g}")
 
 
 def in_metres(source: InputMesh, options: Options) -> InputMesh:

@@ -46,6 +46,9 @@ class Decomposition(Result):
         ``overlap`` : dict
             With the option `overlap`: ``seams``, how many pairs of hulls touched, and ``short``, how many of them
             overlap by less than asked for. Both are None where there was no time.
+        ``avoid`` : dict
+            With the option `avoid`: the names of meshes that the input itself has ``crossed``, and those that hulls
+            have ``entered`` all the same.
         ``concavity``, ``distance`` : dict
             With the criterion of that name: ``per_part`` lists that of each hull's part in the order of ``hulls``;
             ``max`` is the worst. Both are None where there was no time to measure them; so are the distances below.

@@ -198,6 +198,7 @@ WRONG_OPTIONS = {
     "overlap_abs": [0, -1, NAN, INFINITE, "a", 1e9],
     "keep_open": [0, 0.05, 1, NAN, "0.9", True],
     "keep_open_abs": [0, -1, NAN, INFINITE, "a", 1e9, 1e-9],
+    "avoid": ["a.obj", 3, [3], [NAN]],
     "merge": ["no", 0, 2],
     "policy": ["", 3, "GREEDY", "greedy-", ["greedy"]],
     "gap": [0, 0.004, 0.16, NAN, "3", True],

@@ -146,8 +146,9 @@ def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -
         "timeout": 2.5,
     }
     words = [word for name, value in options.items() for word in ("--" + name.replace("_", "-"), value)]
+    words += ["--avoid", "a.obj", "--avoid", "b.stl"]
     assert rlacd("decompose", mesh, *words, "--no-merge").exit_code == 0
-    assert stand_in.calls == [{**options, "merge": False}]
+    assert stand_in.calls == [{**options, "avoid": ["a.obj", "b.stl"], "merge": False}]
 
 
 def test_a_report_on_stdout_is_json_and_nothing_else(mesh: Path, stand_in: StandIn) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import os
 import re
 from pathlib import Path
@@ -17,8 +18,8 @@ from lxml import etree
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError, OutputError
-from rlacd.io.robots import rewrite
-from tests.models import fall_in_mujoco, mujoco_model, points_of_geom, table
+from rlacd.io.robots import decomposed
+from tests.models import fall_in_mujoco, inside, mujoco_model, points_of_geom, table
 
 EAR = """<?xml version="1.0"?>
 <!-- made by hand -->
@@ -85,23 +86,106 @@ def collisions(path: Path) -> list[trimesh.Trimesh]:
 # --- URDF -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("per", ["link", "mesh"])
 @pytest.mark.promise("robots", "robot-hulls")
-def test_a_urdf_keeps_every_byte_but_its_collision_meshes_whose_space_hulls_fill_at_every_scale(ear: Path) -> None:
-    done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), threads=1)
+def test_a_urdf_keeps_every_byte_but_its_collision_meshes_whose_space_hulls_fill_at_every_scale(
+    ear: Path, per: Any
+) -> None:
+    done = rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), per=per, threads=1)
     after = done.path.read_text()
     assert without_collision_meshes(after) == without_collision_meshes(EAR)
-    first, second = (len(mesh.files) for mesh in done.meshes)  # one mesh at two scales: at one of them it is used twice
+    base, tip = (link.results for link in done.links)
+    assert (len(base), len(tip)) == (1, 1 if per == "link" else 2)
+    assert per == "link" or tip[1] is base[0], "what is used twice at one scale is decomposed once"
+    first, second = len(base[0]), len(tip[0])
     assert after.count("<!-- kept > -->") == first, "what else is in a collision goes to each hull"
     names = [element.get("name") for element in etree.parse(str(done.path)).iterfind(".//collision")]
     assert names[:first] == [f"a > b_{index:03d}" for index in range(first)]
     assert done.warnings == []
     hulls = collisions(done.path)
-    groups = [hulls[:first], hulls[first : first + second], hulls[first + second :]]
-    for group, scale in zip(groups, ([0.5, 0.5, 2.0], [-1.0, 1.0, 1.0], [0.5, 0.5, 2.0]), strict=True):
-        want = table().apply_transform(np.diag([*scale, 1.0]))
+    assert all(hull.volume > 0 and hull.is_convex for hull in hulls)
+    scales = [[0.5, 0.5, 2.0], [-1.0, 1.0, 1.0], [0.5, 0.5, 2.0]]
+    tables = [table().apply_transform(np.diag([*scale, 1.0])) for scale in scales]
+    groups = [(hulls[:first], tables[0]), (hulls[first:], trimesh.util.concatenate(tables[1:]))]
+    if per == "mesh":
+        groups[1:] = [(hulls[first : first + second], tables[1]), (hulls[first + second :], tables[2])]
+    for group, want in groups:
         assert trimesh.util.concatenate(group).bounds == pytest.approx(want.bounds, abs=1e-6)
-        assert all(hull.volume > 0 and hull.is_convex for hull in group)
-        assert sum(hull.volume for hull in group) == pytest.approx(want.volume, rel=0.02)
+        assert inside(group, want.vertices, 1e-6).all()
+    for link, group in zip(done.links, (hulls[:first], hulls[first:]), strict=True):
+        shift = 1.0 if link.name == "base" else 0.0  # its collision stands higher
+        ours = trimesh.util.concatenate(link.hulls).bounds - (0, 0, shift)
+        assert ours == pytest.approx(trimesh.util.concatenate(group).bounds, abs=1e-6)
+
+
+LEVER = """<robot name="r">
+<link name="arm">
+  <collision name="beam">
+    <origin xyz="1 2 3" rpy="0.3 0 0.5"/>
+    <geometry><mesh filename="bar.stl" scale="2 1 1"/></geometry>
+  </collision>
+  <!-- between -->
+  <collision><origin xyz="0 0 5"/><geometry><sphere radius="1"/></geometry></collision>
+  <collision><geometry><mesh filename="bar.stl" scale="-1 1 1"/></geometry>
+    <origin xyz="1 2 3.5" rpy="1.2 0.4 -2"/></collision>
+  <collision group="soft"><geometry><mesh filename="bar.stl"/></geometry></collision>
+</link>
+<link name="hand">
+  <collision><origin xyz="7 0 0" rpy="0 0 1"/><geometry><mesh filename="bar.stl"/></geometry></collision>
+</link>
+<joint name="j" type="revolute">
+  <parent link="arm"/><child link="hand"/><origin xyz="0 9 0" rpy="0 0 1.5707963"/>
+</joint>
+</robot>"""
+
+
+@pytest.fixture
+def lever(tmp_path: Path) -> Path:
+    trimesh.creation.box((1, 0.2, 0.2)).apply_translation((0.5, 0.3, 0)).export(tmp_path / "bar.stl")
+    (tmp_path / "lever.urdf").write_text(LEVER)
+    return tmp_path / "lever.urdf"
+
+
+def collision_meshes(robot: Path) -> list[trimesh.Trimesh]:
+    """The meshes of a URDF with all joints at zero, as yourdfpy places them; its spheres are left out."""
+    yourdfpy = pytest.importorskip("yourdfpy", reason="the extra sim is not installed")
+    bare = robot.with_name(f"bare_{robot.name}")
+    bare.write_text(re.sub("<collision><[^<]*<geometry><sphere.*", "", robot.read_text()))
+    urdf = yourdfpy.URDF.load(str(bare), load_collision_meshes=True, build_collision_scene_graph=True)
+    scene = urdf.collision_scene
+    each = [(scene.geometry[name], pose) for pose, name in map(scene.graph.get, scene.graph.nodes_geometry)]
+    return [part for mesh, pose in each for part in mesh.copy().apply_transform(pose).split(only_watertight=False)]
+
+
+def test_the_meshes_of_a_link_become_one_solid_where_its_first_mesh_was(lever: Path) -> None:
+    """Turned, moved and mirrored; what collides differently stays apart, and primitives stay."""
+    done = rlacd.rewrite_robot(lever, lever.with_name("out.urdf"), threshold_abs=0.01, threads=1)
+    arm, hand = done.links
+    assert [len(result.report["repair"]) for result in arm.results] == [2, 1]
+    assert hand.results[0] is arm.results[1], "alike, wherever it is"
+    after = done.path.read_text()
+    assert after.count("<!-- between -->") == after.count('<sphere radius="1"/>') == after.count('group="soft"') == 1
+    assert after.count("collision name=") == len(arm.results[0])
+    before, hulls = collision_meshes(lever), [mesh.convex_hull for mesh in collision_meshes(done.path)]
+    corners = np.concatenate([mesh.vertices for mesh in before])
+    assert inside(hulls, corners, 1e-5).all()
+    assert sum(hull.volume for hull in hulls) == pytest.approx(sum(abs(mesh.volume) for mesh in before), rel=0.05)
+
+
+def test_lengths_are_shares_of_the_robot_at_rest(lever: Path) -> None:
+    size = np.ptp(np.concatenate([mesh.vertices for mesh in collision_meshes(lever)]), axis=0).max()
+    assert size > 10, "the joint turns the hand away"
+    for how, length in (({}, 0.015 * size), ({"threshold": 0.1}, 0.05 * size), ({"threshold_abs": 0.2}, 0.2)):
+        done = rlacd.rewrite_robot(lever, lever.with_name("out.urdf"), links={"h.nd": 0.01}, threads=1, **how)  # type: ignore[arg-type]
+        for link, want in zip(done.links, (length, 0.01), strict=True):
+            options = link.results[0].report["options"]
+            assert options["criterion"] == "distance"
+            assert options["threshold_abs"] == pytest.approx(want, rel=5e-3)
+    own = rlacd.rewrite_robot(lever, lever.with_name("own.urdf"), relative_to="mesh", per="mesh", threads=1)
+    options = own.links[0].results[0].report["options"]
+    assert (options["criterion"], options["threshold"], options["threshold_abs"]) == ("concavity", 0.05, None)
+    with pytest.raises(OptionError, match=r"matches the regular expression 'han': arm, hand"):
+        rlacd.rewrite_robot(lever, lever.with_name("no.urdf"), links={"han": 0.01})
 
 
 @pytest.mark.parametrize("robot", ["kuka_iiwa/model.urdf", "franka_panda/panda.urdf"])
@@ -165,7 +249,7 @@ def test_packages_are_found_where_robotics_people_keep_them(
     robot.write_text(EAR.replace("meshes/table", "package://parts/table"))
     given = [f"parts={parts}"] if how == "option" else []
     done = rlacd.rewrite_robot(robot, robot.with_name("out.urdf"), package_dirs=given, threads=1)
-    assert {mesh.path for mesh in done.meshes} == {parts / "table.stl"}
+    assert {mesh for link in done.links for mesh in link.meshes} == {parts / "table.stl"}
 
 
 def test_lengths_are_in_the_robots_unit(tmp_path: Path) -> None:
@@ -175,7 +259,7 @@ def test_lengths_are_in_the_robots_unit(tmp_path: Path) -> None:
     big.export(tmp_path / "big.stl")
     robot = urdf(tmp_path, "filename='big.stl' scale='0.001 0.001 0.001'")
     done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threshold_abs=0.004, threads=1)
-    assert done.meshes[0].result.report["options"]["threshold"] == pytest.approx(0.004 * 2 / 0.4)
+    assert done.links[0].results[0].report["options"]["threshold"] == pytest.approx(0.004 * 2 / 0.4)
     (hulls,) = [trimesh.util.concatenate(collisions(done.path))]
     assert hulls.bounds == pytest.approx(table().bounds, abs=1e-6)
 
@@ -185,21 +269,21 @@ def test_a_mesh_smaller_than_the_threshold_becomes_one_hull(tmp_path: Path) -> N
     for name, mesh in (("one", table()), ("two", apart)):
         mesh.export(tmp_path / f"{name}.stl")
     urdf(tmp_path, "filename='one.stl'", "filename='two.stl'")
-    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.9, threads=1)
-    assert [len(mesh.files) for mesh in done.meshes] == [1, 1]
-    fine = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "fine.urdf", threshold_abs=0.01, threads=1)
-    assert [len(mesh.files) for mesh in fine.meshes] == [5, 10]
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.9, per="mesh", threads=1)
+    assert [len(result) for result in done.links[0].results] == [1, 1]
+    fine = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "fine.urdf", threshold_abs=0.01, per="mesh", threads=1)
+    assert [len(result) for result in fine.links[0].results] == [5, 10]
 
 
 def test_a_timeout_counts_for_each_mesh(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
-    whole = rewrite.decompose
+    whole = decomposed.decompose
 
     def watched(*words: object, **options: object) -> object:
         given.append(options["timeout"])
         return whole(*words, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(rewrite, "decompose", watched)
+    monkeypatch.setattr(decomposed, "decompose", watched)
     rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), timeout=50.0, threads=1)
     assert given == [50.0, 50.0]
 
@@ -221,9 +305,9 @@ def test_meshes_of_one_name_in_two_folders_do_not_clash(tmp_path: Path) -> None:
         (tmp_path / folder).mkdir()
         trimesh.creation.box((size, size, size)).export(tmp_path / folder / ("Arm.stl" if folder == "a" else "arm.stl"))
     robot = urdf(tmp_path, "filename='a/Arm.stl'", "filename='b/arm.stl'")
-    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threads=1)
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", per="mesh", threads=1)
     assert [mesh.extents[0] for mesh in collisions(done.path)] == pytest.approx([1.0, 2.0])
-    assert len({name.lower() for mesh in done.meshes for name in mesh.files}) == 2
+    assert len({name.lower() for name in done.links[0].files}) == 2
 
 
 def test_line_ends_and_encodings_are_kept(ear: Path) -> None:
@@ -240,15 +324,41 @@ def test_a_robot_is_rewritten_on_the_command_line(ear: Path) -> None:
     run = CliRunner().invoke(app, ["decompose", str(ear), "--threads", "1", "--report", "-"])
     assert run.exit_code == 0, run.output
     assert ear.with_name("ear_hulls.urdf").is_file()
-    assert "2 meshes" in run.stderr
+    assert "2 links" in run.stderr
+    assert re.search(r"tip +2 meshes +\d+ hulls? +farthest [\d.e-]+ mm", run.stderr)
+    assert [link["name"] for link in json.loads(run.stdout)["links"]] == ["base", "tip"]
+    run = CliRunner().invoke(app, ["decompose", str(ear), "--link", "t.*=1mm", "--link", "base=0.5", "--per", "mesh"])
+    assert run.exit_code == 0, run.output
     for words, says in (
         (["--picture", "p.png"], "--picture is for a single mesh"),
         (["--package-dir", "no/such"], "does not exist"),
+        (["--link", "tip"], "REGEX=LENGTH"),
+        (["--link", "*tip=1mm"], "regular expressions"),
+        (["--link", "tap=1mm"], "base, tip"),
+        (["--relative-to", "node"], "'mesh'"),
     ):
         run = CliRunner().invoke(app, ["decompose", str(ear), *words])
         assert run.exit_code == 2
         assert says in " ".join(run.stderr.split())
         assert run.stderr.count("\n") == 1
+
+
+def test_warnings_of_a_kind_are_one_that_names_the_worst(tmp_path: Path) -> None:
+    """Rings whose holes close, in another number and size each, from files whose y axis points up."""
+    links = []
+    for index, (width, count) in enumerate([(0.02, 1), (0.06, 3), (0.04, 1)]):
+        rings = [trimesh.creation.annulus(width, width + 0.05, 0.05, sections=24) for _ in range(count)]
+        mesh = trimesh.util.concatenate([ring.apply_translation((i, 0, 0)) for i, ring in enumerate(rings)])
+        (tmp_path / f"ring{index}.dae").write_bytes(trimesh.exchange.dae.export_collada(mesh))
+        mesh = f'<mesh filename="ring{index}.dae"/>'
+        links.append(f'<link name="l{index}"><collision><geometry>{mesh}</geometry></collision></link>')
+    (tmp_path / "r.urdf").write_text(f"<robot name='r'>{''.join(links)}</robot>")
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.2, threads=1)
+    said = [warning for warning in done.warnings if "passage" in warning]
+    assert len(said) == 1
+    assert said[0].startswith("ring1 and 2 others: 3 passages narrow by over a third, such as")
+    assert sum("Y_UP" in warning for warning in done.warnings) == 1
+    assert len(done.warnings) == 2
 
 
 def test_going_elsewhere_says_which_files_will_be_missed(ear: Path, tmp_path: Path) -> None:
@@ -310,7 +420,7 @@ def test_mujoco_reads_the_rewritten_mjcf_and_hulls_lie_where_the_mesh_lay(arm: P
     after = mujoco_model(done.path)
     for body in ("upper", "lower"):
         assert bounds_of(after, body) == pytest.approx(bounds_of(before, body), abs=1e-5)
-    table_hulls, big_hulls = (len(mesh.files) for mesh in done.meshes)
+    table_hulls, big_hulls = (len(link.files) for link in done.links)
     # "upper" keeps its collision geom for its mass, "lower" the red one to look at too, with hulls beside them.
     assert after.ngeom == before.ngeom + table_hulls + big_hulls
     assert after.geom("elbow_mass").rgba[3] == 0.0, "what stays for its mass is not drawn"
@@ -321,14 +431,27 @@ def test_mujoco_reads_the_rewritten_mjcf_and_hulls_lie_where_the_mesh_lay(arm: P
     assert np.isfinite(fall_in_mujoco(done.path, 0.05).speed)
 
 
-def bounds_of(model: Any, body: str) -> np.ndarray:
+def bounds_of(model: Any, body: str | int) -> np.ndarray:
+    points = points_of_body(model, body)
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def geoms_of_body(model: Any, body: str | int) -> list[np.ndarray]:
+    """The points of each mesh that a body collides with, in the world."""
     import mujoco
 
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     own = (model.geom_bodyid == model.body(body).id) & (model.geom_dataid >= 0) & (model.geom_contype > 0)
-    points = np.concatenate([points_of_geom(model, data, geom) for geom in np.flatnonzero(own)])
-    return np.array([points.min(axis=0), points.max(axis=0)])
+    return [points_of_geom(model, data, geom) for geom in np.flatnonzero(own)]
+
+
+def points_of_body(model: Any, body: str | int) -> np.ndarray:
+    return np.concatenate(geoms_of_body(model, body))
+
+
+def hulls_of_body(model: Any, body: str | int) -> list[trimesh.Trimesh]:
+    return [trimesh.Trimesh(points).convex_hull for points in geoms_of_body(model, body)]
 
 
 @pytest.mark.promise("robots")
@@ -396,6 +519,54 @@ def tensors(model: Any) -> np.ndarray:
     return np.array([turn * inertia @ turn.T for turn, inertia in zip(turns, model.body_inertia, strict=True)])
 
 
+HAND = """<mujoco>
+<compiler angle="{angle}" eulerseq="xZy" autolimits="true"/>
+<default><default class="c"><geom type="mesh" group="3" quat="1 0 0.2 0"/></default></default>
+<asset><mesh name="t" file="table.stl" scale="1 -1 2" refpos="0.1 0 0" refquat="1 1 0 0"/>
+<mesh name="u" file="table.stl" scale="0.5 0.5 0.5"/></asset>
+<worldbody><geom class="c" mesh="u" pos="4 0 0"/><geom class="c" mesh="u" pos="5 0 0"/>
+<body name="palm" pos="1 2 3" axisangle="1 2 0 {turn}"><joint/>
+  <geom class="c" mesh="t" pos="0.3 0 0" density="500"/>
+  <frame pos="0 1 0" euler="{turn} {turn} {turn}"><geom class="c" mesh="u" xyaxes="1 1 0 0 0 2"/></frame>
+  <geom class="c" mesh="u" zaxis="1 2 -3" friction="0.1"/><!-- slippery -->
+  <geom name="pad" class="c" mesh="u" pos="0 0 1"/>
+  <replicate count="2" offset="2 0 0"><geom class="c" mesh="u" pos="0 3 0"/><geom class="c" mesh="u"/></replicate>
+  <body euler="0 {turn} 0" pos="0 0 1"><geom class="c" mesh="u"/><geom class="c" mesh="u" pos="0.1 0 0"/></body>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("angle", "turn"), [("degree", "20"), ("radian", "0.34906585")])
+@pytest.mark.promise("robot-hulls", "robot-mass")
+def test_geoms_of_a_body_become_one_solid_where_they_collide_alike(tmp_path: Path, angle: str, turn: str) -> None:
+    """Placed, turned, mirrored and scaled in every way that MJCF has; compared where MuJoCo puts them."""
+    table().export(tmp_path / "table.stl")
+    (tmp_path / "in.xml").write_text(HAND.format(angle=angle, turn=turn))
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threshold_abs=0.02, threads=1)
+    before, after = mujoco_model(tmp_path / "in.xml"), mujoco_model(done.path)
+    world, _, tip = done.links
+    assert [len(link.results) for link in done.links] == [2, 4, 1], "world apart; slippery, named, replicated apart"
+    assert (world.results[0], tip.name) == (world.results[1], "body_2")
+    assert "<!-- slippery -->" in done.path.read_text()
+    assert after.body_mass == pytest.approx(before.body_mass, rel=1e-6)
+    assert tensors(after) == pytest.approx(tensors(before), rel=1e-6, abs=1e-6 * before.body_inertia.max())
+    for body in ("palm", 2):
+        assert bounds_of(after, body) == pytest.approx(bounds_of(before, body), abs=1e-5)
+        corners, hulls = points_of_body(before, body), hulls_of_body(after, body)
+        assert inside(hulls, corners, 1e-5).all()
+    shape = trimesh.util.concatenate(tip.hulls).apply_transform(pose_of_body(after, 2))
+    assert shape.bounds == pytest.approx(bounds_of(before, 2), abs=1e-5), "in Python they are in the body's frame"
+
+
+def pose_of_body(model: Any, body: str | int) -> np.ndarray:
+    import mujoco
+
+    data, pose = mujoco.MjData(model), np.eye(4)
+    mujoco.mj_forward(model, data)
+    place = data.body(body)
+    pose[:3, :3], pose[:3, 3] = place.xmat.reshape(3, 3), place.xpos
+    return pose
+
+
 @pytest.mark.parametrize("inertia", ["", "inertia='exact'", "inertia='convex'"])
 def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, inertia: str) -> None:
     trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "flat.stl")
@@ -438,7 +609,7 @@ def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
     before = mujoco_model(tmp_path / "in.xml")
     done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threads=1)
     after = mujoco_model(done.path)
-    assert after.ngeom == before.ngeom + len(done.meshes[0].files)
+    assert after.ngeom == before.ngeom + len(done.links[0].files)
     assert after.body_mass == pytest.approx(before.body_mass)
     text = done.path.read_text(encoding="utf-8")
     assert text.startswith("<mujoco>\n <!-- scene -->\n <!-- für -->")
@@ -463,7 +634,7 @@ def test_a_model_whose_paths_are_stripped_is_rewritten_with_the_paths_that_count
     before = mujoco_model(source)
     done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
     after = mujoco_model(done.path)
-    assert after.ngeom == before.ngeom + len(done.meshes[0].files)
+    assert after.ngeom == before.ngeom + len(done.links[0].files)
     assert after.body_inertia == pytest.approx(before.body_inertia, rel=1e-6)
 
 
@@ -546,7 +717,7 @@ def test_a_robot_cannot_name_what_lies_outside_its_package(tmp_path: Path, refer
     assert "\n" not in str(caught.value)
     if "outside" in reference and "package" not in reference:
         done = rlacd.rewrite_robot(package / "r.urdf", package / "out.urdf", package_dirs=[str(tmp_path)], threads=1)
-        assert done.meshes[0].path == outside, "unless the user allows it"
+        assert done.links[0].meshes == [outside], "unless the user allows it"
 
 
 def test_places_are_checked_before_the_work(ear: Path, tmp_path: Path) -> None:
@@ -561,3 +732,5 @@ def test_places_are_checked_before_the_work(ear: Path, tmp_path: Path) -> None:
         rlacd.rewrite_robot(ear.parent / "meshes" / "table.stl", tmp_path / "out.stl")
     with pytest.raises(OptionError, match="threshold"):
         rlacd.rewrite_robot(ear, tmp_path / "out2.urdf", threshold=-1.0)
+    with pytest.raises(OptionError, match="unit"):
+        rlacd.rewrite_robot(ear, tmp_path / "mm.urdf", unit="mm")

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
-from tests.models import TABLE_VOLUME, table
+from tests.models import TABLE_VOLUME, inside, table
 
 pytest.importorskip("pxr", reason="the extra usd is not installed")
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdValidation, Vt
@@ -75,7 +75,7 @@ def test_hulls_lie_where_the_mesh_lay_and_nothing_else_changes(tmp_path: Path, b
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
     assert body != "/robot" or findings(stage) == []
     hulls = colliders(stage)
-    assert len(hulls) == len(done.meshes[0].files) > 1
+    assert len(hulls) == len(done.links[0].files) > 1
     for hull in hulls:
         assert UsdPhysics.MeshCollisionAPI(hull).GetApproximationAttr().Get() == "convexHull"
         assert UsdGeom.Imageable(hull).ComputePurpose() == "guide"
@@ -120,7 +120,7 @@ def test_what_names_a_mesh_as_a_collider_names_its_hulls_and_the_rest_gives_a_wa
     stage = Usd.Stage.Open(str(done.path))
     hulls = [prim for prim in colliders(stage) if prim.GetName() != "wall"]
     paths = {hull.GetPath() for hull in hulls}
-    assert len(paths) == len(done.meshes[0].files)
+    assert len(paths) == len(done.links[0].files)
     named = UsdPhysics.FilteredPairsAPI(stage.GetPrimAtPath("/robot/wall")).GetFilteredPairsRel().GetTargets()
     assert paths < set(named)
     members = UsdPhysics.CollisionGroup(stage.GetPrimAtPath("/robot/group")).GetCollidersCollectionAPI()
@@ -141,6 +141,42 @@ def findings(stage: Any) -> list[str]:
     return [error.GetMessage() for error in UsdValidation.ValidationContext(validators).Validate(stage)]
 
 
+@pytest.mark.parametrize("per", ["link", "mesh"])
+@pytest.mark.promise("robot-hulls", "robot-mass")
+def test_meshes_of_a_rigid_body_become_one_solid_where_they_collide_alike(tmp_path: Path, per: Any) -> None:
+    stage = Usd.Stage.Open(str(write_stage(tmp_path / "in.usda")))
+    turned = add_table(stage, "/robot/turned")
+    turned.AddRotateXYZOp().Set((20, 30, 40))
+    moved, scaled, rotated = turned.GetOrderedXformOps()
+    turned.SetXformOpOrder([moved, rotated, scaled])
+    rubber = UsdShade.Material.Define(stage, "/robot/rubber")
+    UsdPhysics.MaterialAPI.Apply(rubber.GetPrim()).CreateDynamicFrictionAttr(0.9)
+    pad = add_table(stage, "/robot/pad").GetPrim()
+    UsdShade.MaterialBindingAPI.Apply(pad).Bind(rubber, UsdShade.Tokens.weakerThanDescendants, "physics")
+    add_table(stage, "/fixed")
+    add_table(stage, "/walls")
+    wall = UsdGeom.Cube.Define(stage, "/robot/wall").GetPrim()
+    UsdPhysics.FilteredPairsAPI.Apply(wall).CreateFilteredPairsRel().AddTarget("/robot/pad")
+    group = UsdPhysics.CollisionGroup.Define(stage, "/robot/group")
+    for path in ("/robot/table", "/robot/turned"):
+        group.GetCollidersCollectionAPI().IncludePath(path)
+    group.CreateFilteredGroupsRel()
+    stage.Save()
+    before = [placed(prim) for prim in colliders(stage)]
+    done = rlacd.rewrite_robot(tmp_path / "in.usda", tmp_path / "out.usda", threads=1, quality="fast", per=per)
+    robot, *others = done.links
+    assert (robot.name, [link.name for link in others]) == ("/robot", ["/fixed", "/walls"])
+    assert len(robot.results) == (2 if per == "link" else 3), "rubber stays apart"
+    assert {str(path) for path in robot.meshes} == {"/robot/table", "/robot/turned", "/robot/pad"}
+    stage = Usd.Stage.Open(str(done.path))
+    hulls = [placed(prim) for prim in colliders(stage)]
+    assert sum(len(link.files) for link in done.links) == len(hulls)
+    for mesh in before:
+        assert inside([hull.convex_hull for hull in hulls], mesh.vertices, 0.01).all()
+    mass = UsdPhysics.MassAPI(stage.GetPrimAtPath("/robot")).GetMassAttr().Get()
+    assert mass == pytest.approx(3 * TABLE_VOLUME * np.prod(SCALE) * 0.01**3 * 1000, rel=1e-5)
+
+
 def test_instances_that_collide_are_opened_and_each_gets_the_hulls(tmp_path: Path) -> None:
     write_stage(tmp_path / "part.usda")
     stage = Usd.Stage.CreateNew(str(tmp_path / "scene.usda"))
@@ -151,8 +187,8 @@ def test_instances_that_collide_are_opened_and_each_gets_the_hulls(tmp_path: Pat
     stage.Save()
     done = rlacd.rewrite_robot(tmp_path / "scene.usda", tmp_path / "out.usda", threads=1, quality="fast")
     assert any("2 instances" in warning for warning in done.warnings)
-    one, other = done.meshes
-    assert one.result is other.result
+    one, other = done.links
+    assert one.results == other.results
     assert len(colliders(Usd.Stage.Open(str(done.path)))) == 2 * len(one.files)
 
 

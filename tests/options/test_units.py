@@ -148,32 +148,3 @@ def test_a_scene_has_a_floor_to_land_on(tmp_path: Path) -> None:
     assert 0.1 < data.xipos[1][2] < 0.2  # it stands on its legs
     with pytest.raises(OptionError, match="MJCF"):
         result.save(tmp_path / "table.urdf", scene=True)
-
-
-@pytest.mark.slow
-def test_a_robot_of_many_hulls_is_told_of_a_threshold_for_all(tmp_path: Path) -> None:
-    """A large plain box and small rings that are cut finely: the suggestion holds when it is followed."""
-    trimesh.creation.box((1.49, 0.3, 0.3)).export(tmp_path / "arm.stl")
-    ring = trimesh.creation.torus(0.05, 0.015, major_sections=32, minor_sections=12)
-    ring.export(tmp_path / "ring.stl")
-    links = "".join(
-        f'<link name="{name}"><collision><geometry><mesh filename="{name}.stl"/></geometry></collision></link>'
-        for name in ("arm", "ring")
-    )
-    joint = '<joint name="j" type="fixed"><parent link="arm"/><child link="ring"/></joint>'
-    (tmp_path / "robot.urdf").write_text(f'<robot name="r">{links}{joint}</robot>')
-    tight = {"criterion": "concavity", "threshold": 0.01, "threads": 1}
-    done = rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "acd.urdf", **tight)
-    hulls = sum(len(mesh.files) for mesh in done.meshes)
-    assert hulls > 20
-    said = next(warning for warning in done.warnings if "--threshold-abs" in warning)
-    assert said.startswith(f"2 meshes became {hulls} hulls")
-    length = said.partition("--threshold-abs ")[2].partition(",")[0]
-    assert 1 <= float(length) * min(mesh.result.report["scale"] for mesh in done.meshes) / 0.01 < 1.2
-    followed = rlacd.rewrite_robot(
-        tmp_path / "robot.urdf", tmp_path / "few.urdf", threshold_abs=float(length), threads=1
-    )
-    assert sum(len(mesh.files) for mesh in followed.meshes) < hulls
-    assert not any("--threshold-abs" in warning for warning in followed.warnings)
-    with pytest.raises(OptionError, match="unit"):
-        rlacd.rewrite_robot(tmp_path / "robot.urdf", tmp_path / "mm.urdf", unit="mm")

@@ -73,6 +73,8 @@ class JobSpec:
         checked = Options.of({"threads": 1, **options})
         if not isinstance(checked.first_policy, str):
             raise OptionError("in a batch, policy has to be a name or a file: objects stay in their process.")
+        if checked.avoid:
+            raise OptionError("in a batch, avoid (--avoid) has to be left out: it is for a single mesh.")
         make_policy(checked.first_policy)
         asked = OutputOptions(**written)
         ending, file_format = file_kind(asked.file_format, checked.preset)

@@ -23,6 +23,7 @@ from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import is_robot, rewrite_robot, usd
 from rlacd.io.robots.rewrite import rewrite_stage
+from rlacd.options.robots import RobotOptions
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.process import peak_memory
 
@@ -88,7 +89,7 @@ def _robot(spec: JobSpec, robot: Path | usd.Colliders, place: Path, hull_only: b
     if isinstance(robot, Path):
         done = rewrite_robot(robot, place, **options)
     else:
-        done = rewrite_stage(robot, place, options, keep_input=True)
+        done = rewrite_stage(robot, place, options, RobotOptions(), keep_input=True)
         robot = robot.source
     here = {str(place.parent): "the results", str(robot.absolute().parent): "the robot's folder"}
     warnings = [STAND_IN] if hull_only else []
@@ -96,7 +97,7 @@ def _robot(spec: JobSpec, robot: Path | usd.Colliders, place: Path, hull_only: b
         for path, name in here.items():
             warning = warning.replace(path, name)
         warnings.append(warning)
-    reports = [mesh.result.report for mesh in done.meshes]
+    reports = [result.report for link in done.links for result in link.results]
     facts = {what: sum(report[what] for report in reports) for what in ("parts", "faces", "vertices")}
     fits = [fit for report in reports if (fit := Fit.of(report)) is not None and fit.is_length]
     if fits and all(fit.worst is not None for fit in fits):

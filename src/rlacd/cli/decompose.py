@@ -16,10 +16,11 @@ import click
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import import_trimesh
-from rlacd.cli.options import decompose_options, how, unit_given
+from rlacd.cli.options import decompose_options, how, link_lengths, unit_given
 from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.options.output import PAGES, OutputOptions
+from rlacd.options.robots import RobotOptions
 
 ROBOTS = (".urdf", ".xml")
 IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
@@ -58,7 +59,7 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
 
     Ctrl-C once stops and writes the result so far; twice quits at once.
     """
-    asked = OutputOptions(**taken(how, OutputOptions))
+    asked, robots = OutputOptions(**taken(how, OutputOptions)), taken(how, RobotOptions)
     if more := click.get_current_context().args:
         if len(more) == 1 and not os.path.exists(more[0]):
             raise OptionError(f"the name of the output follows -o: rlacd decompose {mesh} -o {more[0]}")
@@ -69,12 +70,12 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
             raise OptionError("the hulls would go to the terminal: give -o a file name, or - to print them anyway.")
         asked = dataclasses.replace(asked, output=STDIO)
     with stdin_as_file(mesh, source) as file:
-        complete = _run(file, asked, how)
+        complete = _run(file, asked, robots, how)
     if not complete:
         raise SystemExit(ExitCode.STOPPED_EARLY)
 
 
-def _run(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> bool:
+def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str, Any]) -> bool:
     """Check everything, then do it; returns whether it is complete."""
     _check_input(mesh)
     import_trimesh(mesh)
@@ -84,11 +85,12 @@ def _run(mesh: Path, asked: OutputOptions, how: dict[str, Any]) -> bool:
     stage = _stage(mesh, wanted)
     robot = mesh.suffix.lower() in ROBOTS or stage is not None
     _check_output(mesh, wanted)
-    _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted)
+    _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted, robots)
     if wanted.balls is not None and how.get("criterion") != "navigable":
         raise OptionError("--balls needs --criterion navigable.")
-    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
-    run = partial(_rewrite, stage) if robot else _write
+    in_metres = mesh.suffix.lower() in IN_METRES
+    options = decompose_options(how, metres=in_metres or how.get("unit") is not None)
+    run = partial(_rewrite, stage, RobotOptions(**link_lengths(robots, in_metres))) if robot else _write
     return run(mesh, wanted, options, unit_given(how))
 
 
@@ -144,7 +146,9 @@ def is_html(path: str) -> bool:
     return Path(path).suffix.lower() in PAGES
 
 
-def _rewrite(stage: Any, robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
+def _rewrite(
+    stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None
+) -> bool:
     """Replace the collision meshes of a robot, or of a stage that has been read; returns whether all are complete."""
     from rlacd.cli.terminal import rewrite_summary, watching
     from rlacd.io.robots.rewrite import rewrite_robot, rewrite_stage
@@ -153,12 +157,13 @@ def _rewrite(stage: Any, robot: Path, wanted: OutputOptions, options: dict[str, 
     with watching(quiet=bool(wanted.quiet)) as watch:
         options, place, flat = {**options, "progress": watch}, str(wanted.output), bool(wanted.keep_input)
         if stage is not None:
-            done = rewrite_stage(stage, Path(place), options, keep_input=flat)
+            done = rewrite_stage(stage, Path(place), options, how, keep_input=flat)
         else:
-            done = rewrite_robot(robot, place, package_dirs=wanted.package_dirs or (), keep_input=flat, **options)
+            given = {"package_dirs": wanted.package_dirs or (), "keep_input": flat, **vars(how)}
+            done = rewrite_robot(robot, place, **given, **options)
     if not wanted.quiet:
         say(rewrite_summary(done, unit))
-    _write_report(wanted, to_json({str(mesh.path): mesh.result.report for mesh in done.meshes}))
+    _write_report(wanted, to_json(done.report()))
     return done.complete
 
 
@@ -185,7 +190,7 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
     return dataclasses.replace(asked, output=output, file_format=file_format)
 
 
-def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
+def _check_mesh(mesh: Path, wanted: OutputOptions, robots: dict[str, Any]) -> None:
     """Check before any work that all outputs can be written."""
     from rlacd.io.write import file_stem, hull_target
     from rlacd.io.write.balls import check_balls
@@ -195,8 +200,8 @@ def _check_mesh(mesh: Path, wanted: OutputOptions) -> None:
     if target.is_folder:
         stem = file_stem(mesh.stem)
         check_names(target.path, stem, [f"{stem}_000.{target.file_format}"])  # the one that every result has
-    if wanted.package_dirs:
-        raise OptionError("--package-dir is for robots, a .urdf or .xml file as input.")
+    for flag in ["package-dir"] * bool(wanted.package_dirs) + [{"links": "link"}.get(name, name) for name in robots]:
+        raise OptionError(f"--{flag} is for robots, a .urdf or .xml file as input.")
     if wanted.picture is not None:
         from rlacd.view.picture import check_picture
 
@@ -253,6 +258,7 @@ COMMAND = Command(
         Argument("mesh", "IN", MESH),
         Option("source", "--from", metavar="EXT", panel="Input", help=FROM),
         *options_of(OutputOptions),
+        *options_of(RobotOptions),
         *how(),
     ],
     first=FIRST,

@@ -125,6 +125,21 @@ def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
     return taken
 
 
+def link_lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
+    """Parse ``--link REGEX=LENGTH``: in the robot's own unit, or with one where that is the metre."""
+    taken: dict[str, float] = {}
+    for word in given.get("links") or ():
+        pattern, _, text = word.rpartition("=")
+        found = _LENGTH.fullmatch(text.strip())
+        value, unit = (_number(found[1]), found[2]) if found else (_number(text), None)
+        if not pattern or value is None or unit == "%":
+            raise OptionError(f"--link is {word!r}; it has to be REGEX=LENGTH, such as 'finger.*=1mm'.")
+        if unit is not None and not metres:
+            raise OptionError(f"--link is {word!r}; of a USD stage, lengths are in its own unit: leave out {unit}.")
+        taken[pattern] = value * (UNITS[unit] if unit else 1.0)
+    return {**given, "links": taken} if taken else given
+
+
 def unit_given(how: dict[str, Any]) -> str | None:
     """The unit in which the threshold was given; None if in the frame or the input's own."""
     found = _LENGTH.fullmatch(str(how.get("threshold") or "").strip())

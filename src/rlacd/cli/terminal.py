@@ -125,15 +125,35 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
 
 
 def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
-    """Summarise the result for a robot: its meshes, each with its number of hulls."""
-    total = counted(sum(len(mesh.files) for mesh in done.meshes), "hull", "hulls")
-    made = f"{counted(len(done.meshes), 'mesh', 'meshes')}, {total} in {done.folder}" if done.meshes else "written"
-    lines = [f"{done.path}: {made}"]
-    for mesh in done.meshes:
-        hulls = counted(len(mesh.files), "hull", "hulls")
-        lines.append(f"  {mesh.path.name}: {hulls}; {_fit(mesh.result.report, unit)}")
+    """Summarise the result for a robot: a line for each link with collision meshes, and totals."""
+    if not done.links:
+        return "\n".join([f"{done.path}: written", *(f"  warning: {warning}" for warning in done.warnings)])
+    meshes = sum(len(link.meshes) for link in done.links)
+    hulls = sum(len(link.files) for link in done.links)
+    made = f"{counted(len(done.links), 'link', 'links')}, {counted(hulls, 'hull', 'hulls')} in {done.folder}"
+    lines = [f"{done.path}: {made}, {done.seconds:.2f} s"]
+    width = max(len(link.name) for link in done.links)
+    for link in done.links:
+        sizes = f"{counted(len(link.meshes), 'mesh', 'meshes'):>9}  {counted(len(link.files), 'hull', 'hulls'):>8}"
+        lines.append(f"  {link.name:{width}} {sizes}  {_farthest(link.farthest, done.metres, unit)}")
+    each = f"{hulls / len(done.links):.1f} hulls a link for {counted(meshes, 'mesh', 'meshes')}"
+    lines.append(f"  {each}; {_farthest(done.farthest, done.metres, unit)}")
+    if done.samples:
+        kept = sum(pair.kept_clear for pair in done.pairs)
+        looked = (
+            f"{counted(len(done.pairs), 'pair', 'pairs')} of links at {counted(done.samples, 'position', 'positions')}"
+        )
+        lines.append(f"  {looked}: {kept} kept clear by finer hulls")
     lines += [f"  warning: {warning}" for warning in done.warnings]
     return "\n".join(lines)
+
+
+def _farthest(length: float | None, metres: float, unit: str | None) -> str:
+    """How far hulls reach beyond the meshes, in a unit; in millimetres by default."""
+    if length is None:
+        return "not measured"
+    unit = unit if unit in UNITS else "mm"
+    return f"farthest {length * metres / UNITS[unit]:.3g} {unit}"
 
 
 def counted(count: int, one: str, many: str) -> str:

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from rlacd import _native
+from rlacd.criteria.avoided import Avoided
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
@@ -87,6 +88,16 @@ class Criterion(Protocol):
     def obstacles(self) -> Balls | None:
         """Balls that no hull may touch, if the criterion is defined by balls."""
         return None
+
+    @property
+    def avoided(self) -> Avoided | None:
+        """Meshes that no hull may enter."""
+        return None
+
+    @property
+    def alone(self) -> Criterion:
+        """The same without those meshes: for a simpler copy of the solid, which may itself enter them."""
+        return self
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """Summarise how well finished parts meet the criterion; `errors` holds that of each part, None if unknown."""

@@ -1,4 +1,4 @@
-"""Criteria with one more condition: passages that hulls keep open, hulls inside limits on vertices and faces."""
+"""Criteria with one more condition: passages that hulls keep open, meshes that they avoid, limits on their corners."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from rlacd import _native
+from rlacd.criteria.avoided import FINEST, Avoided
 from rlacd.criteria.concavity import Concavity, Distance
 from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
 from rlacd.criteria.navigable import Intrusions, Navigable
@@ -84,7 +85,7 @@ def limited_part(
 
 @dataclass(frozen=True)
 class LimitedCriterion(Criterion):
-    """A criterion that the limited hull of a part has to meet too, and whose hulls keep passages open.
+    """A criterion that the limited hull of a part has to meet too, and whose hulls keep passages open and avoid meshes.
 
     Attributes
     ----------
@@ -93,20 +94,31 @@ class LimitedCriterion(Criterion):
     limits : HullLimits
     free, kept : Balls
         The largest that fit in the passages of the solid, and how large they have to stay.
+    avoided : Avoided or None
+        What hulls may not enter.
+    finest : Distance or None
+        A part that is as tight as this is cut no further to avoid it.
     """
 
     criterion: Criterion
     limits: HullLimits = NO_LIMITS
     free: Balls = NO_BALLS
     kept: Balls = NO_BALLS
+    avoided: Avoided | None = None
+    finest: Distance | None = None
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
         """The criterion that the options name, with their passages; limits come later (see `rlacd.limit`)."""
         criterion = CRITERIA[options.criterion_name].prepare(options, solid, run)
+        made = cls(criterion)
+        if options.avoid:
+            avoided = Avoided.of(options.avoid, solid, 1 if run is None else run.threads)
+            made = replace(made, avoided=avoided, finest=Distance(FINEST * options.threshold))
         if run is not None and (options.keep_open is not None or options.keep_open_abs is not None):
-            return cls(criterion, NO_LIMITS, *_passages(criterion, options, solid, run))
-        return criterion
+            free, kept = _passages(criterion, options, solid, run)
+            return replace(made, free=free, kept=kept)
+        return criterion if made.avoided is None else made
 
     @property
     def eliminates(self) -> bool:
@@ -138,16 +150,24 @@ class LimitedCriterion(Criterion):
 
     def is_met(self, part: Part) -> bool:
         """Decide for the exact hull first, then for the limited one: it stays out of the balls, and is tight."""
-        return self._is_met(part) and (keeps(part.hull, self.limits) or self.of_facets.is_met(self._limited(part)))
+        if not self._is_met(part, part):
+            return False
+        return keeps(part.hull, self.limits) or self.of_facets._is_met(self._limited(part), part)
 
     @cached_property
     def of_facets(self) -> LimitedCriterion:
-        """That of the underlying criterion; passages stay open."""
+        """That of the underlying criterion; passages stay open, and meshes are avoided."""
         return replace(self, criterion=self.criterion.of_facets, limits=NO_LIMITS)
 
-    def _is_met(self, part: Part) -> bool:
+    def _is_met(self, part: Part, exact: Part) -> bool:
         narrows = len(self.kept) > 0 and self._intrusions.any_beyond(part, ROUNDING)
-        return not narrows and self.criterion.is_met(part)
+        return not narrows and not self._enters(part, exact) and self.criterion.is_met(part)
+
+    def _enters(self, part: Part, exact: Part) -> bool:
+        """Whether the hull enters what it is to avoid, and cuts may help: none makes a limited hull tight."""
+        if self.avoided is None or not self.avoided.is_entered(part.hull):
+            return False
+        return self.finest is None or not self.finest.is_met(exact)
 
     def error(self, part: Part) -> float:
         """Measure the part against the hull that it ends with if it does not meet the criterion."""
@@ -160,9 +180,17 @@ class LimitedCriterion(Criterion):
         return replace(self, criterion=self.criterion.settled(limited), kept=kept)
 
     def scaled(self, factor: float) -> LimitedCriterion:
-        """Coarser: hulls may also take more of each ball, by the same factor."""
+        """Coarser: hulls may also take more of each ball, and coarser parts enter meshes, by the same factor."""
         radii = np.maximum(self.free.radii - factor * (self.free.radii - self.kept.radii), 0.0)
-        return replace(self, criterion=self.criterion.scaled(factor), kept=Balls(self.free.centres, radii))
+        finest = self.finest and self.finest.scaled(factor)
+        return replace(
+            self, criterion=self.criterion.scaled(factor), kept=Balls(self.free.centres, radii), finest=finest
+        )
+
+    @property
+    def alone(self) -> Criterion:
+        """Without what hulls avoid."""
+        return replace(self, avoided=None)
 
     def _limited(self, part: Part) -> Part:
         return limited_part(part, self.limits, self.of_facets.overhang)

@@ -12,6 +12,7 @@ import trimesh
 
 from rlacd import _native
 from rlacd._version import __version__
+from rlacd.criteria.avoided import FINEST, warnings_of
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
@@ -96,6 +97,8 @@ def make_report(
         missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
         warnings += [*summary.warnings, *missed]
         warnings += too_narrow(apart.narrowed, reached, run.stopped_by is not None) if apart else []
+        entered = criterion.avoided and criterion.avoided.found(parts, solid.frame.scale)
+        warnings += warnings_of(entered, _why_entered(run)) if entered else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return {
@@ -109,6 +112,7 @@ def make_report(
             **({"primitives": _primitives(parts)} if options.primitives else {}),
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
+            **({"avoid": entered} if entered else {}),
             "hausdorff": {"over": apart and apart.over, "under": apart and max(apart.under, apart.left_out.distance)},
             "passages": apart and apart.narrowed.passages,
             "scale": solid.frame.scale,
@@ -119,6 +123,13 @@ def make_report(
             "at_least": reached.found and min(reached.found.at_least, len(hulls)),
             "warnings": warnings,
         }
+
+
+def _why_entered(run: Run) -> str:
+    """Why finer cuts did not help."""
+    if run.stopped_by is not None:
+        return "the work was stopped before"
+    return f"parts within {FINEST:.0%} of the threshold, and those that limits leave no way, are cut no further"
 
 
 def _holes(solid: Solid) -> list[dict[str, Any]]:
@@ -188,6 +199,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
         **({"overlap": _joint_seams([r for _, r in reports])} if "overlap" in first else {}),
         **{what: sum(report[what] for _, report in reports) for what in counted},
         **_joint_fit(each),
+        **({"avoid": _joint_avoid([r["avoid"] for _, r in reports])} if "avoid" in first else {}),
         "hausdorff": {side: _farthest([(r["hausdorff"][side], f) for _, r, f in each]) for side in ("over", "under")},
         "scale": scale,
         "mass": joint_mass([Mass.of_plain(report["mass"]) for _, report in reports]).as_plain(),
@@ -244,6 +256,12 @@ def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
         for place in one["short_seams"]
     ]
     return {"seams": sum(one["seams"] for one in seams), "short": len(places), "short_seams": places}
+
+
+def _joint_avoid(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Of all nodes: a mesh that several enter is listed for each."""
+    crossed = dict.fromkeys(name for one in each for name in one["crossed"])
+    return {"crossed": [*crossed], "entered": [entry for one in each for entry in one["entered"]]}
 
 
 def _added(counts: Sequence[dict[str, int]]) -> dict[str, int]:

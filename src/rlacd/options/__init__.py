@@ -27,7 +27,16 @@ from rlacd.options.fields import (
     stated,
 )
 from rlacd.options.keywords import unknown_option
-from rlacd.options.names import POLICIES, PRIMITIVE_KINDS, PrimitiveKind, policy_name, read_policy, read_primitives
+from rlacd.options.names import (
+    POLICIES,
+    PRIMITIVE_KINDS,
+    PrimitiveKind,
+    mesh_name,
+    policy_name,
+    read_meshes,
+    read_policy,
+    read_primitives,
+)
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
 from rlacd.options.presets import PRESETS, HullLimits, PresetName, find_preset
@@ -44,8 +53,11 @@ VolumeOf = Literal["part", "whole"]
 OpenName = Literal["auto", "solid", "thin"]
 DetailName = Literal["simple", "full"]
 QualityName = Literal["fast", "balanced", "best"]
-RelativeTo = Literal["scene", "node"]
+RelativeTo = Literal["scene", "node", "mesh"]
 UnitName = Literal["mm", "cm", "m", "in", "file"]
+
+MeshLike: TypeAlias = Any
+"""Stands for what `rlacd.decompose` takes as a mesh."""
 
 Policy: TypeAlias = Any
 """Stands for `rlacd.Policy`, an object with a method `choose`: policies are built on top of options."""
@@ -93,6 +105,7 @@ _POLICY = custom(
     read_policy,
     "greedy navacd learned rl-acd FILE.npz …",
 )
+_AVOIDED = custom("a list of meshes or of paths of meshes", read_meshes)
 _CORNERS = integer(4, rule="an integer, at least 4 (a tetrahedron)")
 _OPENNESS = number(
     *(0.1, 0.99),
@@ -144,7 +157,7 @@ class Options:
     threshold
         The concavity a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with more hulls:
         0.02 is fine, 0.2 coarse. Also as a share of the longest side (2.5%) or, where the file says its unit, as a
-        length (0.05m), which is a distance.
+        length (0.05m), which is a distance. For a robot by default 1.5% of its longest side, as a distance.
     threshold_abs
         The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance.
     volume_tolerance
@@ -173,6 +186,9 @@ class Options:
         share of its radius (0.9) still fits between the hulls; also the radius of a ball that has to pass (2mm).
     keep_open_abs
         The radius of that ball as a length in the mesh's own unit.
+    avoid
+        Meshes in the same frame and unit that no hull enters: files, here. Parts are cut finer there, down to a
+        hundredth of the threshold. May be repeated.
     merge
         Join hulls where one is tight enough, also across what lies between them.
     policy
@@ -205,7 +221,8 @@ class Options:
     per_node
         Decompose each node of a scene separately, such as doors and drawers, which move.
     relative_to
-        With --per-node, whether --threshold is relative to the size of the whole scene or of each node.
+        What --threshold is relative to: with --per-node the whole scene or each node; of a robot all of it (scene) or
+        each mesh, whose criterion is then concavity.
     unit
         The unit of the mesh, which is converted to metres; file takes what the file says.
     scale
@@ -241,6 +258,7 @@ class Options:
     overlap_abs: float | None = option(None, LIMITS, LENGTH)
     keep_open: float | None = option(None, LIMITS, _OPENNESS, metavar="NUMBER", usual="passages may close")
     keep_open_abs: float | None = option(None, LIMITS, LENGTH)
+    avoid: Sequence[MeshLike] = option((), LIMITS, _AVOIDED, metavar="FILE", usual="nothing", repeated=True)
     merge: bool = option(True, METHOD, usual="merge")
     policy: str | Policy | None = option(None, METHOD, _POLICY, metavar="NAME", usual="greedy; learned with --no-merge")
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
@@ -353,8 +371,9 @@ class Options:
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as plain values, the criterion by its name or its own options, a policy by its name."""
-        plain = dataclasses.asdict(dataclasses.replace(self, policy="greedy"))
-        return plain | {"policy": policy_name(self.first_policy), "primitives": [*plain["primitives"]]}
+        plain = dataclasses.asdict(dataclasses.replace(self, policy="greedy", avoid=()))
+        own = {"policy": policy_name(self.first_policy), "primitives": [*plain["primitives"]]}
+        return plain | own | {"avoid": [mesh_name(mesh) for mesh in self.avoid]}
 
     def at_scale(self, scale: float) -> Options:
         """Get the same options with lengths as bare numbers, where a unit of the input is `scale` units of the frame.

@@ -1,4 +1,4 @@
-"""Names that options take: of the policies that choose cuts, and of the primitives that a part may become."""
+"""Names that options take: of the policies that choose cuts, of primitives, of meshes."""
 
 from __future__ import annotations
 
@@ -84,3 +84,28 @@ def read_primitives(given: Any) -> tuple[PrimitiveKind, ...]:
         raise TypeError
     names = {one_of(PRIMITIVE_KINDS).read(word) for word in given}
     return tuple(kind for kind in PRIMITIVE_KINDS if kind in names)
+
+
+def read_meshes(given: Any) -> tuple[Any, ...]:
+    """Read a list of meshes: paths, objects with vertices or a scene's geometry, or (vertices, faces).
+
+    Raises
+    ------
+    TypeError
+        It is no such list.
+    """
+    if not isinstance(given, (list, tuple)):
+        raise TypeError
+    for mesh in given:
+        is_pair = isinstance(mesh, tuple) and len(mesh) == 2
+        is_path = isinstance(mesh, (str, os.PathLike))
+        if not (is_pair or is_path or hasattr(mesh, "vertices") or hasattr(mesh, "geometry")):
+            raise TypeError
+    return tuple(given)
+
+
+def mesh_name(mesh: Any) -> str:
+    """Get a name for a mesh: its file's, or its own."""
+    if isinstance(mesh, (str, os.PathLike)):
+        return os.path.basename(os.fspath(mesh))
+    return str(getattr(mesh, "name", "a mesh"))

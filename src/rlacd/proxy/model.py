@@ -210,8 +210,9 @@ class Model:
 
     def tighter(self, goal: Criterion, factor: float = 1.0) -> Criterion:
         """Get what parts of the model have to meet so that those of the solid meet the goal, scaled by a factor."""
-        share = factor if self.proxy is None else factor - self.proxy.margin(goal)
-        return goal if share == 1.0 else goal.scaled(share)
+        if self.proxy is None:
+            return goal if factor == 1.0 else goal.scaled(factor)
+        return goal.alone.scaled(factor - self.proxy.margin(goal))
 
     def lift(
         self, parts: list[Part], goal: Criterion, factor: float, policy: Policy, run: Run, *, merge: bool
@@ -223,6 +224,6 @@ class Model:
             lift = Lift(self.solid, self.proxy, scaled, policy, run)
             parts = lift(parts, mend=run.stopped_by is None)
             if merge and run.stopped_by is None:  # the margin may have kept some apart
-                looser = scaled.scaled(1 + self.proxy.margin(goal))
+                looser = scaled.alone.scaled(1 + self.proxy.margin(goal))
                 parts = merge_lifted(parts, self.component, looser, lift.confirmed, run)
         return parts

@@ -3,84 +3,44 @@
 A geom's settings come from its own attributes and from defaults: its class, or the nearest ``childclass`` above it, and
 the classes that contain that class (https://mujoco.readthedocs.io, "Default settings").
 
+A geom with a name is a collider of its own, since sensors, contact pairs and programs go by names, and so is one of the
+world. The others of a body are joined where all they say is the same but their mesh, place, mass and colour. Bodies
+without joints stay apart from the one that carries them, as in MuJoCo, where they have names and frames.
+
 Hulls weigh nothing. A geom stays, without contacts, if its body's mass follows from it: then mass, centre and inertia
 are the original's, however they were given. A geom in a group that MuJoCo shows by default (0, 1, 2) may also be the
 only visible one of its body; unless another geom shows the same mesh there, it stays and remains visible.
-
-Files that ``<include>`` names are part of the model. Their paths are relative to the folder of the main file, or if
-nothing is there, to that of the file that names them.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import trimesh
 
-from rlacd.errors import MeshFileError
-from rlacd.io.robots.references import References
-from rlacd.io.robots.spans import Edit, Element, expand
-from rlacd.io.robots.urdf import HullFiles, MeshUse, Plan, read_scale
+from rlacd.io.robots.bodies import Body, Collider, PlacedMesh
+from rlacd.io.robots.mjcf_model import FILES, Compiler, Defaults
+from rlacd.io.robots.plan import HullFiles, Plan, Sources, colliders, read_scale
+from rlacd.io.robots.poses import Angles, inverse
+from rlacd.io.robots.spans import Edit, Element
 
 SHOWN, HIDDEN = ("0", "1", "2"), "3"
 """Groups that MuJoCo shows by default, and one that it does not."""
 
 BODIES = ("worldbody", "body", "frame", "replicate")
-STRIPPED = ("mesh", "texture", "hfield", "skin")
-FILES = (*STRIPPED, "include", "model")
 NAMED_BY = {"geom1": None, "geom2": None, "objname": "objtype", "refname": "reftype"}
 """Attributes that may name a geom, and those that then say so."""
 
-MOST_STL_FACES = 200_000
-"""Triangles of the largest STL file that MuJoCo reads."""
+OWN = ("mesh", "mass", "density", "shellinertia", "rgba", "material")
+PLACED = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+"""Attributes in which geoms that collide as one solid may differ."""
 
 LEAST_VOLUME = 1e-14
 """A mesh with less volume is refused by MuJoCo 4.0, unless its inertia is that of a shell."""
-
-
-TOP = "main"
-
-
-@dataclass
-class Defaults:
-    """Attributes by class and element, with what each class inherits."""
-
-    parents: dict[str, str | None] = field(default_factory=dict)
-    own: dict[tuple[str, str], dict[str, str]] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, root: Element) -> Defaults:
-        """Collect the ``<default>`` sections of a model; those at the top are one class, whatever its name."""
-        defaults = cls({TOP: None})
-        for section in root.named("default"):
-            defaults._gather(section, TOP, None)
-        return defaults
-
-    def _gather(self, section: Element, name: str, parent: str | None) -> None:
-        self.parents[name] = parent
-        for child in section.children:
-            if child.tag == "default":
-                self._gather(child, child.attributes.get("class", ""), name)
-            else:
-                self.own.setdefault((name, child.tag), {}).update(child.attributes)
-
-    def full(self, element: Element, childclass: str | None = None) -> dict[str, str]:
-        """Return the element's attributes, completed by those of its classes."""
-        name: str | None = element.attributes.get("class", childclass)
-        name = name if name in self.parents else TOP
-        chain: list[dict[str, str]] = []
-        while name is not None and name in self.parents and len(chain) <= len(self.parents):
-            chain.append(self.own.get((name, element.tag), {}))
-            name = self.parents[name]
-        merged: dict[str, str] = {}
-        for attributes in (*reversed(chain), element.attributes):
-            merged.update(attributes)
-        return merged
 
 
 @dataclass(frozen=True)
@@ -106,137 +66,124 @@ class _Geom:
         """Whether it stays, without contacts; a shape for fluids belongs to the whole, not to its hulls."""
         return self.is_seen or self.is_weighed or self.attributes.get("fluidshape", "none") != "none"
 
+    @property
+    def name(self) -> str | None:
+        """Its name, by which other elements and programs refer to it."""
+        return self.element.attributes.get("name")
+
+    @property
+    def body(self) -> Element:
+        """The body that it belongs to."""
+        return next(element for element in self.element.up() if element.tag in ("body", "worldbody"))
+
+    @property
+    def kind(self) -> Hashable | None:
+        """Equal for geoms of a body that may become one solid; None if it stays apart."""
+        if self.name is not None or self.body.tag == "worldbody":
+            return None
+        copied = next(element for element in self.element.up() if element.tag in ("replicate", "body"))
+        said = sorted((name, value) for name, value in self.attributes.items() if name not in (*OWN, *PLACED))
+        return id(copied), self.is_seen, *said
+
 
 class _Mesh(NamedTuple):
-    """A mesh that is replaced: its name, its asset, the asset's attributes with those of its classes, and its use."""
+    """A mesh that is replaced: its asset, the asset's attributes with those of its classes, and its file, unplaced."""
 
     name: str
     asset: Element
     full: Mapping[str, str]
-    use: MeshUse
+    placed: PlacedMesh
 
 
-@dataclass(frozen=True)
-class Compiler:
-    """What all ``<compiler>`` elements of a model say together: later ones overrule."""
-
-    settings: Mapping[str, str]
-    root: Element
-
-    @classmethod
-    def of(cls, root: Element) -> Compiler:
-        """Collect the settings."""
-        settings: dict[str, str] = {}
-        for compiler in root.named("compiler"):
-            new = dict(compiler.attributes)
-            if "assetdir" in new:
-                new = {"meshdir": new["assetdir"], "texturedir": new["assetdir"], **new}
-            settings.update(new)
-        return cls(settings, root)
-
-    @property
-    def strips(self) -> bool:
-        """Whether only the last part of each name counts. Hulls are in a folder, so the result says otherwise."""
-        return self.settings.get("strippath") == "true"
-
-    @property
-    def mesh_folder(self) -> str:
-        """The folder of meshes, relative to that of the main file."""
-        return self.settings.get("meshdir", "")
-
-    def relocated(self, element: Element) -> str | None:
-        """The file that an element names, seen from the main file and not stripped, if its text is not that."""
-        own, main = element.attributes.get("file", ""), self.root.file.folder
-        name = re.split(r"[/\\]", own)[-1] if self.strips and element.tag in STRIPPED else own
-        where = {"include": "", "texture": "texturedir"}.get(element.tag, "meshdir")
-        folder = main / self.settings.get(where, "")
-        inner = element.file.folder
-        if name and inner != main and inner.is_relative_to(main) and not (folder / name).exists():
-            moved = inner.relative_to(main) / name
-            name = moved.as_posix() if (folder / moved).exists() else name
-        return None if name == own else name
-
-    def is_weighed(self, geom: Element, full: Mapping[str, str]) -> bool:
-        """Tell whether the mass of the geom's body follows from the geom."""
-        body = next((element for element in geom.up() if element.tag in ("body", "worldbody")), None)
-        when = self.settings.get("inertiafromgeom", "auto")
-        if body is None or body.tag == "worldbody" or when == "false":
-            return False
-        if when != "true" and any(body.named("inertial")):
-            return False
-        first, last = (*_numbers(geom, self.settings, "inertiagrouprange", "0 5"), 5.0)[:2]
-        if not first <= _numbers(geom, full, "group", "0")[0] <= last:
-            return False
-        return _numbers(geom, full, "mass" if "mass" in full else "density", "1000")[0] != 0
-
-
-def read_model(root: Element, references: References, read: Callable[[Path], bytes]) -> Compiler:
-    """Bring in what the model includes, and return the settings of the whole.
-
-    Raises
-    ------
-    MeshFileError
-        A file cannot be read, may not be, or is included twice.
-    """
-
-    def find(name: str, element: Element) -> Path:
-        main = root.file.folder
-        return references.find(name, main if (main / name).is_file() else element.file.folder)
-
-    expand(root, find, read)
-    return Compiler.of(root)
-
-
-def plan_mjcf(compiler: Compiler, references: References, named: Callable[[str, str], str]) -> Plan:
+def plan_mjcf(compiler: Compiler, sources: Sources) -> Plan:
     """Find the collision meshes of an MJCF model; the rest is as for `rlacd.io.robots.urdf.plan_urdf`."""
     root = compiler.root
     defaults = Defaults.of(root)
     assets = {_mesh_name(mesh, defaults): mesh for section in root.named("asset") for mesh in section.named("mesh")}
     warnings: list[str] = []
     geoms = [geom for body in root.walk() if body.tag in BODIES for geom in _colliding(body, defaults, compiler)]
-    meshes = []
+    meshes: dict[str, _Mesh] = {}
     for name in dict.fromkeys(geom.mesh for geom in geoms):
         full = defaults.full(assets[name]) if name in assets else {}
         if "file" in full:
-            meshes.append(_Mesh(name, assets[name], full, _use(assets[name], full, references, compiler)))
+            meshes[name] = _Mesh(name, assets[name], full, _unplaced(assets[name], full, compiler, sources))
         else:
             why = "has no file of its own" if name in assets else "is not in the file"
             warnings.append(f"The mesh {name} is left unchanged: it {why}.")
-    replaced = {mesh.name for mesh in meshes}
-    geoms = [geom for geom in geoms if geom.mesh in replaced]
+    geoms = [geom for geom in geoms if geom.mesh in meshes]
     warnings += _caveats(root, geoms)
-    rewritten = {mesh.asset for mesh in meshes}
+    rewritten = {mesh.asset for mesh in meshes.values()}
     files = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
     relative = [file for file in files if file and not Path(file).is_absolute()]
+    bodies, found = _bodies(geoms, meshes, compiler, apart=sources.apart)
 
-    def edit(hulls: HullFiles, sources: Mapping[MeshUse, trimesh.Trimesh], copies: Mapping[MeshUse, str]) -> list[Edit]:
+    def edit(hulls: HullFiles, copies: Mapping[Path, str]) -> list[Edit]:
         taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
-        names: dict[str, list[str]] = {}
-        edits, own = [], {*taken}
-        for mesh in meshes:
-            names[mesh.name] = [_unused(f"{mesh.name}_{i:03d}", own) for i in range(len(hulls[mesh.use]))]
-            edits.append(_hull_assets(mesh, named, zip(names[mesh.name], hulls[mesh.use], strict=True)))
+        names, edits = _hull_assets(found, meshes, hulls, sources.named, {*taken})
+        for mesh in meshes.values():
             values = {"file": moved} if (moved := compiler.relocated(mesh.asset)) is not None else {}
-            if mesh.use in copies:
-                values["file"] = named(mesh.full["file"], copies[mesh.use])
-            if _lacks_volume(sources[mesh.use], mesh.full.get("inertia", "legacy")):
+            path = mesh.placed.surface.path
+            if path in copies:
+                values["file"] = sources.named(mesh.full["file"], copies[path])
+            if _lacks_volume(mesh.placed, mesh.full.get("inertia", "legacy")):
                 values["inertia"] = "shell"
                 weighed = any(g.mesh == mesh.name and g.is_weighed and "mass" not in g.attributes for g in geoms)
                 said = " Its mass is its area times the density." if weighed else ""
-                warnings.append(f'{mesh.use.path.name} has no volume, so its mesh got inertia="shell".{said}')
+                warnings.append(f'{path.name} has no volume, so its mesh got inertia="shell".{said}')
             edits += [mesh.asset.replaced(mesh.asset.with_attributes(values))] if values else []
-        edits += [_geom_edit(geom, names[geom.mesh], taken) for geom in geoms]
+        for collider, together in found.items():
+            edits += _geom_edits(together, names[collider], taken)
         return edits + _relocations(compiler, edits, rewritten)
 
-    return Plan(list(dict.fromkeys(mesh.use for mesh in meshes)), edit, relative, warnings)
+    return Plan(bodies, edit, relative, warnings)
 
 
-def _hull_assets(mesh: _Mesh, named: Callable[[str, str], str], hulls: Iterable[tuple[str, str]]) -> Edit:
-    """Add the hulls' assets, by name and file, behind that of their mesh."""
-    asset, full = mesh.asset, mesh.full
-    shell = {"inertia": "shell"} if "inertia" in full else {}  # hulls weigh nothing, and may be too thin for the others
-    copies = [asset.with_attributes({"name": new, "file": named(full["file"], file), **shell}) for new, file in hulls]
-    return Edit(asset.file, asset.end, asset.end, b"".join(asset.indent + copy for copy in copies))
+def _bodies(
+    geoms: Sequence[_Geom], meshes: Mapping[str, _Mesh], compiler: Compiler, *, apart: bool
+) -> tuple[list[Body], dict[Collider, list[_Geom]]]:
+    """Sort geoms by their bodies, and by what may become one solid."""
+    of_body: dict[Element, list[_Geom]] = {}
+    for geom in geoms:
+        of_body.setdefault(geom.body, []).append(geom)
+    order = [element for element in compiler.root.walk() if element.tag == "body"]
+    bodies: list[Body] = []
+    found: dict[Collider, list[_Geom]] = {}
+    for element, own in of_body.items():
+        name = "world" if element.tag == "worldbody" else element.attributes.get("name")
+        name = f"body_{order.index(element) + 1}" if name is None else name
+        placed = [replace(meshes[g.mesh].placed, to_body=compiler.to_body(g.element, g.attributes)) for g in own]
+        uses = [(None if apart else geom.kind, at, geom) for geom, at in zip(own, placed, strict=True)]
+        joined = colliders(name, uses)
+        bodies.append(Body(name, compiler.pose(element.up()), [*joined], element.tag == "worldbody"))
+        found |= joined
+    return bodies, found
+
+
+def _hull_assets(
+    found: Mapping[Collider, Sequence[_Geom]],
+    meshes: Mapping[str, _Mesh],
+    hulls: HullFiles,
+    named: Callable[[str, str], str],
+    taken: set[str],
+) -> tuple[dict[Collider, list[str]], list[Edit]]:
+    """Name the hulls, and add their assets behind those of the meshes whose place they take."""
+    names: dict[Collider, list[str]] = {}
+    done: dict[tuple[str, ...], list[str]] = {}
+    behind: dict[str, list[bytes]] = {}
+    for collider, geoms in found.items():
+        mesh = meshes[geoms[0].mesh]
+        if (key := (mesh.name, *hulls[collider])) not in done:
+            stem = mesh.name if len(geoms) == 1 else collider.name
+            done[key] = [_unused(f"{stem}_{i:03d}", taken) for i in range(len(hulls[collider]))]
+            own = zip(done[key], hulls[collider], strict=True)
+            values = [{"name": name, "file": named(mesh.full["file"], file)} for name, file in own]
+            if "inertia" in mesh.full:  # hulls weigh nothing, and may be too thin for the others
+                values = [each | {"inertia": "shell"} for each in values]
+            behind.setdefault(mesh.name, []).extend(mesh.asset.with_attributes(each) for each in values)
+        names[collider] = done[key]
+    ends = [(meshes[name].asset, copies) for name, copies in behind.items()]
+    edits = [Edit(e.file, e.end, e.end, b"".join(e.indent + copy for copy in copies)) for e, copies in ends]
+    return names, edits
 
 
 def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) -> list[Edit]:
@@ -259,59 +206,51 @@ def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) 
     return [element.replaced(element.with_attributes(values)) for element, values in moved.items()]
 
 
-def _geom_edit(geom: _Geom, meshes: list[str], taken: set[str]) -> Edit:
-    element = geom.element
-    own = element.attributes.get("name")
-    pieces = []
-    if geom.is_kept:
-        values = {"contype": "0", "conaffinity": "0"}
-        if own is not None:
-            values["name"] = _unused(f"{own}_visual" if geom.is_seen else f"{own}_mass", taken)
-        if not geom.is_seen:
-            values["rgba"] = "0 0 0 0"  # neither drawn nor hit by rays
-        pieces.append(element.with_attributes(values))
+def _geom_edits(geoms: Sequence[_Geom], meshes: Sequence[str], taken: set[str]) -> list[Edit]:
+    """Put a geom for each hull in the place of the first; all that stay no longer collide."""
+    edits = []
+    for geom in geoms:
+        pieces = [_kept(geom, taken)] if geom.is_kept else []
+        pieces += _hull_geoms(geom, meshes, taken) if geom is geoms[0] else []
+        element = geom.element
+        edits.append(element.replaced(element.indent.join(pieces)) if pieces else element.removed())
+    return edits
+
+
+def _kept(geom: _Geom, taken: set[str]) -> bytes:
+    values = {"contype": "0", "conaffinity": "0"}
+    if geom.name is not None:
+        values["name"] = _unused(f"{geom.name}_visual" if geom.is_seen else f"{geom.name}_mass", taken)
+    if not geom.is_seen:
+        values["rgba"] = "0 0 0 0"  # neither drawn nor hit by rays
+    return geom.element.with_attributes(values)
+
+
+def _hull_geoms(geom: _Geom, meshes: Sequence[str], taken: set[str]) -> Iterator[bytes]:
     for index, mesh in enumerate(meshes):
         values = {"mesh": mesh, "mass": "0"}
-        if own is not None and index:  # the first keeps the name, since other elements may refer to it
-            values["name"] = _unused(f"{own}_{index:03d}", taken)
+        if geom.name is not None and index:  # the first keeps the name, since other elements may refer to it
+            values["name"] = _unused(f"{geom.name}_{index:03d}", taken)
         if geom.is_seen:
             values["group"] = HIDDEN
         if "fluidshape" in geom.attributes and geom.is_kept:
             values["fluidshape"] = "none"
-        pieces.append(element.with_attributes(values))
-    return element.replaced(element.indent.join(pieces))
+        yield geom.element.with_attributes(values)
 
 
-def _numbers(geom: Element, attributes: Mapping[str, str], name: str, default: str) -> list[float]:
-    """Read the numbers of an attribute, at least one."""
-    text = attributes.get(name, default)
-    try:
-        return [float(word) for word in text.split()] or [float(text)]
-    except ValueError as error:
-        where = geom.attributes.get("name", "without a name")
-        raise MeshFileError(f"the {name} of the geom {where} is {text!r}, which is no number: correct it.") from error
-
-
-def _lacks_volume(mesh: trimesh.Trimesh, inertia: str) -> bool:
+def _lacks_volume(mesh: PlacedMesh, inertia: str) -> bool:
     """Tell whether MuJoCo would refuse to find the inertia of the mesh in this way."""
     if inertia == "shell" or not len(mesh.faces):
         return False
-    corners = mesh.vertices.astype(np.float32).astype(float)[mesh.faces]
+    corners = mesh.points.astype(np.float32).astype(float)[mesh.faces]
     corners -= corners.reshape(-1, 3).mean(axis=0)
     volumes = np.linalg.det(corners) / 6
     if inertia == "exact":
-        return bool(volumes.sum() < LEAST_VOLUME or not mesh.is_winding_consistent)
+        return bool(
+            volumes.sum() < LEAST_VOLUME
+            or not trimesh.Trimesh(mesh.points, mesh.faces, process=False).is_winding_consistent
+        )
     return bool(np.abs(volumes).sum() < LEAST_VOLUME)
-
-
-def mujoco_reads(path: Path) -> bool:
-    """Tell whether MuJoCo reads a mesh file: OBJ, its own MSH, and binary STL of at most 200,000 triangles."""
-    ending = path.suffix.lower()
-    if ending != ".stl":
-        return ending in (".obj", ".msh")
-    with path.open("rb") as file:
-        count = int.from_bytes(file.read(84)[80:], "little")
-    return count <= MOST_STL_FACES and path.stat().st_size == 84 + 50 * count
 
 
 def _unused(name: str, taken: set[str]) -> str:
@@ -336,11 +275,13 @@ def _collides(attributes: Mapping[str, str]) -> bool:
     return any(attributes.get(name, "1").strip() != "0" for name in ("contype", "conaffinity"))
 
 
-def _use(asset: Element, full: Mapping[str, str], references: References, compiler: Compiler) -> MeshUse:
+def _unplaced(asset: Element, full: Mapping[str, str], compiler: Compiler, sources: Sources) -> PlacedMesh:
+    """Read the file of an asset; its coordinates are taken from ``refpos`` and ``refquat``, then scaled."""
     where = f"mesh {full.get('name', full['file'])} of {asset.file.path}"
     folder = compiler.root.file.folder / compiler.mesh_folder
-    place = references.find(compiler.relocated(asset) or full["file"], folder)
-    return MeshUse(place, read_scale(full.get("scale"), where))
+    place = sources.references.find(compiler.relocated(asset) or full["file"], folder)
+    turned = Angles().pose({"pos": full.get("refpos", "0 0 0"), "quat": full.get("refquat", "1 0 0 0")}, where)
+    return PlacedMesh(sources.load(place), read_scale(full.get("scale"), where), np.eye(4), inverse(turned))
 
 
 def _mesh_name(mesh: Element, defaults: Defaults) -> str:

@@ -1,76 +1,42 @@
-"""Rewriting a robot: plan from the file, decompose each mesh once, write hulls and file."""
+"""Rewriting a robot: plan from the file, decompose each solid once, write hulls and file."""
 
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import trimesh
-from numpy.typing import NDArray
-
-from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshError, MeshFileError, OptionError
+from rlacd.errors import MeshFileError, OptionError
 from rlacd.io.read.contents import Triangles
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
-from rlacd.io.robots.mjcf import mujoco_reads, plan_mjcf, read_model
+from rlacd.io.robots.bodies import Body, Collider, Surface, size_of
+from rlacd.io.robots.clearance import checked_links, motion_of, resting
+from rlacd.io.robots.decomposed import check_options, decompose_bodies
+from rlacd.io.robots.matrix import chosen, excludes
+from rlacd.io.robots.matrix import srdf as srdf_of
+from rlacd.io.robots.mjcf import plan_mjcf
+from rlacd.io.robots.mjcf_model import mujoco_reads, read_model
+from rlacd.io.robots.plan import Plan, Sources
 from rlacd.io.robots.references import References
+from rlacd.io.robots.rewritten import Rewritten, RewrittenLink, grouped, warnings_of
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
-from rlacd.io.robots.urdf import MeshUse, Plan, plan_urdf
+from rlacd.io.robots.urdf import plan_urdf
 from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
-from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
-from rlacd.solid.frame import Frame
-from rlacd.solid.hull import Hull
+from rlacd.options.robots import PairKind, Per, RobotOptions
 
 ENDINGS = {".urdf": "urdf", ".xml": "mjcf"}
 ROOTS = {"urdf": "robot", "mjcf": "mujoco"}
-
-
-@dataclass(frozen=True)
-class RewrittenMesh:
-    """One collision mesh: its file, the names of its hulls' files, and its decomposition at the scale of its use."""
-
-    path: Path
-    files: list[str]
-    result: Decomposition
-
-
-@dataclass(frozen=True)
-class Rewritten:
-    """The result of rewriting a robot.
-
-    Attributes
-    ----------
-    path
-        The new description.
-    folder
-        Where its hulls are, as OBJ files.
-    meshes
-        The collision meshes that were replaced, each once.
-    warnings
-        What the user should know: one sentence each.
-    """
-
-    path: Path
-    folder: Path
-    meshes: list[RewrittenMesh]
-    warnings: list[str]
-
-    @property
-    def complete(self) -> bool:
-        """False when a decomposition was stopped early."""
-        return all(mesh.result.report.get("complete", True) for mesh in self.meshes)
 
 
 def is_robot(path: str | os.PathLike[str]) -> bool:
@@ -84,6 +50,11 @@ def rewrite_robot(
     *,
     package_dirs: Sequence[str] = (),
     keep_input: bool = False,
+    per: Per = "link",
+    links: Mapping[str, float] | None = None,
+    samples: int = 500,
+    exclude: str | Sequence[PairKind] = (),
+    srdf: str | os.PathLike[str] | None = None,
     **options: Any,
 ) -> Rewritten:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
@@ -101,9 +72,26 @@ def rewrite_robot(
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and is searched for packages.
     keep_input : bool
         Of a USD stage, write one file that holds all of it, instead of a layer over the original.
+    per : "link" or "mesh"
+        What is decomposed as one solid: all collision meshes of a link (URDF), body (MJCF) or rigid body (USD) that
+        share their contact properties, or each mesh. Links that fixed joints connect stay apart; so do MJCF geoms with
+        a name, and meshes that belong to no body.
+    links : dict, optional
+        For the links whose whole name matches a regular expression, another `threshold_abs`: ``{"finger.*": 0.001}``.
+        The last that matches counts.
+    samples : int
+        Joint positions within their limits, beside that at rest, at which links are looked at: those whose meshes do
+        not touch there do not touch as hulls either, and are cut finer where they would, or a warning names both. Needs
+        the extra ``clear``. USD stages are looked at as they stand.
+    exclude : sequence of "adjacent", "always" and "never"
+        Pairs of bodies of an MJCF model to add as ``<exclude>``, by when their hulls touch at these positions.
+    srdf : path-like, optional
+        For a URDF, where to write them as ``<disable_collisions>`` for MoveIt.
     **options
-        Those of `rlacd.decompose`, for each mesh. Lengths such as `threshold_abs` are in the robot's unit, after the
-        scale of a mesh; a `timeout` applies to each mesh.
+        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
+        the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
+        ``relative_to="mesh"`` to each solid, whose criterion and threshold are then those of `rlacd.decompose`. Lengths
+        such as `threshold_abs` are in the robot's unit, after the scale of a mesh. A `timeout` applies to each solid.
 
     Returns
     -------
@@ -119,55 +107,73 @@ def rewrite_robot(
         The place cannot be written to.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
-    _check_options(options)
+    asked = RobotOptions(per, links, samples, exclude, None if srdf is None else os.fspath(srdf))
+    _check_matrix(source, asked)
+    check_options(options)
     if source.suffix.lower() in usd.ENDINGS:
         _check_place(source, place, usd.ENDINGS)
-        return rewrite_stage(usd.read_colliders(source), place, options, keep_input=keep_input)
+        return rewrite_stage(usd.read_colliders(source), place, options, asked, keep_input=keep_input)
     if keep_input:
         raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
-    packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
+    packages, began = checked(OutputOptions, "package_dirs", package_dirs) or (), time.perf_counter()
     kind, root, folder = _opened(source, place)
-    references = References(source, packages)
-    plan, warnings = _plan(root, kind, references, place, folder)
-    if not plan.uses:
+    plan, warnings = _plan(root, kind, References(source, packages), place, folder, apart=asked.per == "mesh")
+    if not plan.bodies:
         write_file(place, root.file.data)
-        return Rewritten(place, folder, [], [f"{source} has no collision mesh, so this is a copy.", *warnings])
-    stem = file_stem(place.stem)
-    meshes: dict[MeshUse, RewrittenMesh] = {}
-    files: dict[str, bytes] = {}
-    copies: dict[MeshUse, str] = {}
-    for use, name in zip(plan.uses, _stems([use.path for use in plan.uses]), strict=True):
-        result, said = _decomposed(use, options)
-        hulls = {f"{stem}_{name}_{i:03d}.obj": encode_plain_obj(_unscaled(h, use)) for i, h in enumerate(result.hulls)}
-        if kind == "mjcf" and not mujoco_reads(use.path):
-            copies[use] = f"{stem}_{name}_visual.obj"
-            plain = Triangles(result.source.vertices / use.scale, _oriented(result.source.faces, use))
-            files[copies[use]] = encode_plain_obj(plain)  # without the scale, which is applied when it is read
-        files |= hulls
-        meshes[use] = RewrittenMesh(use.path, list(hulls), result)
-        warnings += [*said, *(f"{use.path.name}: {warning}" for warning in result.report.get("warnings", []))]
-    named = {use: mesh.files for use, mesh in meshes.items()}
-    edits = plan.edit(named, {use: mesh.result.source for use, mesh in meshes.items()}, copies)
-    data = edited(root, edits)
-    warnings += [warning for warning in plan.warnings if warning not in warnings] + _fewer(meshes, options)
+        said = [f"{source} has no collision mesh, so this is a copy.", *warnings]
+        return Rewritten(place, folder, [], said, time.perf_counter() - began, 0.0)
+    results = decompose_bodies(plan.bodies, options, asked)
+    motion = partial(motion_of, kind, source, plan.bodies, asked, options.get("seed") or 0)
+    clear = checked_links(plan.bodies, results, motion, options, asked)
+    results, stem = clear.results, file_stem(place.stem)
+    files, names = _hull_files(stem, results)
+    copies = _copies(stem, plan.bodies) if kind == "mjcf" else {}
+    files |= {name: encode_plain_obj(Triangles(mesh.vertices, mesh.faces)) for mesh, name in copies.items()}
+    edits, said = excludes(root, chosen(clear.pairs, asked.exclude))
+    data = edited(root, [*plan.edit(names, {mesh.path: name for mesh, name in copies.items()}), *edits])
+    warnings += [warning for warning in plan.warnings if warning not in warnings]
+    warnings += [*warnings_of(results), *clear.warnings, *said]
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
-    return Rewritten(place, folder, list(meshes.values()), warnings)
+    if asked.srdf is not None:
+        write_file(Path(asked.srdf), srdf_of(root.attributes.get("name", "robot"), clear.pairs))
+    made = [RewrittenLink.of(body, results, names) for body in plan.bodies]
+    seconds, size = time.perf_counter() - began, size_of(plan.bodies)
+    return Rewritten(place, folder, made, warnings, seconds, size, 1.0, clear.pairs, clear.samples)
 
 
 def rewrite_stage(
-    stage: usd.Colliders, place: Path, options: Mapping[str, Any], *, keep_input: bool = False
+    stage: usd.Colliders, place: Path, options: Mapping[str, Any], robot: RobotOptions, *, keep_input: bool = False
 ) -> Rewritten:
     """Rewrite a USD stage that has been read, as `rewrite_robot` does."""
+    began = time.perf_counter()
     _check_place(stage.source, place, usd.ENDINGS)
-    _check_options(options)
-    data, done, warnings, files = usd.encode_layer(stage, place, lambda mesh: _coarse(mesh, options), flat=keep_input)
-    warnings += _left_behind(files, stage.source.parent, place)
-    meshes = [RewrittenMesh(Path(path), [*map(hull_name, range(len(hulls)))], hulls) for path, hulls in done.items()]
-    if not meshes:
+    check_options(options)
+    bodies, prims = usd.bodies_of(stage, apart=robot.per == "mesh")
+    results = decompose_bodies(bodies, options, robot)
+    fixed = {node["path"] for node in stage.nodes if not node["body"]}
+    clear = checked_links(bodies, results, lambda: (resting(bodies, fixed), []), options, robot, stage.metres)
+    results = clear.results
+    data, warnings, files = usd.encode_layer(stage, place, prims, results, flat=keep_input)
+    warnings += [*warnings_of(results), *clear.warnings, *_left_behind(files, stage.source.parent, place)]
+    names = {collider: [*map(hull_name, range(len(result)))] for collider, result in results.items()}
+    made = [RewrittenLink.of(body, results, names) for body in bodies]
+    if not made:
         warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
-    return Rewritten(place, place, meshes, warnings)
+    seconds, size = time.perf_counter() - began, size_of(bodies)
+    return Rewritten(place, place, made, warnings, seconds, size, stage.metres, clear.pairs, clear.samples)
+
+
+def _check_matrix(source: Path, robot: RobotOptions) -> None:
+    """Check that what is asked about pairs of links is for this kind of file."""
+    ending = source.suffix.lower()
+    if robot.exclude and ending != ".xml":
+        raise OptionError("exclude (--exclude) is for MJCF; for a URDF give srdf (--srdf).")
+    if robot.srdf is not None:
+        if ending != ".urdf":
+            raise OptionError("srdf (--srdf) is for a URDF; for MJCF give exclude (--exclude).")
+        check_file(Path(robot.srdf))
 
 
 def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:
@@ -194,23 +200,60 @@ def _opened(source: Path, place: Path) -> tuple[str, Element, Path]:
     return kind, root, folder
 
 
-def _check_options(options: Mapping[str, Any]) -> None:
-    Options.of({name: value for name, value in options.items() if name != "progress"})
-    for name in ("unit", "scale", "per_node"):
-        if options.get(name):
-            raise OptionError(f"{name} is for a single mesh; a robot file states it for each of its meshes.")
-
-
-def _plan(root: Element, kind: str, references: References, place: Path, folder: Path) -> tuple[Plan, list[str]]:
-    source = root.file.folder
+def _plan(
+    root: Element, kind: str, references: References, place: Path, folder: Path, *, apart: bool
+) -> tuple[Plan, list[str]]:
+    source, said = root.file.folder, list[tuple[str, str, float]]()
+    load = cache(lambda path: _surface(path, said))
     if kind == "urdf":
-        plan = plan_urdf(root, references, lambda old, hull: _reference(old, hull, references, folder))
+        sources = Sources(references, load, lambda old, hull: _reference(old, hull, references, folder), apart)
+        plan = plan_urdf(root, sources)
     else:
         compiler = read_model(root, references, lambda path: read_named(path, LARGEST_DESCRIPTION))
         within = os.path.relpath(source / compiler.mesh_folder, source)  # the same from the new file
         target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
-        plan = plan_mjcf(compiler, references, lambda _, hull: (Path(target) / hull).as_posix())
-    return plan, [*plan.warnings, *_left_behind(plan.relative, source, place)]
+        plan = plan_mjcf(compiler, Sources(references, load, lambda _, hull: (Path(target) / hull).as_posix(), apart))
+    return plan, [*plan.warnings, *_left_behind(plan.relative, source, place), *grouped(said)]
+
+
+def _surface(path: Path, said: list[tuple[str, str, float]]) -> Surface:
+    """Read a mesh file, in the unit that a COLLADA file states: ROS, Gazebo and Bullet apply it.
+
+    Whether such a file whose y axis points up is turned differs between them, so that is a warning.
+    """
+    mesh = load_mesh(path)
+    said += [(path.name, warning, 0.0) for warning in mesh.warnings]
+    if path.suffix.lower() != ".dae":
+        return Surface(path, mesh.vertices, mesh.faces)
+    if mesh.up != "z":
+        turned = f"{mesh.up.upper()}_UP is declared, and some programs rotate such a file when they read it"
+        said.append((path.name, f"{turned}; hulls keep its coordinates.", 0.0))
+    return Surface(path, mesh.vertices * (mesh.metres or 1.0), mesh.faces)
+
+
+def _hull_files(
+    stem: str, results: Mapping[Collider, Decomposition]
+) -> tuple[dict[str, bytes], dict[Collider, list[str]]]:
+    """The files of all hulls, and the names of each collider's; what is the same is written once."""
+    files: dict[str, bytes] = {}
+    names: dict[Collider, list[str]] = {}
+    done: dict[Any, list[str]] = {}
+    taken: set[str] = set()
+    for collider, result in results.items():
+        key = id(result), collider.meshes[0].key
+        if key not in done:
+            name = _stem(collider.name, taken)
+            done[key] = [f"{stem}_{name}_{i:03d}.obj" for i in range(len(result))]
+            files |= {at: encode_plain_obj(collider.in_file(h)) for at, h in zip(done[key], result, strict=True)}
+        names[collider] = done[key]
+    return files, names
+
+
+def _copies(stem: str, bodies: Sequence[Body]) -> dict[Surface, str]:
+    """Names for copies of the meshes that MuJoCo cannot read."""
+    meshes = [mesh.surface for body in bodies for collider in body.colliders for mesh in collider.meshes]
+    unread, taken = [mesh for mesh in dict.fromkeys(meshes) if not mujoco_reads(mesh.path)], set[str]()
+    return {mesh: f"{stem}_{_stem(mesh.path.stem, taken)}_visual.obj" for mesh in unread}
 
 
 def _left_behind(files: Sequence[str], source: Path, place: Path) -> list[str]:
@@ -232,77 +275,12 @@ def _reference(old: str, hull: str, references: References, folder: Path) -> str
     return f"{folder.name}/{hull}"
 
 
-def _fewer(meshes: Mapping[MeshUse, RewrittenMesh], options: Mapping[str, Any]) -> list[str]:
-    """Say that one length for the whole robot may do, where meshes of other sizes each became many hulls."""
-    hulls = sum(len(mesh.files) for mesh in meshes.values())
-    reports = [mesh.result.report for mesh in meshes.values()]
-    scales = [report["scale"] for report in reports]
-    stated = any(options.get(name) is not None for name in ("threshold_abs", "max_hulls", "timeout"))
-    stated |= options.get("criterion") not in (None, "concavity")
-    if stated or max(scales) < 2 * min(scales) or hulls < MANY_HULLS * len(meshes):
-        return []
-    length = float(f"{1.05 * reports[0]['options']['threshold'] / min(scales):.2g}")  # 5 %: never rounded below it
-    said = f"{len(meshes)} meshes became {hulls} hulls, because the threshold is relative to each"
-    return [f"{said}; --threshold-abs {length:g}, about that of the largest, may give fewer."]
-
-
-MANY_HULLS = 10
-"""Hulls per mesh from which on a length is suggested."""
-
-
-def _coarse(mesh: trimesh.Trimesh, options: Mapping[str, Any]) -> Decomposition:
-    """Decompose a mesh with a length as the threshold; one that is larger than the mesh is cut to it."""
-    given = dict(options)
-    if isinstance(given.get("threshold_abs"), (int, float)):
-        scale = Frame.of(mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices).scale
-        given["threshold_abs"] = min(given["threshold_abs"], LENGTHS["threshold"][1] / scale)
-    return decompose((mesh.vertices, mesh.faces), **given)
-
-
-def _decomposed(use: MeshUse, options: Mapping[str, Any]) -> tuple[Decomposition, list[str]]:
-    """Decompose a mesh, in the unit that a COLLADA file states: ROS, Gazebo and Bullet apply it.
-
-    Whether such a file whose y axis points up is turned differs between them, so that is a warning.
-    """
-    try:
-        read = load_mesh(use.path)
-        is_collada = use.path.suffix.lower() == ".dae"
-        unit = (read.metres or 1.0) if is_collada else 1.0
-        mesh = trimesh.Trimesh(read.vertices * unit * use.scale, _oriented(read.faces, use), process=False)
-        turned = f"{use.path.name} declares {read.up.upper()}_UP, and some programs rotate such a file when they read"
-        said = [f"{turned} it; its hulls keep its coordinates."] if is_collada and read.up != "z" else []
-        return _coarse(mesh, options), said
-    except MeshError as error:
-        if str(use.path) in str(error):
-            raise
-        raise type(error)(f"{use.path}: {error}") from error
-
-
-def _unscaled(hull: trimesh.Trimesh, use: MeshUse) -> trimesh.Trimesh:
-    """Divide a hull by the description's scale, which is applied again when the hull is read."""
-    with np.errstate(over="ignore"):
-        points = np.ascontiguousarray(hull.vertices / use.scale)
-    if not np.isfinite(points).all():
-        raise MeshFileError(f"{use.path} has the scale {use.scale}, which cannot be inverted: correct the scale.")
-    exact = Hull.of(points)
-    if exact is not None:
-        return trimesh.Trimesh(exact.vertices, exact.faces, process=False)
-    return trimesh.Trimesh(points, _oriented(hull.faces, use), process=False)
-
-
-def _oriented(faces: NDArray[Any], use: MeshUse) -> NDArray[Any]:
-    """Turn faces around if the scale mirrors."""
-    return faces if np.prod(np.sign(use.scale)) > 0 else faces[:, ::-1]
-
-
-def _stems(paths: Sequence[Path]) -> list[str]:
-    """Name each mesh after its file; names that would collide on any file system get a number."""
-    stems: list[str] = []
-    for path in paths:
-        plain = stem = file_stem(path.stem)
-        number = 1
-        while stem.lower() in {other.lower() for other in stems}:
-            number += 1
-            stem = f"{plain}_{number}"
-        stems.append(stem)
-    return stems
+def _stem(name: str, taken: set[str]) -> str:
+    """A name for files; one that would collide on any file system gets a number."""
+    plain = stem = file_stem(name)
+    number = 1
+    while stem.lower() in taken:
+        number += 1
+        stem = f"{plain}_{number}"
+    taken.add(stem.lower())
+    return stem

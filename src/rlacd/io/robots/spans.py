@@ -105,6 +105,10 @@ class Element:
         """The edit that puts other bytes in the place of the element."""
         return Edit(self.file, self.start, self.end, new)
 
+    def removed(self) -> Edit:
+        """The edit that takes the element out, with the white space before it on its line."""
+        return Edit(self.file, self.start - len(self.indent), self.end, b"")
+
     def with_attributes(self, values: Mapping[str, str]) -> bytes:
         """Return the element's bytes with attributes set in its start tag, and the rest unchanged."""
         head, rest = self.file.data[self.start : self.head], self.file.data[self.head : self.end]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,15 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.io.read.apart import answer_of
+from rlacd.io.robots.bodies import Body, Collider, PlacedMesh, Surface
+from rlacd.io.robots.plan import colliders
+from rlacd.io.robots.poses import inverse, product, rounded
 from rlacd.io.write.single_precision import required_hull
 from rlacd.io.write.usd import require_usd
+from rlacd.solid.arrays import FloatArray, Int64Array
 
 ENDINGS = (".usd", ".usda", ".usdc")
 """Of stages that are rewritten."""
@@ -31,17 +36,21 @@ class Colliders:
     source
         The stage.
     nodes
-        For each its ``path``, and its ``scale`` [3] on the stage.
+        For each its ``path``, its ``scale`` [3] and ``pose`` (4 rows of 4) on the stage, the path of the rigid ``body``
+        it belongs to, if any, and its ``body_pose``; ``kind``, equal for those that may become one solid, or None.
     blobs
         ``INDEX.points`` and ``INDEX.faces`` of each.
     warnings
         What of the stage is not rewritten, or changes with it.
+    metres
+        Its unit of length.
     """
 
     source: Path
     nodes: list[Mapping[str, Any]]
     blobs: Mapping[str, bytes]
     warnings: list[str]
+    metres: float
 
 
 def read_colliders(stage: Path) -> Colliders:
@@ -56,7 +65,7 @@ def read_colliders(stage: Path) -> Colliders:
     """
     require_usd()
     answer = answer_of(SERVER, stage, "USD", {"path": str(stage)}, {})
-    return Colliders(stage, answer.values["nodes"], answer.blobs, answer.values["warnings"])
+    return Colliders(stage, answer.values["nodes"], answer.blobs, answer.values["warnings"], answer.values["metres"])
 
 
 def colliders_of(mesh: Path) -> Colliders | None:
@@ -65,47 +74,96 @@ def colliders_of(mesh: Path) -> Colliders | None:
     return found if found is not None and found.nodes else None
 
 
+def bodies_of(stage: Colliders, *, apart: bool) -> tuple[list[Body], dict[Collider, list[int]]]:
+    """Sort the meshes by the rigid bodies they belong to, and by what may become one solid.
+
+    Those that no body carries stay apart, each a body of its own.
+
+    Returns
+    -------
+    tuple of (list of Body, dict)
+        The bodies, and the places in ``stage.nodes`` of the meshes of each collider.
+    """
+    of_body: dict[str, list[int]] = {}
+    for index, node in enumerate(stage.nodes):
+        of_body.setdefault(node["body"] or node["path"], []).append(index)
+    arrays: dict[tuple[bytes, bytes], tuple[FloatArray, Int64Array]] = {}
+    bodies: list[Body] = []
+    prims: dict[Collider, list[int]] = {}
+    for name, places in of_body.items():
+        first = stage.nodes[places[0]]
+        pose = _rigid(first["body_pose"]) if first["body"] else np.eye(4)
+        uses: list[tuple[Hashable | None, PlacedMesh, int]] = []
+        for index in places:
+            node, both = stage.nodes[index], (stage.blobs[f"{index}.points"], stage.blobs[f"{index}.faces"])
+            points, faces = np.frombuffer(both[0]).reshape(-1, 3), np.frombuffer(both[1], np.int64).reshape(-1, 3)
+            surface = Surface(Path(node["path"]), *arrays.setdefault(both, (points, faces)))
+            placed = product(inverse(pose), _rigid(node["pose"]))
+            mesh = PlacedMesh(surface, np.array(node["scale"]), placed, np.eye(4))
+            uses.append((None if apart or not node["body"] else node["kind"], mesh, index))
+        joined = colliders(name, uses)
+        bodies.append(Body(name, pose, [*joined], not first["body"]))
+        prims |= joined
+    return bodies, prims
+
+
+def _rigid(rows: Sequence[float]) -> FloatArray:
+    """The pose of a frame, given by 16 numbers in rows, without its scale."""
+    pose = np.array(rows).reshape(4, 4)
+    pose[:3, :3] /= np.sqrt((pose[:3, :3] ** 2).sum(axis=0))
+    return rounded(pose)
+
+
 def encode_layer(
-    stage: Colliders, place: Path, decomposed: Callable[[trimesh.Trimesh], Decomposition], *, flat: bool
-) -> tuple[bytes, dict[str, Decomposition], list[str], list[str]]:
-    """Decompose the meshes that collide, each once at its scale.
+    stage: Colliders,
+    place: Path,
+    prims: Mapping[Collider, Sequence[int]],
+    results: Mapping[Collider, Decomposition],
+    *,
+    flat: bool,
+) -> tuple[bytes, list[str], list[str]]:
+    """Put hulls in the place of each collider's first mesh; its others no longer collide either.
 
     Parameters
     ----------
     stage : Colliders
     place : Path
         Where the layer will be.
-    decomposed : callable
-        Decomposes a mesh, in the stage's unit.
+    prims : dict
+        The places in ``stage.nodes`` of the meshes of each collider.
+    results : dict
+        Its hulls.
     flat : bool
         Whether to write the whole stage as one layer, instead of one over the original; it names pictures and other
         files as before, relative to the folder of the original.
 
     Returns
     -------
-    tuple of (bytes, dict, list of str, list of str)
-        The layer, the result of each prim, warnings, and the other files that `flat` names.
+    tuple of (bytes, list of str, list of str)
+        The layer, warnings, and the other files that `flat` names.
     """
-    blobs, warnings = stage.blobs, list(stage.warnings)
-    results: dict[tuple[bytes, bytes, tuple[float, ...]], Decomposition] = {}
     hulls: dict[str, bytes] = {}
-    done: dict[str, Decomposition] = {}
-    for index, node in enumerate(stage.nodes):
-        points, faces, scale = blobs[f"{index}.points"], blobs[f"{index}.faces"], np.array(node["scale"])
-        key = points, faces, tuple(node["scale"])
-        if key not in results:
-            corners = np.frombuffer(points).reshape(-1, 3) * scale
-            triangles = np.frombuffer(faces, dtype=np.int64).reshape(-1, 3)
-            results[key] = decomposed(trimesh.Trimesh(corners, triangles, process=False))
-            warnings += [f"{node['path']}: {warning}" for warning in results[key].report["warnings"]]
-        for number, hull in enumerate(results[key].hulls):
-            mesh, shift = required_hull(hull, node["path"], "as USD")
-            hulls[f"{index}.{number}.points"] = ((mesh.vertices + shift) / scale).astype("<f4").tobytes()
-            hulls[f"{index}.{number}.faces"] = np.asarray(mesh.faces, dtype="<i4").tobytes()
-        done[node["path"]] = results[key]
+    counts, leads, masses = [0] * len(stage.nodes), [0] * len(stage.nodes), {}
+    for collider, places in prims.items():
+        first, result = places[0], results[collider]
+        counts[first] = len(result)
+        for number, hull in enumerate(result.hulls):
+            mesh, shift = required_hull(hull, stage.nodes[first]["path"], "as USD")
+            points = (mesh.vertices + shift) / np.array(stage.nodes[first]["scale"])
+            hulls[f"{first}.{number}.points"] = points.astype("<f4").tobytes()
+            hulls[f"{first}.{number}.faces"] = np.asarray(mesh.faces, dtype="<i4").tobytes()
+        for index, placed in zip(places, collider.meshes, strict=True):
+            leads[index] = first
+            masses[stage.nodes[index]["path"]] = result.report["mass"] if len(places) == 1 else _mass(placed)
     sublayer = None if flat else Path(os.path.relpath(stage.source, place.absolute().parent)).as_posix()
-    masses = {path: result.report.get("mass") for path, result in done.items()}
     asked = {"path": str(stage.source), "sublayer": sublayer, "ending": place.suffix.lower().lstrip(".")}
-    how = {"masses": masses, "counts": [*map(len, done.values())]}
+    how = {"masses": masses, "counts": counts, "leads": leads}
     answer = answer_of(SERVER, stage.source, "USD", {**asked, **how}, hulls)
-    return answer.blobs["layer"], done, warnings + answer.values["warnings"], answer.values["files"]
+    return answer.blobs["layer"], [*stage.warnings, *answer.values["warnings"]], answer.values["files"]
+
+
+def _mass(mesh: PlacedMesh) -> Any:
+    """The mass of one mesh of several that became a solid; None if it is closed, and needs no repair."""
+    if trimesh.Trimesh(mesh.points, mesh.faces, process=False).is_volume:
+        return None
+    return decompose((mesh.points, mesh.faces), max_hulls=1, quality="fast").report["mass"]

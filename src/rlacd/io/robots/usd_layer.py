@@ -38,9 +38,9 @@ TO_FRAMES = re.compile(r"physics:body[01]$")
 
 @served
 def rewrite(values: Values, blobs: Blobs) -> Answered:
-    """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each: over the
-    stage as ``sublayer``, or all in one."""
-    from pxr import Sdf, Usd
+    """List the colliding meshes; if ``counts`` are given, write the layer with so many hulls for each, and those of the
+    one in ``leads`` for the others: over the stage as ``sublayer``, or all in one."""
+    from pxr import Sdf, Usd, UsdGeom, UsdPhysics
 
     path = Path(values["path"])
     check_files(path)
@@ -55,10 +55,11 @@ def rewrite(values: Values, blobs: Blobs) -> Answered:
     if "counts" in values:
         for body in {body.GetPath(): body for prim in colliders if (body := _body(prim))}.values():
             _fix_mass(path, body, values["masses"])
-        hulls = {}
-        for index, (prim, count) in enumerate(zip(colliders, values["counts"], strict=True)):
+        hulls: dict[Any, list[Any]] = {}
+        for index, (prim, count, lead) in enumerate(zip(colliders, values["counts"], values["leads"], strict=True)):
             shapes = [(blobs[f"{index}.{k}.points"], blobs[f"{index}.{k}.faces"]) for k in range(count)]
-            hulls[prim.GetPath()] = _replace(stage, prim, shapes)
+            hulls[prim.GetPath()] = _hulls(stage, prim, shapes) if lead == index else hulls[colliders[lead].GetPath()]
+            UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)
         left = _retarget(stage, hulls)
         files: list[str] = []
         if values["sublayer"] is None:
@@ -68,11 +69,14 @@ def rewrite(values: Values, blobs: Blobs) -> Answered:
         return {"warnings": left, "files": files}, {"layer": stage_bytes(layer, values["ending"])}
     nodes: list[Values] = []
     arrays: dict[str, bytes] = {}
+    contacts = _Contacts(stage)
     for index, prim in enumerate(colliders):
         points, faces = prim_geometry(path, prim)
-        nodes.append({"path": str(prim.GetPath()), "scale": _scale(prim)})
+        said = {"path": str(prim.GetPath()), "scale": _scale(prim), "kind": contacts.kind(prim)}
+        nodes.append({**said, **_place(prim)})
         arrays |= {f"{index}.points": points.tobytes(), f"{index}.faces": faces.tobytes()}
-    return {"nodes": nodes, "warnings": warnings}, arrays
+    metres = float(UsdGeom.GetStageMetersPerUnit(stage))
+    return {"nodes": nodes, "warnings": warnings, "metres": metres}, arrays
 
 
 def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:
@@ -110,6 +114,59 @@ def _scale(prim: Any) -> list[float]:
     if not (np.isfinite(lengths) & (lengths > 0)).all():
         raise MeshFileError(f"{prim.GetPath()} is scaled to nothing, or to infinity: correct its scale")
     return [float(f"{length:.9g}") for length in lengths]
+
+
+def _place(prim: Any) -> Values:
+    """Where a mesh and its body stand."""
+    from pxr import Usd, UsdGeom
+
+    cache, body = UsdGeom.XformCache(Usd.TimeCode.EarliestTime()), _body(prim)
+    pose, of_body = (np.array(cache.GetLocalToWorldTransform(each)).T for each in (prim, body or prim))
+    places = {"pose": pose.ravel().tolist(), "body_pose": of_body.ravel().tolist()}
+    return {**places, "body": str(body.GetPath()) if body else None}
+
+
+class _Contacts:
+    """What a stage says about the contacts of its meshes."""
+
+    def __init__(self, stage: Any) -> None:
+        from pxr import UsdPhysics
+
+        prims = [*stage.Traverse()]
+        links = [link for prim in prims for link in prim.GetAuthoredRelationships()]
+        self._naming = [link for link in links if TO_COLLIDERS.match(link.GetName())]
+        groups = [UsdPhysics.CollisionGroup(prim) for prim in prims if prim.IsA(UsdPhysics.CollisionGroup)]
+        self._groups = [group.GetCollidersCollectionAPI().ComputeMembershipQuery() for group in groups]
+
+    def kind(self, prim: Any) -> str | None:
+        """Equal for meshes that may become one solid; None for one that is sheared, which stays apart."""
+        from pxr import Usd, UsdGeom, UsdShade
+
+        rows = np.array(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))[:3, :3]
+        axes = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+        if not np.allclose((axes[:, None] * axes).sum(axis=2), np.eye(3), atol=1e-6):
+            return None
+        path = prim.GetPath()
+        material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
+        said = [*_schemas(prim), *(f"{each.GetName()} {_value(each)}" for each in _settings(prim))]
+        said += [str(link.GetPath()) for link in self._naming if path in link.GetTargets()]
+        said += [str(group.IsPathIncluded(path)) for group in self._groups]
+        return " ".join([str(material.GetPath()) if material else "", *said])
+
+
+def _value(each: Any) -> Any:
+    return each.GetTargets() if hasattr(each, "GetTargets") else each.Get()
+
+
+def _schemas(prim: Any) -> list[str]:
+    """Schemas that go from a mesh to its hulls."""
+    return [name for name in prim.GetAppliedSchemas() if not OF_THE_MESH.search(name)]
+
+
+def _settings(prim: Any) -> list[Any]:
+    """Properties that go from a mesh to its hulls."""
+    authored = {each.GetName(): each for each in prim.GetAuthoredProperties()}
+    return [authored[name] for name in authored if OF_COLLISIONS.match(name) and not OF_BODIES.match(name)]
 
 
 def _body(prim: Any) -> Any:
@@ -190,8 +247,8 @@ def _mass(points: Any, faces: Any, scale: list[float]) -> dict[str, Any]:
     return {"volume_abs": solid.volume, "centre_abs": solid.center_mass, "inertia_abs": solid.moment_inertia}
 
 
-def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[Any]:
-    """Put hulls beside a mesh, or below it if it is a rigid body, and let it no longer collide; returns their paths."""
+def _hulls(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[Any]:
+    """Put hulls beside a mesh, or below it if it is a rigid body; returns their paths."""
     from pxr import UsdGeom, UsdPhysics
 
     inside = prim.HasAPI(UsdPhysics.RigidBodyAPI)
@@ -204,9 +261,7 @@ def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[An
         moved = UsdGeom.Xformable(prim)
         group.AddTransformOp().Set(moved.GetLocalTransformation())
         group.SetResetXformStack(moved.GetResetXformStack())
-    schemas = [name for name in prim.GetAppliedSchemas() if not OF_THE_MESH.search(name)]
-    authored = {each.GetName(): each for each in prim.GetAuthoredProperties()}
-    settings = [authored[name] for name in authored if OF_COLLISIONS.match(name) and not OF_BODIES.match(name)]
+    schemas, settings = _schemas(prim), _settings(prim)
     for number, (points, faces) in enumerate(hulls):
         corners, triangles = np.frombuffer(points, "<f4").reshape(-1, 3), np.frombuffer(faces, "<i4").reshape(-1, 3)
         hull = mesh_prim(stage, group.GetPath().AppendChild(f"hull_{number:03d}"), corners, triangles).GetPrim()
@@ -216,5 +271,4 @@ def _replace(stage: Any, prim: Any, hulls: list[tuple[bytes, bytes]]) -> list[An
             hull.AddAppliedSchema(schema)
         for each in settings:
             each.FlattenTo(hull)
-    UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)
     return [hull.GetPath() for hull in group.GetPrim().GetChildren()]

@@ -1,0 +1,175 @@
+"""Bodies whose hulls touch where they themselves do not are decomposed again, each clear of the other.
+
+The places at which hulls touch are the counterexamples of one round; new ones, found with the new hulls, those of the
+next. Of two bodies, first the one whose hulls reach into the other stays out of the other's hulls; if both do, first
+one stays out of the other's surface and leaves half the gap, then the other out of its hulls.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from rlacd.clear.bodies import Body, Surface, inverse, moved
+from rlacd.clear.motion import Motion
+from rlacd.clear.touching import TOUCH, Offence, Shapes, Touching, check, size_of
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.component import concatenated
+from rlacd.solid.obstacle import Obstacle
+
+MOST_ROUNDS = 8
+"""After which pairs that still touch are told."""
+
+MOST_PLACES = 24
+"""Of one pair, looked at in one round: the deepest, and those that differ most from it."""
+
+OFF_HULLS = 10 * TOUCH
+"""How far hulls stay off those of other bodies, a share of the size of all: single precision moves them less."""
+
+Redo = Callable[[int, Sequence[Obstacle]], Sequence[Surface]]
+"""Decomposes the body of this number again, clear of obstacles in its frame."""
+
+
+@dataclass(frozen=True)
+class Cleared:
+    """What became of bodies.
+
+    Attributes
+    ----------
+    bodies : list of Body
+    touching : dict
+        As `check` finds it for the new hulls.
+    mended : tuple of (int, int)
+        Pairs whose hulls touched though they did not, and no longer do.
+    """
+
+    bodies: list[Body]
+    touching: dict[tuple[int, int], Touching]
+    mended: tuple[tuple[int, int], ...] = ()
+
+
+class _Wish(NamedTuple):
+    """One body stays out of another, of its surface or of its hulls."""
+
+    body: int
+    other: int
+    of_mesh: bool
+
+
+@dataclass
+class _Wishes:
+    """What bodies are to stay out of, and where, seen from them.
+
+    Attributes
+    ----------
+    places : dict
+        Poses of the other body, by their digits.
+    gaps : dict
+        The least gap between the two there.
+    tried : set
+        Places with the hulls that the other body had: the same again would not help.
+    renewed : dict
+        How often a body was decomposed again.
+    """
+
+    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)
+    gaps: dict[_Wish, float] = field(default_factory=dict)
+    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)
+    renewed: Counter[int] = field(default_factory=Counter)
+
+    def add(self, wish: _Wish, poses: Sequence[FloatArray]) -> bool:
+        """Add places; returns whether any is new."""
+        version = 0 if wish.of_mesh else self.renewed[wish.other]
+        keys = [(wish, version, pose.round(9).tobytes()) for pose in poses]
+        is_new = not self.tried.issuperset(keys)
+        if is_new:
+            self.tried.update(keys)
+            known = self.places.setdefault(wish, {})
+            known.update(zip((key[2] for key in keys), poses, strict=True))
+        return is_new
+
+
+def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
+    """Decompose bodies again until no hulls touch mostly where the bodies do not, or that does not help.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra ``clear`` is not installed.
+    """
+    bodies = list(bodies)
+    known: dict[tuple[int, int, bytes], bool] = {}
+    touching = check(bodies, motion, known=known)
+    first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
+    for _ in range(MOST_ROUNDS):
+        wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
+        again = _wish(bodies, wrong, wishes)
+        if not again:
+            break
+        for body in sorted(again):
+            obstacles = [_obstacle(bodies, wish, wishes, motion) for wish in wishes.places if wish.body == body]
+            bodies[body] = bodies[body].with_hulls(redo(body, obstacles))
+            wishes.renewed[body] += 1
+        near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
+        renewed = check(bodies, motion, near, known)
+        touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
+    mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
+    return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))
+
+
+def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:
+    """Add what bodies are to stay out of, and return those to decompose again: not both of a pair at once."""
+    shapes = {i: Shapes(bodies[i]) for pair in wrong for i in pair}
+    again, fixed = set[int](), set[int]()
+    for (i, j), found in sorted(wrong.items(), key=lambda one: (-one[1].offences[0].depth, one[0])):
+        seen = [place.pose for place in _spread(found.offences)]
+        poses = {i: seen, j: [inverse(pose) for pose in seen]}
+        ours, theirs = (any(shapes[a].enters(shapes[b], pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
+        ways = [_Wish(i, j, False), _Wish(j, i, False)]
+        if theirs:
+            ways.reverse()
+        if ours and theirs:
+            ways.insert(0, _Wish(i, j, True))
+        for wish in ways:
+            if wish.body not in fixed and wish.other not in again and wishes.add(wish, poses[wish.body]):
+                again.add(wish.body)
+                fixed.add(wish.other)
+                if wish.of_mesh:
+                    gap = min(shapes[i].gap(shapes[j], pose) for pose in seen)
+                    wishes.gaps[wish] = min(gap, wishes.gaps.get(wish, gap))
+                break
+    return again
+
+
+def _spread(offences: Sequence[Offence]) -> list[Offence]:
+    """The deepest, and then always the one that differs most from those chosen."""
+    poses = np.stack([one.pose[:3].ravel() for one in offences])
+    poses[:, 3::4] /= max(float(np.abs(poses[:, 3::4]).max()), 1e-300)
+    chosen, away = [0], np.full(len(offences), np.inf)
+    while len(chosen) < min(MOST_PLACES, len(offences)):
+        away = np.minimum(away, np.abs(poses - poses[chosen[-1]]).sum(axis=1))
+        chosen.append(int(away.argmax()))
+    return [offences[i] for i in chosen]
+
+
+def _obstacle(bodies: Sequence[Body], wish: _Wish, wishes: _Wishes, motion: Motion) -> Obstacle:
+    """The other body at all places, seen from the one that stays out of it, as far as it comes near that."""
+    own, other = bodies[wish.body], bodies[wish.other]
+    if wish.of_mesh:
+        (vertices, faces), margin = other.mesh, wishes.gaps[wish] / 2
+    else:
+        vertices, faces = concatenated([(v, f.astype(np.int32)) for v, f in other.hulls])
+        margin = OFF_HULLS * size_of(bodies, motion)
+    lower, upper = own.box[0] - margin, own.box[1] + margin
+    near = []
+    for pose in wishes.places[wish].values():
+        triangles = moved(vertices, pose)[faces]
+        meets = (triangles.min(axis=1) <= upper).all(axis=1) & (triangles.max(axis=1) >= lower).all(axis=1)
+        near.append(triangles[meets])
+    corners = np.ascontiguousarray(np.concatenate(near).reshape(-1, 3))
+    numbers = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    return Obstacle(other.name, corners, numbers, margin, is_told=False)

@@ -1,0 +1,109 @@
+"""What pairs of links do over all joint positions, as MoveIt's setup assistant sorts them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from rlacd.clear.mend import Cleared
+from rlacd.clear.motion import Motion
+
+Contact = Literal["adjacent", "always", "sometimes", "never"]
+
+
+@dataclass(frozen=True)
+class LinkPair:
+    """Two links.
+
+    Attributes
+    ----------
+    first, second : str
+        Their names.
+    adjacent : bool
+        Whether one joint connects them, or several without a link with collision meshes between.
+    contact : "always", "sometimes" or "never"
+        When their hulls touch.
+    share : float
+        Share of the joint positions at which they do.
+    meshes : float
+        Share at which their meshes do.
+    new_depth : float
+        How deep hulls overlap where the meshes do not touch, at most; 0 if they nowhere do.
+    kept_clear : bool
+        Whether their hulls were made finer so that they do not.
+    loose : bool
+        Whether a joint that was looked at only at rest lies between them: at other places they may do otherwise.
+    """
+
+    first: str
+    second: str
+    adjacent: bool
+    contact: Literal["always", "sometimes", "never"]
+    share: float
+    meshes: float
+    new_depth: float
+    kept_clear: bool
+    loose: bool
+
+    @property
+    def kind(self) -> Contact:
+        """As in the matrix: adjacent comes first; loose links sometimes touch."""
+        return "adjacent" if self.adjacent else "sometimes" if self.loose else self.contact
+
+    def as_plain(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+
+def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:
+    """All pairs of links with hulls, in their order."""
+    found, bodies = cleared.touching, cleared.bodies
+    pairs = []
+    for i, first in enumerate(bodies):
+        for j in range(i + 1, len(bodies)):
+            if not (first.hulls and bodies[j].hulls):
+                continue
+            touching = found.get((i, j))
+            share = float(touching.hulls.mean()) if touching else 0.0
+            contact: Literal["always", "sometimes", "never"] = (
+                "always" if share == 1 else "sometimes" if share else "never"
+            )
+            meshes = float(touching.meshes.mean()) if touching else 0.0
+            depth = touching.offences[0].depth if touching and touching.offences else 0.0
+            names, is_kept = (first.name, bodies[j].name), (i, j) in cleared.mended
+            joined, loose = (i, j) in motion.adjacent, motion.carrier[i] != motion.carrier[j]
+            pairs.append(LinkPair(*names, joined and not loose, contact, share, meshes, depth, is_kept, loose))
+    return pairs
+
+
+def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]) -> list[str]:
+    """What to say of links that touch; `length` says one in words."""
+    names = {pair: f"{cleared.bodies[pair[0]].name} and {cleared.bodies[pair[1]].name}" for pair in cleared.touching}
+    sentences, earlier, always = [], list[tuple[float, str]](), list[str]()
+    for pair, touching in cleared.touching.items():
+        deepest = touching.offences[0] if touching.offences else None
+        if touching.is_wrong and deepest is not None:
+            places = "" if len(touching.offences) == 1 else f", the deepest of {len(touching.offences)} places"
+            sentences.append(
+                f"Hulls of {names[pair]} touch though the links do not, up to {length(deepest.depth)} deep "
+                f"{motion.words(deepest.sample)}{places}."
+            )
+        elif deepest is not None:
+            earlier.append((deepest.depth, names[pair]))
+        if touching.meshes.all() and pair not in motion.adjacent:
+            always.append(names[pair])
+    if earlier:
+        depth, worst = max(earlier)
+        sentences.append(
+            f"Links that collide at some joint positions, as {worst} do, touch at others too as hulls, up to "
+            f"{length(depth)} deep ({len(earlier)} such pairs)."
+        )
+    if always:
+        said = (
+            f"{always[0]} touch"
+            if len(always) == 1
+            else f"{always[0]}, and {len(always) - 1} more pairs of links, touch"
+        )
+        sentences.append(f"{said} in the input itself wherever the joints are.")
+    return sentences

@@ -1,0 +1,153 @@
+"""Other meshes that no hull may enter, except where the solid itself crosses them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rlacd import _native
+from rlacd.solid.arrays import FloatArray, dots
+from rlacd.solid.component import Part
+from rlacd.solid.frame import ROUNDING, Frame
+from rlacd.solid.hull import TOLERANCE, Hull
+from rlacd.solid.obstacle import Obstacle
+from rlacd.solid.solid import Solid
+
+FINEST = 0.01
+"""Share of the threshold down to which parts are cut whose hulls enter what they are to avoid."""
+
+SMALLEST = 0.02
+"""Triangles that cross the solid are halved until their sides are at most this long, then left out."""
+
+_HALVINGS = 40
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What hulls stay out of, of one obstacle.
+
+    Attributes
+    ----------
+    name : str
+    filling : Filling or None
+        Its triangles in the frame; None if none is left.
+    margin : float
+        How far hulls stay off it, in the frame.
+    is_crossed : bool
+        Whether the solid crosses it; those triangles are left out.
+    is_told : bool
+        Whether the report says what became of it.
+    """
+
+    name: str
+    filling: _native.Filling | None
+    margin: float
+    is_crossed: bool
+    is_told: bool
+
+    @classmethod
+    def of(cls, obstacle: Obstacle, frame: Frame, surface: _native.Surface | None, threads: int) -> Kept:
+        """Leave out what the solid with this surface, if it has one, crosses or holds."""
+        triangles = frame.to_frame(obstacle.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
+        triangles, is_crossed = (triangles, False) if surface is None else _outside(triangles, surface)
+        filling = _native.Filling(*_mesh(triangles), threads) if len(triangles) else None
+        return cls(obstacle.name, filling, obstacle.margin * frame.scale, is_crossed, obstacle.is_told)
+
+    def is_entered(self, hull: Hull) -> bool:
+        """Whether a hull comes nearer than the margin."""
+        return self.filling is not None and self.filling.comes_deeper(hull.vertices, hull.faces, ROUNDING - self.margin)
+
+    def depth(self, hull: Hull) -> float:
+        """How deep it reaches into a hull, to `TOLERANCE`; 0 if it does not."""
+        if self.filling is None or not self.filling.comes_deeper(hull.vertices, hull.faces, TOLERANCE):
+            return 0.0
+        low, high = TOLERANCE, 2.0
+        while high - low > TOLERANCE:
+            middle = (low + high) / 2
+            is_deeper = self.filling.comes_deeper(hull.vertices, hull.faces, middle)
+            low, high = (middle, high) if is_deeper else (low, middle)
+        return high
+
+
+@dataclass(frozen=True)
+class Avoided:
+    """All that hulls stay out of."""
+
+    kept: tuple[Kept, ...]
+
+    @classmethod
+    def of(cls, obstacles: Sequence[Obstacle], solid: Solid, threads: int) -> Avoided:
+        """Prepare obstacles for the hulls of a solid."""
+        surface = _native.Surface(*solid.mesh, threads) if len(solid.mesh[1]) else None
+        return cls(tuple(Kept.of(obstacle, solid.frame, surface, threads) for obstacle in obstacles))
+
+    def is_entered(self, hull: Hull) -> bool:
+        """Whether a hull enters any of them."""
+        return any(kept.is_entered(hull) for kept in self.kept)
+
+    def found(self, parts: Sequence[Part], scale: float) -> dict[str, Any] | None:
+        """The report's entry: what finished hulls enter, how many and how deep, and what the input crosses."""
+        told = [kept for kept in self.kept if kept.is_told]
+        if not told:
+            return None
+        depths = np.array([[kept.depth(part.hull) for part in parts] for kept in told])
+        return {
+            "crossed": [kept.name for kept in told if kept.is_crossed],
+            "entered": [
+                {"name": kept.name, "hulls": int(np.count_nonzero(own)), "depth_abs": float(own.max()) / scale}
+                for kept, own in zip(told, depths, strict=True)
+                if own.any()
+            ],
+        }
+
+
+def warnings_of(found: dict[str, Any], reason: str) -> list[str]:
+    """A sentence for each obstacle that is entered all the same; `reason` ends it."""
+    crossed = [f"The input itself crosses {name}, so hulls are not kept out of it there." for name in found["crossed"]]
+    return [
+        *crossed,
+        *(
+            f"{one['hulls']} hull{'s enter' if one['hulls'] > 1 else ' enters'} {one['name']}, up to "
+            f"{one['depth_abs']:.4g} deep: {reason}."
+            for one in found["entered"]
+        ),
+    ]
+
+
+def _outside(triangles: FloatArray, surface: _native.Surface) -> tuple[FloatArray, bool]:
+    """The triangles [T, 3, 3], halved where they are long, that do not cross a closed surface and are not inside it."""
+    kept, is_crossed = [], False
+    for _ in range(_HALVINGS):
+        crossing = surface.crossing(*_mesh(triangles), TOLERANCE)
+        is_off = np.ones(len(triangles), dtype=bool)
+        is_off[crossing] = False
+        kept.append(triangles[is_off])
+        triangles = triangles[~is_off]
+        sides = np.roll(triangles, -1, axis=1) - triangles
+        lengths = dots(sides, sides)
+        is_small = lengths.max(axis=1, initial=0.0) <= SMALLEST**2
+        is_crossed |= bool(is_small.any())
+        triangles = _halved(triangles[~is_small], lengths[~is_small])
+        if not len(triangles):
+            break
+    off = np.concatenate(kept)
+    inside = (
+        surface.winding(np.ascontiguousarray(off.mean(axis=1)), accuracy=4.0) > 0.5 if len(off) else off[:0, 0, 0] > 0
+    )
+    return off[~inside], is_crossed or bool(inside.any())
+
+
+def _halved(triangles: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Both halves of triangles [T, 3, 3], across their longest sides."""
+    each, start = np.arange(len(triangles)), lengths.argmax(axis=1) if len(triangles) else np.empty(0, dtype=np.intp)
+    a, b, c = (triangles[each, (start + k) % 3] for k in range(3))
+    middle = (a + b) / 2
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def _mesh(triangles: FloatArray) -> tuple[FloatArray, Any]:
+    corners = np.ascontiguousarray(triangles.reshape(-1, 3))
+    return corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3)

@@ -1,0 +1,126 @@
+"""Links that do not touch in the input do not touch as hulls: checked at joint positions, and mended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rlacd.clear import Body as Moving
+from rlacd.clear import LinkPair, Motion, at_rest, kept_clear, link_pairs, mjcf_motion, urdf_motion, warnings_of
+from rlacd.decomposition import Decomposition
+from rlacd.errors import MissingExtraError
+from rlacd.io.robots.bodies import Body, Collider
+from rlacd.io.robots.decomposed import decomposed, options_of_bodies
+from rlacd.io.robots.poses import inverse, moved
+from rlacd.options.robots import RobotOptions
+from rlacd.solid.obstacle import Obstacle
+
+MOST_SAID = 5
+"""Pairs that touch, each with a warning of its own."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Links that were checked against each other.
+
+    Attributes
+    ----------
+    results : dict of Collider to Decomposition
+        The hulls, finer where links would touch.
+    pairs : list of LinkPair
+        Empty if nothing was checked.
+    samples : int
+        Joint positions looked at, with that at rest.
+    warnings : list of str
+    """
+
+    results: dict[Collider, Decomposition]
+    pairs: list[LinkPair]
+    samples: int
+    warnings: list[str]
+
+
+def checked_links(
+    bodies: Sequence[Body],
+    results: dict[Collider, Decomposition],
+    motion: Callable[[], tuple[Motion, list[str]]],
+    options: Mapping[str, Any],
+    robot: RobotOptions,
+    metres: float = 1.0,
+) -> Checked:
+    """Check the hulls of links against each other, and decompose links again whose hulls touch though they do not."""
+    if len(bodies) < 2:
+        return Checked(results, [], 0, [])
+    if not all(result.report["complete"] for result in results.values()):
+        return Checked(results, [], 0, ["Links were not checked against each other: the work was stopped before."])
+    try:
+        moves, said = motion()
+        results, each = dict(results), options_of_bodies(bodies, options, robot)
+        own = [_moving(body, results) for body in bodies]
+
+        def redo(number: int, obstacles: Sequence[Obstacle]) -> list[tuple[Any, Any]]:
+            results.update(_clear_of(obstacles, bodies[number], results, each[number]))
+            return _moving(bodies[number], results).hulls
+
+        cleared = kept_clear(own, moves, redo)
+    except MissingExtraError as error:
+        return Checked(results, [], 0, [f"Links were not checked against each other: {error}"])
+    found = warnings_of(cleared, moves, lambda length: f"{1000 * metres * length:.3g} mm")
+    more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
+    ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in moves.warnings]
+    warnings = [*said, *ranges, *found[:MOST_SAID], *more]
+    return Checked(results, link_pairs(cleared, moves), len(moves.poses), warnings)
+
+
+def motion_of(
+    kind: str, path: Path, bodies: Sequence[Body], robot: RobotOptions, seed: int
+) -> tuple[Motion, list[str]]:
+    """Where the bodies of a URDF or MJCF file can be."""
+    names = [body.name for body in bodies]
+    try:
+        found = (urdf_motion if kind == "urdf" else mjcf_motion)(path, robot.samples, seed)
+        return found.some(names), []
+    except (ValueError, KeyError) as error:  # MuJoCo reads fewer meshes than we do; links may be in no tree
+        said = " ".join(str(error).split())[:80]
+        return resting(bodies), [
+            f"Links were checked against each other at rest only: {path.name} is refused ({said})."
+        ]
+
+
+def resting(bodies: Sequence[Body], fixed: Collection[str] = ()) -> Motion:
+    """Bodies where they stand."""
+    rest = at_rest([body.name for body in bodies], fixed)
+    rest.poses[0] = [body.pose for body in bodies]
+    return rest
+
+
+def _moving(body: Body, results: Mapping[Collider, Decomposition]) -> Moving:
+    mesh = body.mesh()
+    hulls = [(np.asarray(hull.vertices), np.asarray(hull.faces, np.int32)) for hull in body.hulls(results)]
+    return Moving(body.name, (np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32)), hulls)
+
+
+def _clear_of(
+    obstacles: Sequence[Obstacle], body: Body, results: Mapping[Collider, Decomposition], options: Mapping[str, Any]
+) -> dict[Collider, Decomposition]:
+    """Decompose the colliders of a body again that come near obstacles."""
+    again = {}
+    for collider in body.colliders:
+        back = inverse(collider.meshes[0].to_body)
+        placed = [Obstacle(o.name, moved(back, o.vertices), o.faces, o.margin, is_told=False) for o in obstacles]
+        near = [obstacle for obstacle in placed if _is_near(obstacle, results[collider])]
+        if near:
+            again[collider] = decomposed(body, collider, {**options, "avoid": near})
+    return again
+
+
+def _is_near(obstacle: Obstacle, result: Decomposition) -> bool:
+    if not len(obstacle.vertices):
+        return False
+    lower, upper = obstacle.vertices.min(axis=0) - obstacle.margin, obstacle.vertices.max(axis=0) + obstacle.margin
+    boxes = [hull.bounds for hull in result.hulls]
+    return any(bool((box[0] <= upper).all() and (box[1] >= lower).all()) for box in boxes)

@@ -1,0 +1,168 @@
+"""What became of a robot, in its own terms: its links, lengths in its unit, warnings about all solids of a kind."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import trimesh
+
+from rlacd.clear import LinkPair
+from rlacd.decomposition import Decomposition
+from rlacd.io.robots.bodies import Body, Collider
+
+
+@dataclass(frozen=True, eq=False)
+class RewrittenLink:
+    """A link (URDF), body (MJCF) or rigid body (USD) whose collision meshes were replaced.
+
+    Attributes
+    ----------
+    name
+        As in the file; of a USD stage its path.
+    meshes
+        The files of its collision meshes, or the paths of their prims.
+    hulls
+        In the frame of the link, in the robot's unit.
+    files
+        The names of the hulls' files.
+    results
+        The decomposition of each of its solids, in the frame of the solid's first mesh.
+    """
+
+    name: str
+    meshes: Sequence[Path]
+    hulls: Sequence[trimesh.Trimesh]
+    files: Sequence[str]
+    results: Sequence[Decomposition]
+
+    @classmethod
+    def of(
+        cls, body: Body, results: Mapping[Collider, Decomposition], names: Mapping[Collider, Sequence[str]]
+    ) -> RewrittenLink:
+        """What became of a body."""
+        meshes = [mesh.surface.path for collider in body.colliders for mesh in collider.meshes]
+        files = [name for collider in body.colliders for name in names[collider]]
+        return cls(body.name, meshes, body.hulls(results), files, [results[collider] for collider in body.colliders])
+
+    @property
+    def farthest(self) -> float | None:
+        """How far its hulls reach beyond its meshes, in the robot's unit; None where there was no time to measure."""
+        return _most([_reach(result) for result in self.results])
+
+
+@dataclass(frozen=True, eq=False)
+class Rewritten:
+    """The result of rewriting a robot.
+
+    Attributes
+    ----------
+    path
+        The new description.
+    folder
+        Where its hulls are, as OBJ files.
+    links
+        The links with collision meshes, which hulls replaced.
+    warnings
+        What the user should know: one sentence each.
+    seconds
+        Wall time.
+    size
+        The longest side of the box around all meshes that were replaced, with all joints at zero.
+    metres
+        The robot's unit of length.
+    pairs
+        What each two of the links do at the joint positions that were looked at; empty if none were.
+    samples
+        How many those are.
+    """
+
+    path: Path
+    folder: Path
+    links: list[RewrittenLink]
+    warnings: list[str]
+    seconds: float
+    size: float
+    metres: float = 1.0
+    pairs: Sequence[LinkPair] = ()
+    samples: int = 0
+
+    @property
+    def complete(self) -> bool:
+        """False when a decomposition was stopped early."""
+        return all(result.report.get("complete", True) for link in self.links for result in link.results)
+
+    @property
+    def farthest(self) -> float | None:
+        """How far hulls reach beyond the meshes, in the robot's unit; None where there was no time to measure."""
+        return _most([link.farthest for link in self.links])
+
+    def report(self) -> dict[str, Any]:
+        """All measurements as plain values; lengths named ``_abs`` are in the robot's unit."""
+        return {
+            "robot": str(self.path),
+            "metres": self.metres,
+            "size_abs": self.size,
+            "complete": self.complete,
+            "meshes": sum(len(link.meshes) for link in self.links),
+            "hulls": sum(len(link.files) for link in self.links),
+            "farthest_abs": self.farthest,
+            "seconds": self.seconds,
+            "links": [
+                {
+                    "name": link.name,
+                    "meshes": [str(mesh) for mesh in link.meshes],
+                    "hulls": len(link.files),
+                    "files": [*link.files],
+                    "farthest_abs": link.farthest,
+                    "solids": [result.report for result in link.results],
+                }
+                for link in self.links
+            ],
+            "samples": self.samples,
+            "pairs": [pair.as_plain() for pair in self.pairs],
+            "warnings": self.warnings,
+        }
+
+
+def warnings_of(results: Mapping[Collider, Decomposition]) -> list[str]:
+    """What the reports of all solids warn of; the worst lost the widest passage, or has hulls that reach farthest."""
+    solids = {id(result): (collider.name, result) for collider, result in results.items()}
+    each = [(name, result, said) for name, result in solids.values() for said in result.report["warnings"]]
+    return grouped([(name, said, _widest(r) if "passage" in said else _reach(r) or 0.0) for name, r, said in each])
+
+
+def grouped(warnings: Sequence[tuple[str, str, float]]) -> list[str]:
+    """One sentence for all warnings of a kind: the worst, by what it is about, what it says, and how bad that is."""
+    kinds: dict[str, list[tuple[str, str, float]]] = {}
+    for one in warnings:
+        kinds.setdefault(_kind(one[1]), []).append(one)
+    sentences = []
+    for each in kinds.values():
+        name, said, _ = max(each, key=lambda one: one[2])
+        others = {1: "", 2: " and 1 other"}.get(len(each), f" and {len(each) - 1} others")
+        sentences.append(f"{name}{others}: {said}")
+    return sentences
+
+
+def _kind(warning: str) -> str:
+    """The first words of a sentence without numbers and plurals."""
+    words = [word.rstrip("s") for word in re.findall(r"[a-z]+", warning.lower()) if len(word) > 3]
+    return " ".join(words[:4])
+
+
+def _widest(result: Decomposition) -> float:
+    return max((one["radius_abs"] - one["left_abs"] for one in result.report["passages"] or ()), default=0.0)
+
+
+def _reach(result: Decomposition) -> float | None:
+    over: float | None = result.report.get("hausdorff", {}).get("over")
+    return None if over is None else over / float(result.report["scale"])
+
+
+def _most(lengths: Sequence[float | None]) -> float | None:
+    known = [length for length in lengths if length is not None]
+    return max(known) if known and len(known) == len(lengths) else None

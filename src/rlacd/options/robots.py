@@ -1,0 +1,73 @@
+"""The options of a robot as a whole, each stated once; `rlacd.rewrite_robot` says what they mean."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rlacd.options.fields import check_fields, custom, number, one_of, option, path_like, stated
+
+Per = Literal["link", "mesh"]
+PairKind = Literal["adjacent", "always", "never"]
+
+_length = number(above=0).read
+
+
+def _links(given: Any) -> dict[str, float]:
+    if not isinstance(given, Mapping) or not all(isinstance(pattern, str) for pattern in given):
+        raise TypeError
+    for pattern in given:
+        re.compile(pattern)
+    return {pattern: _length(length) for pattern, length in given.items()}
+
+
+def _kinds(given: Any) -> tuple[str, ...]:
+    words = given.split(",") if isinstance(given, str) else given
+    if not isinstance(words, (list, tuple)):
+        raise TypeError
+    return tuple(one_of(PairKind).read(word.strip()) for word in words)
+
+
+_KINDS = custom("some of adjacent, always, never", _kinds, "adjacent always never")
+_LINKS = custom("positive lengths by regular expressions of link names, such as {'finger.*': 0.001}", _links)
+
+
+@stated(panel="Robots", python="rewrite_robot({}=)")
+@dataclass(frozen=True)
+class RobotOptions:
+    """How the links of a robot are decomposed.
+
+    Attributes
+    ----------
+    per
+        What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
+    links
+        Another distance for the links whose whole name matches a regular expression, such as 'finger.*=1mm', or in the
+        robot's own unit. May be repeated; the last that matches counts.
+    samples
+        Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
+        extra rlacd[clear].
+    exclude
+        Pairs of bodies of an MJCF model whose contacts MuJoCo need not find: adjacent, always or never in contact at
+        these positions.
+    srdf
+        Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.
+
+    Raises
+    ------
+    OptionError
+        A value is of the wrong type or out of its range.
+    """
+
+    per: Per = option("link", one_of=Per)
+    links: Mapping[str, float] | None = option(
+        None, kind=_LINKS, flags=("--link",), metavar="REGEX=LENGTH", repeated=True
+    )
+    samples: int = option(500, least=0, most=100_000)
+    exclude: str | Sequence[PairKind] = option((), kind=_KINDS, metavar="adjacent,always,…", usual="none")
+    srdf: str | None = option(None, kind=path_like(), metavar="FILE")
+
+    def __post_init__(self) -> None:
+        check_fields(self)

@@ -1,0 +1,222 @@
+"""Links that were clear of each other stay clear: small robots in MuJoCo, and where that cannot be, what is said."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from lxml import etree
+
+import rlacd
+from rlacd.clear import Body, at_rest, check, mjcf_motion, urdf_motion
+from rlacd.clear.bodies import overlapping, placed_boxes
+from rlacd.errors import OptionError
+from tests.moving import ALL, Joint, Robot, block, drawer, fork_and_lug
+
+mujoco = pytest.importorskip("mujoco", reason="extra sim")
+pytest.importorskip("coal", reason="extra clear")
+pytest.importorskip("yourdfpy", reason="extra clear")
+
+
+def positions_with_contacts(urdf: Path) -> list[float]:
+    """The positions of its joints, all together from one limit to the other, at which MuJoCo finds contacts."""
+    model = mujoco.MjModel.from_xml_path(str(urdf))
+    data, found = mujoco.MjData(model), []
+    for share in np.linspace(0, 1, 41).tolist():
+        data.qpos[:] = (1 - share) * model.jnt_range[:, 0] + share * model.jnt_range[:, 1]
+        mujoco.mj_forward(model, data)
+        found += [share] if any(contact.dist < 0 for contact in data.contact) else []
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", ALL)
+@pytest.mark.promise("links-clear")
+def test_links_with_play_between_them_do_not_touch_as_hulls(make: Callable[[], Robot], tmp_path: Path) -> None:
+    robot = make()
+    done = rlacd.rewrite_robot(robot.write(tmp_path), tmp_path / "out.urdf", quality="fast", threads=1)
+    assert any(pair.kept_clear for pair in done.pairs), "as tight as the threshold, hulls would touch"
+    assert [pair for pair in done.pairs if pair.share] == []
+    assert done.samples == 501
+    assert positions_with_contacts(done.path) == []
+    assert not [warning for warning in done.warnings if "touch" in warning]
+
+
+@pytest.mark.slow
+@pytest.mark.promise("links-clear")
+def test_links_too_close_for_any_hulls_are_named_with_depth_and_joint_position(tmp_path: Path) -> None:
+    robot, options = fork_and_lug(play=1e-4).write(tmp_path), {"quality": "fast", "threads": 1, "samples": 50}
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threshold_abs=0.02, max_hulls=4, **options)
+    (pair,) = done.pairs
+    assert (pair.meshes, pair.adjacent, pair.kept_clear) == (0, True, False)
+    assert pair.new_depth > 1e-4
+    (said,) = [warning for warning in done.warnings if "touch though the links do not" in warning]
+    assert said.startswith(f"Hulls of fork and lug touch though the links do not, up to {1000 * pair.new_depth:.3g} mm")
+    assert "lug_joint = " in said or "at rest" in said
+
+
+def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: Path) -> None:
+    """Of three links in a row, the outer two cross in the input wherever the joints are."""
+    links = {
+        "base": block((0, 0, 0), (1, 1, 1)),
+        "middle": block((3, 0, 0), (4, 1, 1)),
+        "tip": block((0.5, 0.2, 0.2), (1.5, 0.8, 0.8)),
+    }
+    joints = tuple(
+        Joint("revolute", parent, child, (1, 0, 0), (0, 0.5, 0.5), (-0.1, 0.1))
+        for parent, child in (("base", "middle"), ("middle", "tip"))
+    )
+    path = Robot("row", links, joints).write(tmp_path)
+    done = rlacd.rewrite_robot(path, tmp_path / "out.urdf", threads=1, samples=20, srdf=tmp_path / "row.srdf")
+    assert done.warnings == ["base and tip touch in the input itself wherever the joints are."]
+    assert {(pair.first, pair.second): pair.kind for pair in done.pairs} == {
+        ("base", "middle"): "adjacent",
+        ("base", "tip"): "always",
+        ("middle", "tip"): "adjacent",
+    }
+    reasons = [
+        element.get("reason") for element in etree.parse(str(tmp_path / "row.srdf")).iterfind("disable_collisions")
+    ]
+    assert reasons == ["Adjacent", "Default", "Adjacent"]
+    assert done.report()["pairs"][1]["contact"] == "always"
+
+
+ARM = """<mujoco><asset><mesh name="box" file="box.obj"/></asset><worldbody>
+  <body name="a"><joint name="j" type="hinge" axis="0 0 1"/><geom type="mesh" mesh="box" mass="1"/>
+    <body name="b" pos="3 0 0"><joint name="k" type="hinge" axis="0 0 1" range="-30 30" limited="true"/>
+      <geom type="mesh" mesh="box" mass="1"/>
+      <body name="c" pos="3 0 0"><geom type="mesh" mesh="box" mass="1"/></body></body></body>
+  <body name="cup" pos="0 0 1.01"><freejoint/><geom type="mesh" mesh="box" mass="1"/></body>
+</worldbody><equality><joint joint1="k" joint2="j" polycoef="0.1 0.5 0 0 0"/></equality></mujoco>
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    trimesh.creation.box().export(tmp_path / "box.obj")
+    (tmp_path / "arm.xml").write_text(ARM)
+    return tmp_path / "arm.xml"
+
+
+def test_pairs_of_bodies_are_excluded_from_contacts_where_asked(arm: Path) -> None:
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), exclude="adjacent,never", samples=30, threads=1)
+    kinds = {(pair.first, pair.second): pair.kind for pair in done.pairs}
+    assert kinds[("a", "b")] == kinds[("b", "c")] == "adjacent"
+    assert kinds[("a", "c")] == "never"
+    assert kinds[("a", "cup")] == "sometimes", "a cup moves freely: what it does at rest says nothing"
+    model = mujoco.MjModel.from_xml_path(str(done.path))
+    assert model.nexclude == 3
+    again = rlacd.rewrite_robot(done.path, arm.with_name("again.xml"), exclude=["never"], samples=30, threads=1)
+    assert mujoco.MjModel.from_xml_path(str(again.path)).nexclude == 3, "what is excluded already stays so once"
+
+
+def test_joints_of_mjcf_are_sampled_in_their_limits_or_told(arm: Path) -> None:
+    motion = mjcf_motion(arm, 100, seed=3)
+    assert motion.joints == ("j",)
+    assert motion.positions.shape == (101, 1)
+    assert np.abs(motion.positions).max() == pytest.approx(np.pi, rel=0.05)
+    assert [warning.split(",")[0] for warning in motion.warnings] == [
+        "the joint j has no limits",
+        "the joint number 2 is free or a ball",
+    ]
+    a, b = (motion.links.index(name) for name in "ab")
+    turns = np.arctan2(motion.poses[:, b, 1, 0], motion.poses[:, b, 0, 0])
+    driven = 0.1 + 1.5 * motion.positions[:, 0]
+    assert np.cos(turns - driven) == pytest.approx(1), "k follows j by the equality"
+    assert motion.poses[0, a] == pytest.approx(np.eye(4))
+
+
+MIMIC = """<robot name="r">
+  <link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>
+  <joint name="ab" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="ac" type="revolute"><parent link="a"/><child link="c"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="2" effort="1" velocity="1"/><mimic joint="ab" multiplier="-2" offset="0.5"/></joint>
+  <joint name="ad" type="planar"><parent link="a"/><child link="d"/><axis xyz="0 0 1"/></joint>
+  <joint name="de" type="continuous"><parent link="d"/><child link="e"/><axis xyz="0 0 1"/></joint>
+</robot>
+"""
+
+
+def test_mimic_planar_and_endless_joints_of_urdf(tmp_path: Path) -> None:
+    (tmp_path / "r.urdf").write_text(MIMIC)
+    motion = urdf_motion(tmp_path / "r.urdf", 64)
+    assert motion.joints == ("ab", "de")
+    assert motion.warnings == ("the joint ad is planar, so it was looked at only at rest",)
+    low, high = motion.positions[1:].min(axis=0), motion.positions[1:].max(axis=0)
+    assert low == pytest.approx([-1, -np.pi], rel=0.1)
+    assert high == pytest.approx([2, np.pi], rel=0.1)
+    turns = {name: np.arctan2(*motion.poses[:, i, [1, 0], 0].T) for i, name in enumerate(motion.links)}
+    assert np.cos(turns["c"] - (0.5 - 2 * turns["b"])) == pytest.approx(1)
+    assert motion.carrier[motion.links.index("e")] == motion.links.index("d")
+    assert np.array_equal(urdf_motion(tmp_path / "r.urdf", 64).poses, motion.poses)
+    assert urdf_motion(tmp_path / "r.urdf", 0).poses.shape[0] == 1
+
+
+def test_the_broad_phase_finds_what_all_pairs_would() -> None:
+    rng = np.random.default_rng(0)
+    lower = rng.random((7, 40, 3)) * 5
+    boxes = np.stack([lower, lower + rng.random((7, 40, 3))], axis=2)
+    meets = (boxes[:, :, None, 0] <= boxes[:, None, :, 1]).all(axis=-1)
+    expected = np.argwhere(np.triu(meets & meets.transpose(0, 2, 1), k=1))
+    assert np.array_equal(overlapping(boxes), expected)
+    turn = trimesh.transformations.random_rotation_matrix(rng.random(3))
+    around = placed_boxes(boxes[0], np.tile(turn, (1, 40, 1, 1)))[0]
+    corners = trimesh.bounds.corners(boxes[0, 0]) @ turn[:3, :3].T
+    assert around[0] == pytest.approx(np.stack([corners.min(axis=0), corners.max(axis=0)]))
+
+
+def test_a_body_inside_another_touches_it_and_one_in_its_hollow_does_not() -> None:
+    """Of a hollow body that was read as such; hulls of both fill the hollow."""
+    outer = trimesh.creation.box((4, 4, 4))
+    hollow = trimesh.boolean.difference([outer, trimesh.creation.box((2, 2, 2))])
+    inner = trimesh.creation.box((1, 1, 1))
+
+    def body(name: str, mesh: trimesh.Trimesh) -> Body:
+        surface = np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32)
+        hull = mesh.convex_hull
+        return Body(name, surface, [(np.asarray(hull.vertices), np.asarray(hull.faces, np.int32))])
+
+    (found,) = check([body("a", outer), body("b", inner)], at_rest("ab")).values()
+    assert (found.hulls.tolist(), found.meshes.tolist(), found.offences) == ([True], [True], ())
+    (found,) = check([body("a", hollow), body("b", inner)], at_rest("ab")).values()
+    assert (found.meshes.tolist(), len(found.offences)) == ([False], 1)
+
+
+def test_without_the_extra_a_warning_says_that_nothing_was_checked(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "coal", None)
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), samples=5, threads=1)
+    assert (done.samples, done.pairs) == (0, [])
+    assert any("were not checked against each other" in w and "rlacd[clear]" in w for w in done.warnings)
+
+
+def test_what_is_not_for_a_kind_of_file_is_refused(arm: Path, tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match=r"srdf .* is for a URDF"):
+        rlacd.rewrite_robot(arm, arm.with_name("out.xml"), srdf=tmp_path / "a.srdf")
+    with pytest.raises(OptionError, match=r"exclude .* is for MJCF"):
+        rlacd.rewrite_robot(fork_and_lug().write(tmp_path), tmp_path / "out.urdf", exclude="always")
+    with pytest.raises(OptionError, match="some of adjacent, always, never"):
+        rlacd.rewrite_robot(arm, arm.with_name("out.xml"), exclude="sometimes")
+
+
+@pytest.mark.promise("links-clear")
+def test_nodes_of_a_scene_that_do_not_touch_do_not_as_hulls() -> None:
+    scene, parts = trimesh.Scene(), drawer(0.004).links
+    for name, mesh in parts.items():
+        scene.add_geometry(mesh, node_name=name)
+    done = rlacd.decompose(scene, per_node=True, threshold=0.06, quality="fast", threads=1)
+    hulls = {name: [hull for hull in done if hull.metadata["node"] == name] for name in parts}
+    assert {name for name, own in hulls.items() if own} == set(parts)
+    bodies = [
+        Body(name, (mesh.vertices, mesh.faces), [(h.vertices, h.faces) for h in hulls[name]])
+        for name, mesh in parts.items()
+    ]
+    assert check(bodies, at_rest(list(parts))) == {}
+    apart = [rlacd.decompose(mesh, threshold_abs=0.03 * 0.413, quality="fast", threads=1) for mesh in parts.values()]
+    alone = [Body(b.name, b.mesh, [(h.vertices, h.faces) for h in one]) for b, one in zip(bodies, apart, strict=True)]
+    assert len(check(alone, at_rest(list(parts)))) == 1, "each for itself, their hulls touch"
+    assert not [warning for warning in done.report["warnings"] if "touch" in warning]
