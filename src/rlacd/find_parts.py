@@ -34,6 +34,10 @@ COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
 only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
 
+CATCH_UP = 0.9
+"""Parts found on a proxy are carried to the solid beside those of the first pass if they end as more hulls than this
+share of what that pass left: the others could end as fewer."""
+
 FIRST_POWER = 8
 """Power of `COARSER` from which parts over a limit are cut where few hulls are left: 25 times the threshold."""
 
@@ -140,8 +144,14 @@ class _Decomposer:
             parts, found = self._searched(done.parts, done.criterion, goal if factor == 1.0 else None)
             if self.model.proxy is None:
                 return parts, done.criterion, found
-            policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
-            return self.model.lift(parts, goal, factor, policy, self.run, merge=self.options.merge), goal, found
+            lifted = self._lifted(parts, goal, factor)
+            if len(lifted) > CATCH_UP * len(done.parts) and parts is not done.parts:
+                lifted = min(lifted, self._lifted(done.parts, goal, factor), key=cost)
+            return lifted, goal, found
+
+    def _lifted(self, parts: list[Part], goal: Criterion, factor: float) -> list[Part]:
+        policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
+        return self.model.lift(parts, goal, factor, policy, self.run, merge=self.options.merge)
 
     def keeps(self, most: int, parts: list[Part]) -> bool:
         """Whether there are at most so many parts."""
@@ -209,7 +219,7 @@ class _Decomposer:
         """The parts after the search of the quality level and its summary; `asked` is the solid's unscaled goal."""
         options, run, found = self.options, self.run, None
         policy, root = options.first_policy, self.model.component
-        context = SearchContext(root, goal, options.seed, self.sweeps, first_policy=policy)
+        context = SearchContext(root, goal, options.seed)
         given = options.quality, options.budget, options.search_steps
         quality, seconds, steps = given if asked is not None else ("balanced", None, None)
         assert quality is not None, "filled in by the options"
