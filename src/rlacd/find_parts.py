@@ -141,12 +141,14 @@ class _Decomposer:
         """
         with self.run.limited():
             done = cut_and_merge(self.tree, self.model.tighter(goal, factor), self.run, merge=self.options.merge)
-            parts, found = self._searched(done.parts, done.criterion, goal if factor == 1.0 else None)
+            states, found = self._searched(done.parts, done.criterion, goal if factor == 1.0 else None)
+            best = states[-1]
             if self.model.proxy is None:
-                return parts, done.criterion, found
-            lifted = self._lifted(parts, goal, factor)
-            if len(lifted) > CATCH_UP * len(done.parts) and parts is not done.parts:
-                lifted = min(lifted, self._lifted(done.parts, goal, factor), key=cost)
+                return best, done.criterion, found
+            lifted = self._lifted(best, goal, factor)
+            for parts in states[:-1]:  # of the levels below
+                if parts is not best and len(lifted) > CATCH_UP * len(parts) and self.run.stopped_by is None:
+                    lifted = min(lifted, self._lifted(parts, goal, factor), key=cost)
             return lifted, goal, found
 
     def _lifted(self, parts: list[Part], goal: Criterion, factor: float) -> list[Part]:
@@ -215,9 +217,12 @@ class _Decomposer:
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion | None
-    ) -> tuple[list[Part], SearchSummary | None]:
-        """The parts after the search of the quality level and its summary; `asked` is the solid's unscaled goal."""
-        options, run, found = self.options, self.run, None
+    ) -> tuple[list[list[Part]], SearchSummary | None]:
+        """The parts that the levels up to the one asked for end with, the best last, and a summary of the search.
+
+        `asked` is the solid's unscaled goal.
+        """
+        options, run, found, states = self.options, self.run, None, [parts]
         policy, root = options.first_policy, self.model.component
         context = SearchContext(root, goal, options.seed)
         given = options.quality, options.budget, options.search_steps
@@ -226,31 +231,29 @@ class _Decomposer:
         goes_on = options.merge and policy not in AS_PUBLISHED
         eliminates = goes_on and goal.eliminates
         if run.stopped_by is not None:
-            return parts, None
+            return states, None
         try:
             if options.quality == FAST:
                 if goes_on:
                     with run.stage("merge"), run.limited(run.work.done):
-                        parts = grow_cover(parts, goal, run, root)
+                        states = [parts := grow_cover(parts, goal, run, root)]
                 if eliminates and run.stopped_by is None:
                     with run.stage("search"):
-                        parts = eliminate_parts(context, parts, run)
-                return parts, None
+                        states = [eliminate_parts(context, parts, run)]
+                return states, None
             with run.stage("search"):
-                first = eliminates and goal.obstacles is not None
-                merged = parts = eliminate_parts(context, parts, run) if first else parts
-                if run.stopped_by is not None:
-                    return parts, None
+                if eliminates and goal.obstacles is not None:
+                    states = [parts := eliminate_parts(context, parts, run)]
+                    if run.stopped_by is not None:
+                        return states, None
                 if asked is not None:
                     bound = run.start(partial(at_least, self.model.solid, parts, asked.overhang, run))
                     enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
                     context = replace(context, enough=enough)
-                parts, found = search(context, merged, run, quality, seconds, steps)
-                if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
-                    parts = min(parts, eliminate_parts(context, merged, run), key=cost)
+                states, found = search(context, parts, run, quality, seconds, steps)
         except Stopped:
             run.note_stop()
-        return parts, found
+        return states, found
 
 
 def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:

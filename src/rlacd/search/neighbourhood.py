@@ -155,7 +155,7 @@ class Neighbourhood:
         self._graph = PartGraph(parts, context.criterion, run)
         self._best = list(parts)
         self._steps = self._accepted = 0
-        self._gained = 0.0
+        self._gained = time.perf_counter()
         self._nears: dict[int, Cluster] = {}
         self._begun: deque[_UnderWay] = deque()
         self._again: deque[_Trial] = deque()  # what they found came too late

@@ -21,7 +21,7 @@ from rlacd.solid.component import Part
 BEST_SECONDS = 5.0
 """What ``best`` may take by default, more if its first search takes longer."""
 
-TIMES_FIRST_PASS = 5.0
+TIMES_FIRST_PASS = 5.5
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 8e6
@@ -39,6 +39,9 @@ STARTS = ("excess-norm", "hull-sum")
 
 ANOTHER_PASS = 1.5
 """Another pass is abandoned when it exceeds this multiple of the work of the first, ..."""
+
+BOUNDED_STARTS = 2
+"""A bounded search ends when it has saved nothing from the last of so many starts for that long."""
 
 HOPELESS = 5
 """... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
@@ -95,7 +98,7 @@ def search(
     quality: str,
     seconds: float | None = None,
     steps: int | None = None,
-) -> tuple[list[Part], SearchSummary]:
+) -> tuple[list[list[Part]], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
     Without limits of its own, the search does a bounded multiple of the work of the first pass; ``best`` then goes on
@@ -116,16 +119,16 @@ def search(
 
     Returns
     -------
-    parts : list of Part
-        Never worse than the given ones. They depend on the seed and the steps, and on time only if `seconds` or the
-        run ends the search.
+    found : list of list of Part
+        What ``fast`` and ``balanced`` find, and the best; never worse than the given parts. They depend on the seed and
+        the steps, and on time only if `seconds` or the run ends the search.
     summary : SearchSummary
     """
     # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
     # below it.
     parts = drop_slivers(parts, run)
     begin, first_pass = time.perf_counter(), run.work.done
-    allowed = math.inf
+    allowed, bounded = math.inf, seconds is None and steps is None
     if seconds is None:
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
         if steps is not None:
@@ -133,10 +136,11 @@ def search(
     state = _Search(context, parts, run, first_pass)
     most = math.inf if steps is None else steps
     with run.limited(allowed, math.inf if seconds is None else seconds):
-        state.go_on(most)
-    if quality == "best" and seconds is None and steps is None:
+        state.go_on(most, BOUNDED_STARTS if bounded else math.inf)
+    earlier = state.outcome.parts
+    if bounded and quality == "best":
         with run.limited(seconds=BEST_SECONDS - (time.perf_counter() - begin)):
-            state.go_on(most)
+            state.go_on(most, math.inf)
     done = state.outcome
     summary = SearchSummary(
         level=quality,
@@ -151,7 +155,7 @@ def search(
         allowed=None if math.isinf(allowed) else math.floor(allowed),
         at_least=context.enough(),
     )
-    return done.parts, summary
+    return [state.early, earlier, done.parts], summary
 
 
 def eliminate_parts(context: SearchContext, parts: Sequence[Part], run: Run) -> list[Part]:
@@ -181,6 +185,7 @@ class _Search:
 
     def __init__(self, context: SearchContext, parts: list[Part], run: Run, first_pass: int) -> None:
         self.starts = self._passes = 0
+        self.early = parts
         self._context = context
         self._parts = parts
         self._run = run
@@ -194,16 +199,19 @@ class _Search:
         """The best found so far."""
         return reduce(SearchOutcome.then, self._others if self._best is None else [*self._others, self._best.outcome])
 
-    def go_on(self, steps: float) -> None:
-        """Search until the run is over, so many recuts are made or no fewer parts can do."""
+    def go_on(self, steps: float, starts: float) -> None:
+        """Search until the run is over, so many recuts are made, no fewer parts can do or so many starts were tried."""
         run, enough = self._run, self._context.enough
         while steps > self.outcome.steps and not run.is_over and len(self.outcome.parts) > enough():
             if self._best is None:
                 self._best = self._begun(self._parts)
-                self._early = len(self._best.parts)
-            elif (start := self._another_pass()) is not None:
-                self._challenge(self._begun(start), steps)
+                self.early = self._best.parts
+                self._early = len(self.early)
             self._improve(self._best, steps)
+            if (start := self._another_pass()) is not None:
+                self._challenge(self._begun(start), steps)
+            if self._passes + 1 >= starts:
+                return
 
     def _challenge(self, other: Neighbourhood, steps: float) -> None:
         """Search from another start unless it is behind already; the better of two goes on."""
@@ -230,6 +238,8 @@ class _Search:
     def _another_pass(self) -> list[Part] | None:
         """The parts of a pass by another score, among other planes; None if it takes too much work."""
         run, context = self._run, self._context
+        if run.is_over:
+            return None
         self._passes += 1
         sweeps = SweepCache(seed=(context.seed, self._passes))
         tree = CutTree(context.root, Greedy(STARTS[self._passes % len(STARTS)], sweeps=sweeps), run)
