@@ -31,8 +31,8 @@ from rlacd.planes.sweep import SLIVER
 from rlacd.pool import ProcessLimits
 from rlacd.pool.on_ray import MACHINES
 from rlacd.repair import distance, holes, state, wraps
-from rlacd.search.neighbourhood import CLUSTER, LEAST_TRIALS
-from rlacd.search.search import BOUNDED_PATIENCE, LEAST_WORK, MOST_WORK, TIMES_FIRST_PASS
+from rlacd.search.neighbourhood import CLUSTER
+from rlacd.search.search import LEAST_WORK, MOST_WORK, PATIENCE, TIMES_FIRST_PASS
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.passages import FACES
@@ -43,6 +43,7 @@ GB = 2**30
 WORDS = {2: "two", 3: "three", 4: "four", 5: "five"}
 ORDINALS = {3: "third", 4: "quarter"}
 HALVES = {0.5: "half"}
+TWICE = {1.0: "as much as", 2.0: "twice"}
 
 
 def page(name: str) -> str:
@@ -63,7 +64,7 @@ LIMITS = {
     "docs/search.md": [
         f"may do {TIMES_FIRST_PASS:g} times the work of the first pass, at least {LEAST_WORK / 1e6:g} and at most "
         f"{MOST_WORK / 1e6:g} million units",
-        f"{WORDS[BOUNDED_PATIENCE]} trials per part (at least {LEAST_TRIALS})",
+        f"saved nothing in {TWICE[PATIENCE]} the work",
         f"at {MOST_CUTTING / 1e6:g} million units and {MOST_PER_FACE} per triangle",
         f"merging at {MOST_MERGING / 1e6:g} million",
         f"more than {MANY_COMPONENTS:,} pieces",

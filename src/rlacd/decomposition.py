@@ -72,8 +72,9 @@ class Decomposition(Result):
             Of the repaired solid, closed cavities left out, at density one, in the input's unit: ``volume_abs``,
             ``centre_abs`` and, about that centre, ``inertia_abs`` (3 by 3).
         ``search`` : dict or None
-            What the search of a quality level has done: ``level``, ``steps``, ``accepted``, ``seconds``, whether it was
-            ``exhausted``, and the parts of the ``first_pass``, of the best of the ``portfolio``, and at its end.
+            What the search of a quality level has done: ``level``, ``seconds``, when it saved the last part
+            (``last_gain``, 0 if none), ``starts``, ``steps``, ``accepted``, ``work`` of the ``allowed``, and the
+            ``parts`` of the ``first_pass`` and at its end.
         ``at_least`` : int or None
             No decomposition has fewer hulls if each stays within the threshold of the solid and they cover it to 0.001
             (longest side 2). None with the quality ``fast``; 1 where the criterion bounds no distance.

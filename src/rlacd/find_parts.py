@@ -34,6 +34,10 @@ COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
 only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
 
+CATCH_UP = 0.9
+"""Parts found on a proxy are carried to the solid beside those of the first pass if they end as more hulls than this
+share of what that pass left: the others could end as fewer."""
+
 
 class Reached(NamedTuple):
     """The decomposition reached: complete, or the state when it was stopped.
@@ -131,8 +135,15 @@ class _Decomposer:
         """
         with self.run.limited():
             done = cut_and_merge(self.tree, self.model.tighter(goal), self.run, merge=self.options.merge)
-            parts, found = self._searched(done.parts, done.criterion, goal)
-            return self._lifted(parts, goal), goal if self.model.proxy else done.criterion, found
+            states, found = self._searched(done.parts, done.criterion, goal)
+            best = states[-1]
+            if self.model.proxy is None:
+                return best, done.criterion, found
+            lifted = self._lifted(best, goal)
+            for parts in states[:-1]:  # of the levels below
+                if parts is not best and len(lifted) > CATCH_UP * len(parts) and self.run.stopped_by is None:
+                    lifted = min(lifted, self._lifted(parts, goal), key=cost)
+            return lifted, goal, found
 
     def coarser(self, free: list[Part], goal: Criterion) -> Iterator[list[Part]]:
         """Get decompositions under coarser and coarser goals, until one part is left; `free` is that under the goal.
@@ -166,43 +177,41 @@ class _Decomposer:
         return clipped if clipped and clipped.size else Part.glued(first, second)
 
     def _searched(
-        self, parts: list[Part], goal: Criterion, asked: Criterion | None
-    ) -> tuple[list[Part], SearchSummary | None]:
-        """The parts after the search of the quality level and its summary; `asked` is the solid's unscaled goal."""
-        options, run, found = self.options, self.run, None
+        self, parts: list[Part], goal: Criterion, asked: Criterion
+    ) -> tuple[list[list[Part]], SearchSummary | None]:
+        """The parts that the levels up to the one asked for end with, the best last, and a summary of the search.
+
+        `asked` is the solid's unscaled goal.
+        """
+        options, run, found, states = self.options, self.run, None, [parts]
         policy, root = options.first_policy, self.model.component
-        context = SearchContext(root, goal, options.seed, self.sweeps, first_policy=policy)
-        given = options.quality, options.budget, options.search_steps
-        quality, seconds, steps = given if asked is not None else ("balanced", None, None)
-        assert quality is not None, "filled in by the options"
+        context = SearchContext(root, goal, options.seed)
+        assert options.quality is not None, "filled in by the options"
         goes_on = options.merge and policy not in AS_PUBLISHED
         eliminates = goes_on and goal.eliminates
         if run.stopped_by is not None:
-            return parts, None
+            return states, None
         try:
             if options.quality == FAST:
                 if goes_on:
                     with run.stage("merge"), run.limited(run.work.done):
-                        parts = grow_cover(parts, goal, run, root)
+                        states = [parts := grow_cover(parts, goal, run, root)]
                 if eliminates and run.stopped_by is None:
                     with run.stage("search"):
-                        parts = eliminate_parts(context, parts, run)
-                return parts, None
+                        states = [eliminate_parts(context, parts, run)]
+                return states, None
             with run.stage("search"):
-                first = eliminates and goal.obstacles is not None
-                merged = parts = eliminate_parts(context, parts, run) if first else parts
-                if run.stopped_by is not None:
-                    return parts, None
-                if asked is not None:
-                    bound = run.start(partial(at_least, self.model.solid, parts, asked.overhang, run))
-                    enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
-                    context = replace(context, enough=enough)
-                parts, found = search(context, merged, run, quality, seconds, steps)
-                if eliminates and not first and run.stopped_by is None:  # no level is worse than the one before it
-                    parts = min(parts, eliminate_parts(context, merged, run), key=cost)
+                if eliminates and goal.obstacles is not None:
+                    states = [parts := eliminate_parts(context, parts, run)]
+                    if run.stopped_by is not None:
+                        return states, None
+                bound = run.start(partial(at_least, self.model.solid, parts, asked.overhang, run))
+                enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
+                context = replace(context, enough=enough)
+                states, found = search(context, parts, run, options.quality, options.budget, options.search_steps)
         except Stopped:
             run.note_stop()
-        return parts, found
+        return states, found
 
 
 def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:

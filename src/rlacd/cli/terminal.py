@@ -117,6 +117,10 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
     if 1 < least <= parts:
         fewer = "fewer hulls" if least == parts else f"fewer than {least} hulls"
         lines.append(f"  no decomposition to this tolerance has {fewer}")
+    search = report.get("search") or {}
+    if search.get("level") == "best" and least < parts:
+        searched, idle = search["seconds"], search["seconds"] - search["last_gain"]
+        lines.append(f"  the search saved no hull in the last {idle:.1f} of {searched:.1f} s")
     kinds = Counter(shape.kind for shape in result.primitives if shape is not None)
     words = [counted(kinds[kind], kind, "boxes" if kind == "box" else f"{kind}s") for kind in sorted(kinds)]
     lines += [f"  of them {', '.join(words)}"] if words else []

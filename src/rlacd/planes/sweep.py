@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 from weakref import WeakKeyDictionary
@@ -85,18 +86,34 @@ class SweepCache:
         Planes along each of the six axes.
     concave_edges : int
         Number of concave edges whose planes are added.
+    seed : sequence of int, optional
+        Only half of the planes are candidates, drawn by this seed and the component's vertices.
     """
 
-    def __init__(self, per_axis: int = OFFSETS_PER_AXIS, concave_edges: int = EDGES_PER_COMPONENT) -> None:
+    def __init__(
+        self,
+        per_axis: int = OFFSETS_PER_AXIS,
+        concave_edges: int = EDGES_PER_COMPONENT,
+        seed: Sequence[int] | None = None,
+    ) -> None:
         self._per_axis = per_axis
         self._concave_edges = concave_edges
+        self._seed = seed
         self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
         self._sweeps: WeakKeyDictionary[Component, Sweep] = WeakKeyDictionary()
         self._lock = threading.Lock()
 
     def candidates(self, component: Component) -> Candidates:
         """Get the planes of a component."""
-        return self._once(self._candidates, component, lambda one: all_planes(one, self._per_axis, self._concave_edges))
+        return self._once(self._candidates, component, self._planes)
+
+    def _planes(self, component: Component) -> Candidates:
+        planes = all_planes(component, self._per_axis, self._concave_edges)
+        if self._seed is None:
+            return planes
+        random = np.random.default_rng([*self._seed, zlib.crc32(component.vertices.tobytes())])
+        drawn = np.sort(random.permutation(len(planes))[: (len(planes) + 1) // 2])
+        return Candidates(planes.directions[drawn], planes.offsets[drawn])
 
     def of(self, component: Component, threads: int = 1) -> Sweep:
         """Get the sweep of a component."""

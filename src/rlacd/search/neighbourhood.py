@@ -1,10 +1,13 @@
 """Large-neighbourhood search over the parts of a decomposition.
 
-A state is a set of parts, all of which meet the criterion. Two operators change it, in turn:
+A state is a set of parts, all of which meet the criterion. Three operators change it:
 
-- redistribute: a part is divided among the parts around it and disappears. Every part is tried, the smallest first.
+- redistribute: a part is divided among the parts around it and disappears.
+- give: a part gives what the parts around can take; what is left of it is smaller, and they are different.
 - recut: a cluster of neighbours is reunited into one solid and cut again; the pieces are merged with each other and
   with the parts around. Accepted if it leaves fewer parts, or equally many with a smaller total hull volume.
+
+The next trial is always one of the operator that has done the least work since it last saved a part.
 
 Source: P. Shaw, "Using Constraint Programming and Local Search Methods to Solve Vehicle Routing Problems", CP 1998.
 """
@@ -12,9 +15,11 @@ Source: P. Shaw, "Using Constraint Programming and Local Search Methods to Solve
 from __future__ import annotations
 
 import math
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import partial
 
 import numpy as np
@@ -23,9 +28,9 @@ from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
 from rlacd.planes.sweep import SweepCache
-from rlacd.policies import Greedy, Policy
+from rlacd.policies import Greedy
 from rlacd.run import Begun, Run
-from rlacd.search.operators import Exchange, recut, redistribute
+from rlacd.search.operators import Exchange, give, recut, redistribute
 from rlacd.search.part_graph import Cluster, PartGraph
 from rlacd.solid.component import Component, Part
 
@@ -35,12 +40,8 @@ PLANES_PER_AXIS = OFFSETS_PER_AXIS // 2
 CONCAVE_EDGES = EDGES_PER_COMPONENT // 2
 """Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
 
-FEW_PARTS = 20
-"""With more parts than this, trials begin at once: they gain more per unit of work than another pass over the solid,
-and do not wait for the least number of parts."""
-
 PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
-"""Scores of the greedy policy for further passes over the whole solid, best first."""
+"""Scores of the greedy policies that cut neighbourhoods."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +55,8 @@ class SearchContext:
     criterion : Criterion
         Every new part meets it.
     seed : int
-    sweeps : SweepCache
-        Sweeps of the solid's components, including those of the first pass.
     scores : sequence of str
-        Of the greedy policies that cut neighbourhoods and, if time allows, make further passes over the whole solid.
-    first_policy : str or Policy
-        The policy of the first pass, which is not repeated: ``greedy`` has the first of the scores.
+        Of the greedy policies that cut neighbourhoods.
     enough : callable
         Returns the least number of parts of any decomposition: the search ends there. May wait for that.
     near_sweeps : SweepCache
@@ -69,15 +66,13 @@ class SearchContext:
     root: Component
     criterion: Criterion
     seed: int = 0
-    sweeps: SweepCache = field(default_factory=SweepCache)
     scores: Sequence[str] = PORTFOLIO
-    first_policy: str | Policy = "greedy"
     enough: Callable[[], int] = lambda: 1
     near_sweeps: SweepCache = field(default_factory=lambda: SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES))
 
 
-LAG = 8
-"""A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that many can be under way
+LAG = 4
+"""A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that several can be under way
 at a time. It does not depend on the number of threads, so neither does the result."""
 
 CLUSTER = 3
@@ -85,20 +80,7 @@ CLUSTER = 3
 (docs/search.md)."""
 
 DRAWS = 10
-"""Draws of a cluster before a trial is skipped for lack of a new one."""
-
-SMALLEST_FIRST = 0.5
-"""Share of the parts, the smallest, that are redistributed first: nothing saves more parts per unit of work."""
-
-PARTS_PER_RECUT = 4
-"""Between two attempts to redistribute all parts, one cluster is recut for every so many parts: a recut takes the work
-of four attempts to redistribute a part and saves a fifth as many parts, but changes what there is to redistribute."""
-
-PATIENCE = 3 * LAG
-"""By default the search is exhausted after this many trials per part without a gain, ..."""
-
-LEAST_TRIALS = 4 * LAG
-"""... but not before this many: where parts are few, trials cost little."""
+"""Draws of a cluster before it is given up to find a new one."""
 
 
 @dataclass(frozen=True)
@@ -113,28 +95,43 @@ class SearchOutcome:
         Recuts tried.
     accepted : int
         Trials accepted.
-    exhausted : bool
-        No trial had saved a part for a long time, or no fewer can do.
+    gained : float
+        When the last part was saved, by `time.perf_counter`.
     """
 
     parts: list[Part]
-    steps: int
-    accepted: int
-    exhausted: bool
+    steps: int = 0
+    accepted: int = 0
+    gained: float = 0.0
 
     def then(self, other: SearchOutcome) -> SearchOutcome:
-        """Combine this outcome with that of a search that continued from it."""
-        best = min(self.parts, other.parts, key=cost)
-        return SearchOutcome(best, self.steps + other.steps, self.accepted + other.accepted, other.exhausted)
+        """Combine this outcome with that of another search."""
+        best = min(self, other, key=lambda outcome: cost(outcome.parts))
+        return replace(best, steps=self.steps + other.steps, accepted=self.accepted + other.accepted)
 
 
-_Trial = Callable[[Run], Exchange | None]
+class Operator(Enum):
+    """How a trial changes the parts."""
+
+    REDISTRIBUTE = "a part is divided among those around"
+    GIVE = "a part gives to those around what they can take"
+    RECUT = "a cluster is cut again"
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """An operator applied to some parts; recuts have a policy."""
+
+    operator: Operator
+    parts: Cluster
+    policy: int = 0
 
 
 @dataclass(frozen=True)
 class _UnderWay:
     """A trial under way: its own run, and what it will find."""
 
+    trial: _Trial
     run: Run
     found: Begun[Exchange | None]
 
@@ -148,148 +145,147 @@ class Neighbourhood:
     parts : sequence of Part
         Made of components with disjoint interiors.
     run : Run
-    patience : int
-        The search is exhausted after this many trials per part without a gain.
     """
 
-    def __init__(self, context: SearchContext, parts: Sequence[Part], run: Run, patience: int = PATIENCE) -> None:
+    def __init__(self, context: SearchContext, parts: Sequence[Part], run: Run) -> None:
         self._context = context
         self._run = run
-        self._patience = patience
         self._policies = [Greedy(score, sweeps=context.near_sweeps) for score in context.scores]
         self._random = np.random.default_rng(context.seed)
         self._graph = PartGraph(parts, context.criterion, run)
         self._best = list(parts)
-        self._steps = self._accepted = self._without_gain = 0
+        self._steps = self._accepted = 0
+        self._gained = time.perf_counter()
+        self._nears: dict[int, Cluster] = {}
         self._begun: deque[_UnderWay] = deque()
+        self._again: deque[_Trial] = deque()  # what they found came too late
         self._recut: set[tuple[Cluster, int]] = set()
-        self._price = 0.0  # units that the last trials took
+        self._tries: dict[tuple[Operator, int, Cluster], int] = {}
+        self._in_vain = dict.fromkeys(Operator, 0)  # units since each last saved a part
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
-    def improve(self, most: float = math.inf) -> SearchOutcome:
-        """Search until patience or the run is over, `most` recuts are made or no fewer parts can do."""
-        if most > 0:
-            self._make(self._trials(most))
-        return SearchOutcome(self._best, self._steps, self._accepted, self._gave_up or self._is_least)
-
-    def redistribute_all(self) -> None:
-        """Offer each part to those around."""
-        self._make(self._redistributions())
-
-    def _trials(self, most: float) -> Iterator[_Trial]:
-        yield from self._redistributions(SMALLEST_FIRST)
-        while self._steps < most and self._may_continue():
-            yield from self._recuts(min(most, self._steps + math.ceil(len(self._graph.parts) / PARTS_PER_RECUT)))
-            yield from self._redistributions()
-
-    def _redistributions(self, share: float = 1.0) -> Iterator[_Trial]:
-        """Offer each part, or the smallest share of them, to those around."""
-        graph = self._graph
-        waiting = sorted(graph.parts, key=lambda i: (graph.parts[i].hull.volume, i))
-        for which in waiting[: math.ceil(share * len(waiting))]:
-            if not self._may_continue():
-                return
-            if (trial := self._redistributing(which)) is not None:
-                yield trial
-
-    def _recuts(self, most: float) -> Iterator[_Trial]:
-        """Recut clusters until `most` steps are made in total."""
-        failed = 0
-        while self._steps < most and self._may_continue():
-            drawn = self._recutting()
-            if drawn is not None:
-                failed = 0
-                self._steps += 1
-                yield drawn
-            elif self._begun:  # what they find may bring new clusters
-                self._settle()
-            elif (failed := failed + 1) == LAG:
-                return
-
     @property
-    def _is_least(self) -> bool:
-        """Whether no fewer parts can do; of many parts, this is not asked before recuts begin, for it takes a while."""
-        count = len(self._graph.parts)
-        return (self._steps > 0 or count <= FEW_PARTS) and count <= self._context.enough()
-
-    @property
-    def _gave_up(self) -> bool:
-        return self._without_gain >= max(self._patience * len(self._graph.parts), LEAST_TRIALS)
-
-    def _may_continue(self) -> bool:
-        return not self._gave_up and self._run.step(self._steps, None, len(self._best))
-
-    def _recutting(self) -> _Trial | None:
-        """Draw a cluster and a policy by which it has not been recut."""
-        for _ in range(DRAWS):
-            cluster = self._graph.draw(CLUSTER, self._random)
-            if cluster is None:
-                return None
-            policy = int(self._random.integers(len(self._policies)))
-            if (cluster, policy) not in self._recut:
-                self._recut.add((cluster, policy))
-                parts, around = self._graph.of(cluster), self._graph.of(self._graph.around(cluster))
-                context = self._context
-                return partial(recut, parts, around, context.criterion, self._policies[policy], context.root)
-        return None
-
-    def _redistributing(self, which: int) -> _Trial | None:
-        if which not in self._graph.parts:
-            return None
-        around = self._graph.of(self._graph.near(which, self._near))
-        random = np.random.default_rng(int(self._random.integers(2**32)))
-        context = self._context
-        return partial(redistribute, self._graph.parts[which], around, context.criterion, random, context.root)
-
-    def _make(self, trials: Iterator[_Trial]) -> None:
-        """Make trials, `LAG` at a time, and apply what they find."""
-        try:
-            while True:
-                while self._begun and (len(self._begun) == LAG or self._allowance < self._price):
-                    if self._is_least:
-                        return
-                    self._settle()
-                if (trial := next(trials, None)) is None:
-                    break
-                alone = self._run.alone(self._allowance)
-                self._begun.append(_UnderWay(alone, self._run.start(partial(trial, alone))))
-            while self._begun and not self._is_least:
-                self._settle()
-        except Stopped:  # raised between two exchanges: the best state so far is kept
-            self._run.note_stop()
-        finally:
-            self._run.drop([begun.found for begun in self._begun])
-            self._begun.clear()
-
-    @property
-    def _allowance(self) -> float:
-        """Units for another trial: an equal share of what those under way leave, or twice what the last ones took."""
-        free = self._run.work.left
-        if math.isinf(free):
-            return free
-        free -= sum(begun.run.work.most for begun in self._begun)
-        return max(free // (LAG - len(self._begun)), min(free, 2 * self._price))
-
-    def _settle(self) -> None:
-        """Apply what the first of the trials under way has found, unless parts that it changes have gone."""
-        account, begun = self._run.work, self._begun[0]
-        exchange = self._run.result(begun.found)
-        self._begun.popleft()
-        account.pay(begun.run.work.done)
-        taken = exchange is not None and self._graph.apply(exchange)
-        gain = exchange.gain if exchange is not None and taken else 0
-        self._accepted += taken
-        self._without_gain = 0 if gain > 0 else self._without_gain + 1
-        if taken:
-            self._best = min(self._best, self.parts, key=cost)
-        self._price = max(begun.run.work.done, self._price / 2)
-        if begun.run.work.is_spent and not self._begun:
-            account.close()
+    def outcome(self) -> SearchOutcome:
+        """The best found so far."""
+        return SearchOutcome(self._best, self._steps, self._accepted, self._gained)
 
     @property
     def parts(self) -> list[Part]:
-        """The parts so far."""
+        """The parts as they are."""
         return list(self._graph.parts.values())
+
+    @property
+    def is_least(self) -> bool:
+        """Whether no fewer parts can do."""
+        return len(self._best) <= self._context.enough()
+
+    def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
+        """Search until the run is over, `most` recuts are made in total, so many units have saved nothing, or no fewer
+        parts can do."""
+        self._in_vain = dict.fromkeys(Operator, 0)
+        self._make(self._trials(most, patience))
+
+    def redistribute_all(self) -> None:
+        """Offer each part to those around, the smallest first."""
+        self._make(_Trial(Operator.REDISTRIBUTE, (which,)) for which in self._by_size())
+
+    def _trials(self, most: float, patience: float) -> Iterator[_Trial]:
+        """Trials of the operator that has done the least work in vain."""
+        while self._steps < most and sum(self._in_vain.values()) < patience and not self.is_least:
+            for operator in sorted(Operator, key=self._in_vain.__getitem__):
+                trial = self._cluster() if operator is Operator.RECUT else self._least_tried(operator)
+                if trial is not None:
+                    yield trial
+                    break
+            else:
+                if not self._begun:
+                    return
+                self._settle()  # what they find may bring something new to try
+
+    def _cluster(self) -> _Trial | None:
+        """Draw a cluster and a policy by which it has not been recut."""
+        for _ in range(DRAWS if self._policies else 0):
+            cluster = self._graph.draw(CLUSTER, self._random)
+            if cluster is None:
+                break
+            policy = int(self._random.integers(len(self._policies)))
+            if (cluster, policy) not in self._recut:
+                self._recut.add((cluster, policy))
+                self._steps += 1
+                return _Trial(Operator.RECUT, cluster, policy)
+        return None
+
+    def _least_tried(self, operator: Operator) -> _Trial | None:
+        """The part that was tried the fewest times between the same parts, of those the smallest."""
+        tries = {i: self._tries.get((operator, i, near), 0) for i in self._by_size() if (near := self._around(i))}
+        return _Trial(operator, (min(tries, key=tries.__getitem__),)) if tries else None
+
+    def _by_size(self) -> list[int]:
+        parts = self._graph.parts
+        return sorted(parts, key=lambda i: (parts[i].hull.volume, i))
+
+    def _around(self, which: int) -> Cluster:
+        """The parts that a part may be divided among."""
+        if which not in self._nears:
+            self._nears[which] = self._graph.near(which, self._near)
+        return self._nears[which]
+
+    def _exchange(self, trial: _Trial) -> Callable[[Run], Exchange | None] | None:
+        """What finds an exchange of the parts as they are; None if those of the trial have gone."""
+        graph, context, operator = self._graph, self._context, trial.operator
+        if not all(i in graph.parts for i in trial.parts):
+            return None
+        parts = graph.of(trial.parts)
+        if operator is Operator.RECUT:
+            around = graph.of(graph.around(trial.parts))
+            return partial(recut, parts, around, context.criterion, self._policies[trial.policy], context.root)
+        near = self._around(trial.parts[0])
+        key = operator, trial.parts[0], near
+        tries = self._tries[key] = self._tries.get(key, 0) + 1
+        random = np.random.default_rng(int(self._random.integers(2**32)))
+        divide = give if operator is Operator.GIVE else partial(redistribute, again=tries > 1)
+        return partial(divide, parts[0], graph.of(near), context.criterion, random, context.root)
+
+    def _make(self, trials: Iterator[_Trial]) -> None:
+        """Make trials, `LAG` at a time, and apply what they find."""
+        run = self._run
+        try:
+            while run.step(self._steps, None, len(self._best)):
+                trial = self._again.popleft() if self._again else next(trials, None)
+                if trial is None and not self._begun:
+                    return
+                if trial is not None and (exchange := self._exchange(trial)) is not None:
+                    alone = run.alone(run.work.left)
+                    self._begun.append(_UnderWay(trial, alone, run.start(partial(exchange, alone))))
+                if trial is None or len(self._begun) == LAG:
+                    self._settle()
+        except Stopped:  # raised between two exchanges: the best state so far is kept
+            run.note_stop()
+        finally:
+            run.drop([begun.found for begun in self._begun])
+            self._begun.clear()
+
+    def _settle(self) -> None:
+        """Apply what the first trial under way has found, or make it again if parts that it changes have gone."""
+        begun = self._begun.popleft()
+        exchange = self._run.result(begun.found)
+        self._run.work.pay(begun.run.work.done)
+        if begun.run.work.is_spent:  # it was given all that was left
+            self._run.work.close()
+        self._in_vain[begun.trial.operator] += begun.run.work.done
+        if exchange is None:
+            return
+        if not self._graph.apply(exchange):
+            self._again.append(begun.trial)
+            return
+        self._nears.clear()
+        self._accepted += 1
+        if exchange.gain > 0:
+            self._in_vain[begun.trial.operator] = 0
+        if cost(self.parts) < cost(self._best):
+            if len(self.parts) < len(self._best):
+                self._gained = time.perf_counter()
+            self._best = self.parts
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

@@ -4,6 +4,7 @@
 - redistribute: a part is divided until the parts around have taken all of it, or some piece cannot go. Hulls may
   overlap, so a taker need not end where the part began: it takes a piece if the solid clipped to their joint hull meets
   the criterion (`rlacd.merge.merge.Uniter`). A piece that no part can take is halved, and the halves are offered again.
+- give: the same, but what no part can take stays a part.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from rlacd.cut import CutTree
 from rlacd.merge.merge import Uniter, merge_parts
 from rlacd.policies import Policy
 from rlacd.run import Run, work
-from rlacd.solid.component import LOST_VOLUME, Component, Part, reunite
+from rlacd.solid.arrays import heights
+from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part, Plane, reunite
+from rlacd.solid.hull import Hull
 
 EXTRA_PIECES = 5
 """Pieces allowed beyond the number of parts: merging rarely makes up for more."""
@@ -129,6 +132,7 @@ def redistribute(
     random: np.random.Generator,
     solid: Component,
     run: Run,
+    again: bool = False,
 ) -> Exchange | None:
     """Divide a part among the parts around it.
 
@@ -145,47 +149,52 @@ def redistribute(
         The solid that was decomposed.
     run : Run
         Give up when it is over.
+    again : bool
+        It was tried before: pieces are halved along axes drawn at random, not between the parts that can take most.
 
     Returns
     -------
     Exchange or None
         An exchange that saves one part; None if some piece cannot be taken.
     """
-    uniter = Uniter(criterion, solid, run.work)
-    now = list(around)
-
-    def halves(piece: _Piece) -> list[_Piece]:
-        if piece.halves is None:
-            may_cut = run.step(0, None, len(now)) and run.work.pay(work.cutting(piece.component.size))
-            where = random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-            halved = piece.component.halved([part.hull for part in now], where) if may_cut else []
-            piece.halves = [_Piece(half) for half in halved]
-        return piece.halves
-
-    def may_go(piece: _Piece, halvings: int) -> bool:
-        """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger may."""
-        smaller = halves(piece) if halvings > 0 else []
-        if smaller:
-            return all(may_go(half, halvings - 1) for half in smaller)
-        return bool(_takers(now, piece.component, uniter))
-
-    def take(piece: _Piece, halvings: int) -> bool:
-        for i in _takers(now, piece.component, uniter):
-            union = uniter.unite_feasible(now[i], piece.component)
-            if union is not None:
-                now[i] = union
-                return True
-        return halvings > 0 and bool(halves(piece)) and all(take(half, halvings - 1) for half in halves(piece))
-
+    division = _Division(around, Uniter(criterion, solid, run.work), random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
-    if not all(_takers(now, piece.component, uniter) or may_go(piece, HALVINGS) for piece in pieces):
+    if not all(division.takers(piece) or division.may_go(piece) for piece in pieces):
         return None  # quick, and what most end with
-    if not all(take(piece, HALVINGS) for piece in pieces):
+    if any(division.left_of(piece, stop=True) for piece in pieces):
         return None
-    return exchange_of(part, around, now, criterion)
+    return _exchanged(part, around, division.now, criterion)
 
 
-def exchange_of(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
+def give(
+    part: Part,
+    around: Sequence[Part],
+    criterion: Criterion,
+    random: np.random.Generator,
+    solid: Component,
+    run: Run,
+) -> Exchange | None:
+    """Let the parts around a part take what they can of it (see `redistribute`).
+
+    Returns
+    -------
+    Exchange or None
+        Equally many parts or one fewer; None if nothing can be taken, or what is left does not meet the criterion.
+    """
+    division = _Division(around, Uniter(criterion, solid, run.work), random, run, again=True)
+    left = [component for member in part.members for component in division.left_of(_Piece(member))]
+    if run.is_over or all(now is before for now, before in zip(division.now, around, strict=True)):
+        return None
+    rest: list[Part] = []
+    if left:
+        hull = Hull.around(*(component.hull for component in left))
+        rest = [left[0] if len(left) == 1 else ClippedPart(solid, left, hull)]
+        if not run.work.pay(work.judging(rest[0].size, len(hull.faces))) or not criterion.is_met(rest[0]):
+            return None
+    return _exchanged(part, around, [*division.now, *rest], criterion)
+
+
+def _exchanged(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
     """The exchange of parts before and after giving; changed parts of many components are reunited."""
     known = {id(other) for other in around}
     return Exchange.between([part, *around], [p if id(p) in known else _mended(p, criterion) for p in after])
@@ -207,7 +216,61 @@ class _Piece:
     halves: list[_Piece] | None = None
 
 
-def _takers(parts: Sequence[Part], piece: Part, uniter: Uniter) -> list[int]:
-    """The parts that may take a piece, those first whose hulls would grow the least."""
-    by_growth = sorted(uniter.feasible(piece, parts), key=lambda found: found[1] - parts[found[0]].hull.volume)
-    return [i for i, _ in by_growth[:TAKERS]]
+class _Division:
+    """Parts that are offered pieces of another, which are halved if none can take them."""
+
+    def __init__(
+        self, around: Sequence[Part], uniter: Uniter, random: np.random.Generator, run: Run, again: bool
+    ) -> None:
+        self.now = list(around)
+        self._uniter = uniter
+        self._random = random
+        self._run = run
+        self._again = again
+
+    def takers(self, piece: _Piece) -> list[int]:
+        """The parts that may take a piece, those first whose hulls would grow the least."""
+        feasible = self._uniter.feasible(piece.component, self.now)
+        return [i for i, _ in sorted(feasible, key=lambda found: found[1] - self.now[found[0]].hull.volume)[:TAKERS]]
+
+    def may_go(self, piece: _Piece, halvings: int = HALVINGS) -> bool:
+        """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger may."""
+        smaller = self._halves(piece) if halvings > 0 else []
+        return all(self.may_go(half, halvings - 1) for half in smaller) if smaller else bool(self.takers(piece))
+
+    def left_of(self, piece: _Piece, halvings: int = HALVINGS, stop: bool = False) -> list[Component]:
+        """Give away what the parts can take of a piece: what is left, or the first of it that is found."""
+        for i in self.takers(piece):
+            union = self._uniter.unite_feasible(self.now[i], piece.component)
+            if union is not None:
+                self.now[i] = union
+                return []
+        halves = self._halves(piece) if halvings > 0 else []
+        if not halves:
+            return [piece.component]
+        left: list[Component] = []
+        for half in halves:
+            left += self.left_of(half, halvings - 1, stop)
+            if left and stop:
+                break
+        return left
+
+    def _halves(self, piece: _Piece) -> list[_Piece]:
+        if piece.halves is None:
+            may_cut = self._run.step(0, None, len(self.now)) and self._run.work.pay(work.cutting(piece.component.size))
+            piece.halves = [_Piece(half) for half in self._halved(piece.component)] if may_cut else []
+        return piece.halves
+
+    def _halved(self, component: Component) -> list[Component]:
+        """Cut near the middle; the smaller half comes first."""
+        share = self._random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
+        if not self._again:
+            return component.halved([part.hull for part in self.now], share)
+        axes = np.eye(3) if self._random.random() < 0.5 else component.principal_axes
+        along = heights(component.hull.vertices, axes)
+        lower, upper = along.min(axis=0), along.max(axis=0)
+        longest = int(np.argmax(upper - lower))
+        x, y, z = axes[longest].tolist()
+        sides = component.cut(Plane((x, y, z), float(lower[longest] + share * (upper - lower)[longest])))
+        halves = [side for side in sides if side is not None]
+        return sorted(halves, key=lambda half: half.volume) if len(halves) == 2 else []

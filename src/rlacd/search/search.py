@@ -1,4 +1,4 @@
-"""Search for fewer parts: the quality levels, and the bounds of each."""
+"""Search for fewer parts: the quality levels, the bounds of each, and where a search starts."""
 
 from __future__ import annotations
 
@@ -6,42 +6,45 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import reduce
 from typing import Any
 
-from rlacd.cut import CutCache, CutTree
+from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import drop_slivers, grow_cover
+from rlacd.planes.sweep import SweepCache
 from rlacd.policies import Greedy
 from rlacd.run import Run
-from rlacd.search.neighbourhood import FEW_PARTS, PATIENCE, Neighbourhood, SearchContext, SearchOutcome, cost
+from rlacd.search.neighbourhood import Neighbourhood, SearchContext, SearchOutcome, cost
 from rlacd.solid.component import Part
 
 BEST_SECONDS = 5.0
 """What ``best`` may take by default, more if its first search takes longer."""
 
-TIMES_FIRST_PASS = 4.0
+TIMES_FIRST_PASS = 5.5
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
-LEAST_WORK, MOST_WORK = 0.15e6, 6e6
-"""Absolute limits on that limit, in units: about 0.15 and 6 seconds of one core."""
+LEAST_WORK, MOST_WORK = 0.15e6, 8e6
+"""Absolute limits on that limit, in units: about 0.15 and 8 seconds of one core."""
 
 WORK_OF_A_STEP = 1e5
 """Where only the number of steps is limited, the work allowed for each: far more than most take."""
 
-BOUNDED_PATIENCE = 2
-"""A bounded search gives up after this many trials per part without a gain."""
+PATIENCE = 2.0
+"""Another start is tried when the search from the best one has saved nothing in this multiple of the work of the first
+pass: about what another start takes until it shows what it is worth."""
+
+STARTS = ("excess-norm", "hull-sum")
+"""Scores of the greedy policy for further passes over the whole solid, in turn, each among other planes."""
 
 ANOTHER_PASS = 1.5
-"""Another pass over the whole solid is abandoned when it exceeds this multiple of the work of the first, ..."""
+"""Another pass is abandoned when it exceeds this multiple of the work of the first, ..."""
+
+BOUNDED_STARTS = 2
+"""A bounded search ends when it has saved nothing from the last of so many starts for that long."""
 
 HOPELESS = 5
 """... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
-
-SHARE_OF_TIME = 2 / 5
-"""Further passes are made while one takes at most this share of the seconds left."""
-
-ROUNDS = 3
-"""If time allows, the search starts this many times from every pass, each time with another seed."""
 
 
 @dataclass
@@ -53,14 +56,16 @@ class SearchSummary:
     level : str
     seconds : float
         Wall time of the search.
-    first_pass, portfolio, parts : int
-        Number of parts before the search, after the best pass of the portfolio, and at the end.
+    last_gain : float
+        Seconds until it last saved a part; 0 if it never did.
+    first_pass, parts : int
+        Number of parts before the search and at the end.
+    starts : int
+        Passes over the whole solid that it searched from.
     steps : int
         Recuts of clusters.
     accepted : int
         Trials that were accepted.
-    exhausted : bool
-        No trial had saved a part for a long time, or no fewer can do.
     work : int
         Units of work done (see `rlacd.run.work`).
     allowed : int or None
@@ -71,12 +76,12 @@ class SearchSummary:
 
     level: str
     seconds: float
+    last_gain: float
     first_pass: int
-    portfolio: int
     parts: int
+    starts: int
     steps: int
     accepted: int
-    exhausted: bool
     work: int
     allowed: int | None
     at_least: int
@@ -93,7 +98,7 @@ def search(
     quality: str,
     seconds: float | None = None,
     steps: int | None = None,
-) -> tuple[list[Part], SearchSummary]:
+) -> tuple[list[list[Part]], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
     Without limits of its own, the search does a bounded multiple of the work of the first pass; ``best`` then goes on
@@ -114,48 +119,43 @@ def search(
 
     Returns
     -------
-    parts : list of Part
-        Never worse than the given ones. They depend on the seed and the steps, and on time only if `seconds` or the
-        run ends the search.
+    found : list of list of Part
+        What ``fast`` and ``balanced`` find, and the best; never worse than the given parts. They depend on the seed and
+        the steps, and on time only if `seconds` or the run ends the search.
     summary : SearchSummary
     """
     # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
     # below it.
     parts = drop_slivers(parts, run)
-    begin, first_pass, so_far = time.perf_counter(), run.work.done, run.seconds.copy()
-    a_pass = so_far.get("cut", 0.0) + so_far.get("merge", 0.0)
-    bounded = seconds is None and steps is None
-    allowed = math.inf
-    if bounded:
+    begin, first_pass = time.perf_counter(), run.work.done
+    allowed, bounded = math.inf, seconds is None and steps is None
+    if seconds is None:
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
-    elif steps is not None and seconds is None:
-        allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
-    others = context.scores[1:] if context.first_policy == "greedy" else context.scores
-    state = _Search(context, others, run, first_pass, a_pass, HOPELESS * len(parts))
-    if bounded:
-        with run.limited(allowed):
-            starts = state.passes(parts, others[:1] if len(parts) <= FEW_PARTS else [])
-            done = Neighbourhood(context, starts[0], run, BOUNDED_PATIENCE).improve()
-        if quality == "best":
-            with run.limited(seconds=BEST_SECONDS - (time.perf_counter() - begin)):
-                done = done.then(state.from_all(done.parts))
-    else:
-        with run.limited(allowed, math.inf if seconds is None else seconds):
-            done = state.from_all(parts, math.inf if steps is None else steps)
+        if steps is not None:
+            allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
+    state = _Search(context, parts, run, first_pass)
+    most = math.inf if steps is None else steps
+    with run.limited(allowed, math.inf if seconds is None else seconds):
+        state.go_on(most, BOUNDED_STARTS if bounded else math.inf)
+    earlier = state.outcome.parts
+    if bounded and quality == "best":
+        with run.limited(seconds=BEST_SECONDS - (time.perf_counter() - begin)):
+            state.go_on(most, math.inf)
+    done = state.outcome
     summary = SearchSummary(
         level=quality,
         seconds=time.perf_counter() - begin,
+        last_gain=max(done.gained - begin, 0.0),
         first_pass=len(parts),
-        portfolio=int(min(state.fewest, len(parts))),
         parts=len(done.parts),
+        starts=state.starts,
         steps=done.steps,
         accepted=done.accepted,
-        exhausted=done.exhausted,
         work=run.work.done - first_pass,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
         at_least=context.enough(),
     )
-    return done.parts, summary
+    return [state.early, earlier, done.parts], summary
 
 
 def eliminate_parts(context: SearchContext, parts: Sequence[Part], run: Run) -> list[Part]:
@@ -168,51 +168,82 @@ def eliminate_parts(context: SearchContext, parts: Sequence[Part], run: Run) -> 
     return state.parts
 
 
-@dataclass
 class _Search:
-    """Passes over the whole solid, and searches from each."""
+    """Searches from one start after another, of which the best so far goes on.
 
-    context: SearchContext
-    others: Sequence[str]
-    run: Run
-    first_pass: int
-    seconds_of_a_pass: float
-    hopeless: int
-    fewest: float = math.inf
+    What it does depends on time only in where it ends: with more time it is never worse.
 
-    def passes(self, parts: list[Part], scores: Sequence[str]) -> list[list[Part]]:
-        """The given parts and those of further passes, one for each score; best first."""
-        run, context, cache = self.run, self.context, CutCache()
-        found = [parts]
-        for score in scores:
-            if (
-                run.is_over
-                or len(parts) <= context.enough()
-                or self.seconds_of_a_pass > SHARE_OF_TIME * run.seconds_left
-            ):
-                break
-            tree = CutTree(context.root, Greedy(score, sweeps=context.sweeps), run, cache)
-            with run.quietly(), run.limited(ANOTHER_PASS * self.first_pass):
-                other = cut_and_merge(tree, context.criterion, run, most=self.hopeless, strict=True)
-                if other.unmet or run.is_over:
-                    continue
-            if all(cost(other.parts) != cost(known) for known in found):
-                found.append(other.parts)
-        for i, each in enumerate(found):
-            with run.limited(self.first_pass):
-                found[i] = grow_cover(each, context.criterion, run, context.root)
-        found.sort(key=cost)
-        self.fewest = min(self.fewest, len(found[0]))
-        return found
+    Parameters
+    ----------
+    context : SearchContext
+    parts : list of Part
+        The first start.
+    run : Run
+    first_pass : int
+        The work of the first pass.
+    """
 
-    def from_all(self, parts: list[Part], steps: float = math.inf) -> SearchOutcome:
-        """Search from the best pass, then from the next whenever a search is exhausted, for `ROUNDS` rounds."""
-        starts = self.passes(parts, self.others)
-        done = SearchOutcome(starts[0], 0, 0, False)
-        for number in range(ROUNDS * len(starts)):
-            context = replace(self.context, seed=self.context.seed + 1 + number)
-            state = Neighbourhood(context, starts[number % len(starts)], self.run, PATIENCE)
-            done = done.then(state.improve(steps - done.steps))
-            if not done.exhausted:
-                break
-        return done
+    def __init__(self, context: SearchContext, parts: list[Part], run: Run, first_pass: int) -> None:
+        self.starts = self._passes = 0
+        self.early = parts
+        self._context = context
+        self._parts = parts
+        self._run = run
+        self._first_pass = first_pass
+        self._best: Neighbourhood | None = None
+        self._early = len(parts)  # of the best: how many were left when each had been offered to those around
+        self._others = [SearchOutcome(parts)]
+
+    @property
+    def outcome(self) -> SearchOutcome:
+        """The best found so far."""
+        return reduce(SearchOutcome.then, self._others if self._best is None else [*self._others, self._best.outcome])
+
+    def go_on(self, steps: float, starts: float) -> None:
+        """Search until the run is over, so many recuts are made, no fewer parts can do or so many starts were tried."""
+        run, enough = self._run, self._context.enough
+        while steps > self.outcome.steps and not run.is_over and len(self.outcome.parts) > enough():
+            if self._best is None:
+                self._best = self._begun(self._parts)
+                self.early = self._best.parts
+                self._early = len(self.early)
+            self._improve(self._best, steps)
+            if (start := self._another_pass()) is not None:
+                self._challenge(self._begun(start), steps)
+            if self._passes + 1 >= starts:
+                return
+
+    def _challenge(self, other: Neighbourhood, steps: float) -> None:
+        """Search from another start unless it is behind already; the better of two goes on."""
+        assert self._best is not None
+        early = len(other.parts)
+        if early < self._early:
+            self._improve(other, steps)
+        if cost(other.outcome.parts) < cost(self._best.outcome.parts):
+            self._best, self._early, other = other, early, self._best
+        self._others.append(other.outcome)
+
+    def _improve(self, state: Neighbourhood, steps: float) -> None:
+        state.improve(steps - self.outcome.steps + state.outcome.steps, PATIENCE * self._first_pass)
+
+    def _begun(self, parts: list[Part]) -> Neighbourhood:
+        run, context = self._run, self._context
+        with run.limited(self._first_pass):
+            parts = grow_cover(parts, context.criterion, run, context.root)
+        state = Neighbourhood(replace(context, seed=context.seed + self.starts), parts, run)
+        self.starts += 1
+        state.redistribute_all()
+        return state
+
+    def _another_pass(self) -> list[Part] | None:
+        """The parts of a pass by another score, among other planes; None if it takes too much work."""
+        run, context = self._run, self._context
+        if run.is_over:
+            return None
+        self._passes += 1
+        sweeps = SweepCache(seed=(context.seed, self._passes))
+        tree = CutTree(context.root, Greedy(STARTS[self._passes % len(STARTS)], sweeps=sweeps), run)
+        with run.quietly(), run.limited(ANOTHER_PASS * self._first_pass):
+            most = HOPELESS * len(self._parts)
+            other = cut_and_merge(tree, context.criterion, run, most=most, strict=True)
+            return None if other.unmet or run.is_over else other.parts
