@@ -16,6 +16,7 @@ COMMANDS = {
     "batch": "the overhead of a batch beside its meshes",
     "physics": "the hulls in a simulator: piles, balls dropped into holes; primitives",
     "training": "the paper's experiments that train: rewards, discounts",
+    "oracle": "small solids: the best trees of cuts by the paper's objective and by the number of parts",
     "prices": "the prices of rlacd.work against measured times",
 }
 """Name to purpose; each is a module of that name with a click command ``app``."""

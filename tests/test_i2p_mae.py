@@ -252,8 +252,8 @@ def test_without_weights_the_error_says_where_to_get_them(meshes: Path, tmp_path
 SHORT: dict[str, Any] = {
     **TINY_RUN,
     "encoder": "i2p-mae",
-    "iterations": 60,
-    "warmup": 20,
+    "env_steps": 60,
+    "learning_starts": 20,
     "points": 64,
     "validate_every": 30,
 }
@@ -277,7 +277,7 @@ def run(meshes: Path, folder: Path, weights: Path, resume: bool = False, **chang
 
 def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "whole", weights)
-    run(meshes, tmp_path / "halves", weights, iterations=34)
+    run(meshes, tmp_path / "halves", weights, env_steps=34)
     elsewhere = shutil.copy(weights, tmp_path / "the_same.pth")
     run(meshes, tmp_path / "halves", elsewhere, resume=True)
     assert whole_state(tmp_path / "whole") == whole_state(tmp_path / "halves")
@@ -285,7 +285,7 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: 
 
 
 def test_other_weights_do_not_go_on_with_a_run(meshes: Path, weights: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "run", weights, iterations=30, validation=0)
+    run(meshes, tmp_path / "run", weights, env_steps=30, validation=0)
     other = write_tiny_weights(tmp_path / "other.pth", seed=1)
     with pytest.raises(OptionError, match=r"other\.pth holds other weights than the run began with"):
         run(meshes, tmp_path / "run", other, resume=True, validation=0)

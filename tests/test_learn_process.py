@@ -17,6 +17,7 @@ import torch
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
+from rlacd.learn.episodes import Episode
 from rlacd.learn.meshes import list_meshes
 from rlacd.learn.process import Cut, CutProcess, terminal_reward
 from rlacd.learn.q_network import bellman_loss, dual_state_target, soft_value
@@ -140,15 +141,33 @@ def test_dual_state_target_by_hand() -> None:
 
 
 def test_loss_by_hand_and_only_through_the_planes_taken() -> None:
-    q = Q.clone().requires_grad_()
-    loss = bellman_loss(q, torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0)
-    assert loss.item() == pytest.approx(0.5 * (1 + 0) / 2)
-    assert (
-        bellman_loss(torch.tensor([2.0, 4.0]), torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0) == loss.detach()
-    )
+    q = Q.clone()[None].requires_grad_()
+    planes, target = torch.tensor([1, 0]), torch.tensor([5.0, 4.0])
+    loss = bellman_loss(q, planes, target)
+    assert loss.item() == pytest.approx(0.5 * (9 + 0) / 2)
+    assert bellman_loss(torch.tensor([[2.0, 4.0], [5.0, 4.0]]), planes, target) == loss.detach(), "the sum of networks"
+    assert bellman_loss(q, planes, target, huber=1.0).item() == pytest.approx((3 - 0.5) / 2)
     loss.backward()
     assert q.grad is not None
-    assert q.grad.tolist() == [pytest.approx([0, -1.0 / 10 / 2, 0]), [0, 0, 0]]
+    assert q.grad[0].tolist() == [pytest.approx([0, -3.0 / 2, 0]), [0, 0, 0]]
+
+
+def test_returns_over_a_tree_by_hand() -> None:
+    # 0 is cut into 1 and 2; 1 into 3, which is never cut; 2 to the end.
+    episode = Episode(
+        np.zeros((4, 1), np.float16),
+        np.ones((4, 1), np.bool_),
+        np.zeros(4),
+        *(np.array([0, 1, 2]), np.zeros(3, np.int64), np.array([100.0, 10.0, 1.0])),
+        *(np.array([1, 2, 3]), np.array([0, 0, 1]), np.array([0.5, 0.25, 0.9])),
+        parts=9,
+        ended="cap",
+    )
+    one, whole = [100, 10, 1], [100 + 5 + 0.25, 10, 1]
+    for steps, sums, left in ((1, one, {1: 0.5, 2: 0.25}), (2, whole, {3: 0.45}), (0, whole, {3: 0.45})):
+        rewards, leaves = episode.returns(steps)
+        assert rewards.tolist() == sums
+        assert leaves == [left, {3: 0.9}, {}]
 
 
 def component(number: int, replay: Replay) -> Seen:
@@ -158,11 +177,13 @@ def component(number: int, replay: Replay) -> Seen:
 def test_fewest_cuts_by_hand() -> None:
     replay = Replay(9, unknown=100)
     a, b, c, d = (component(i, replay) for i in range(4))
-    replay.count([(a, ((b, 1.0), (c, 1.0))), (b, ()), (c, ((d, 1.0),))])  # d is left when the episode ends
+    replay.count(
+        [(a, ((b, 1.0, 0.0), (c, 1.0, 0.0))), (b, ()), (c, ((d, 1.0, 0.0),))]
+    )  # d is left when the episode ends
     assert [x.fewest for x in (a, b, c, d)] == [1 + 1 + 101, 1, 1 + 100, math.inf]
-    replay.count([(component(2, replay), ((d, 1.0),)), (d, ())])  # another episode comes to the same component
+    replay.count([(component(2, replay), ((d, 1.0, 0.0),)), (d, ())])  # another episode comes to the same component
     assert [x.fewest for x in (a, b, c, d)] == [103, 1, 2, 1]
-    assert replay.cuts(((b, 1.0), (c, 1.0))) == 4
+    assert replay.cuts(((b, 1.0, 0.0), (c, 1.0, 0.0))) == 4
 
 
 @given(st.integers(1, 9), st.lists(st.integers(0, 3), min_size=1, max_size=60))
@@ -171,9 +192,9 @@ def test_replay_gives_back_the_last_transitions_also_when_restored(capacity: int
     replay, made, added = Replay(capacity), 1, {}
     for count in children:
         state, *below = (component(made + i, replay) for i in range(count + 1))
-        left = tuple((child, 0.5 / (i + 1)) for i, child in enumerate(below))
+        left = tuple((child, 0.5 / (i + 1), 0.1 * i) for i, child in enumerate(below))
         replay.count([(state, left)])
-        added[float(made)] = Transition(state, made % 11, state.features, -made, left)
+        added[float(made)] = Transition(state, made % 11, state.features, -made, left, 0.5)
         replay.add(added[float(made)])
         made += 1 + count
     restored = Replay(capacity)
@@ -190,9 +211,10 @@ def test_replay_gives_back_the_last_transitions_also_when_restored(capacity: int
             cut.reward,
             1 + len(cut.children),
         )
-        assert batch["child_features"][mine, 0].tolist() == [float(c.features[0]) for c, _ in cut.children]
-        assert [m.tolist() for m in batch["child_masks"][mine]] == [c.mask.tolist() for c, _ in cut.children]
-        assert batch["child_discounts"][mine] == pytest.approx([d for _, d in cut.children])
+        assert batch["child_features"][mine, 0].tolist() == [float(c.features[0]) for c, *_ in cut.children]
+        assert [m.tolist() for m in batch["child_masks"][mine]] == [c.mask.tolist() for c, *_ in cut.children]
+        assert batch["child_discounts"][mine] == pytest.approx([d for _, d, _ in cut.children])
+        assert batch["child_excess"][mine] == pytest.approx([e for *_, e in cut.children])
 
 
 def test_nothing_to_sample_is_reported() -> None:

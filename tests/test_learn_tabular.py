@@ -130,7 +130,14 @@ def fewest(node: Node) -> int:
 )
 def test_networks_reach_the_optimum_of_their_objective(u_shape: Component, tmp_path: Path, changes: Any) -> None:
     """The reward for finishing the whole solid is no part of a component's own value: there is none to compare with."""
-    steps = {"iterations": 1500, "warmup": 100, "batch": 32, "replay": 5000, "target_every": 50, "environments": 1}
+    steps = {
+        "env_steps": 1500,
+        "learning_starts": 100,
+        "batch_size": 32,
+        "buffer_size": 5000,
+        "target_frequency": 50,
+        "environments": 1,
+    }
     given = {"learning_rate": 1e-3, "epsilon": 0.3, "validation": 0, "rotate": False, **steps, **changes}
     options = TrainOptions(threshold=LIMIT.threshold, **given)
     train(tmp_path / "meshes", tmp_path / "run", options, say=lambda line: None)

@@ -28,17 +28,17 @@ from tests.learning import write_meshes
 from tests.pool.obedient import pool_processes
 
 TINY: dict[str, Any] = {
-    "iterations": 120,
-    "warmup": 30,
-    "batch": 8,
+    "env_steps": 120,
+    "learning_starts": 30,
+    "batch_size": 8,
     "max_faces": 500,
     "environments": 2,
     "validation": 1,
     "validate_every": 60,
     "log_every": 20,
-    "target_every": 10,
+    "target_frequency": 10,
     "max_parts": 12,
-    "replay": 50,
+    "buffer_size": 50,
     "checkpoint_seconds": 0.0,
 }
 
@@ -84,7 +84,7 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         assert isinstance(TrainOptions.preset(name), TrainOptions)
     paper = TrainOptions.preset("paper")
     assert (paper.threshold, paper.volume_reward, paper.finish_reward) == (0.04, 1000, 1000)
-    assert (paper.replay, paper.iterations, paper.warmup) == (100_000, 1_000_000, 10_000)
+    assert (paper.buffer_size, paper.env_steps, paper.learning_starts) == (100_000, 1_000_000, 10_000)
     assert (paper.epsilon, paper.epsilon_decay, paper.points, paper.encoder) == (0.2, 0.99, 2048, "i2p-mae")
     assert (paper.temperature, paper.objective) == (0, "rewards")
     assert paper.max_parts >= 512
@@ -95,8 +95,8 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"batch": 0}, "batch is"),
-        ({"batch": 2.5}, "batch is"),
+        ({"batch_size": 0}, "batch_size is"),
+        ({"batch_size": 2.5}, "batch_size is"),
         ({"threshold": float("nan")}, "threshold is"),
         ({"epsilon": 1.1}, "epsilon is"),
         ({"objective": "both"}, "objective is"),
@@ -145,7 +145,7 @@ def test_the_same_seed_gives_the_same_weights_and_another_does_not(meshes: Path,
 @pytest.mark.slow
 def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "whole")
-    run(meshes, tmp_path / "halves", iterations=70)
+    run(meshes, tmp_path / "halves", env_steps=70)
     (tmp_path / "halves" / "checkpoint.npz.1.part").write_bytes(b"what a crash left")
     run(meshes, tmp_path / "halves", resume=True)
     assert_same_run(tmp_path / "whole", tmp_path / "halves")
@@ -154,8 +154,8 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path:
 @pytest.mark.nightly
 def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    run(meshes, whole, iterations=400)
-    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "jobs": 2}.items()]
+    run(meshes, whole, env_steps=400)
+    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "env_steps": 400, "jobs": 2}.items()]
     words = ["train", str(meshes), "--run", str(killed), "--preset", "paper", "--encoder", "sweep"]  # the defaults
     process = subprocess.Popen([sys.executable, "-m", "rlacd", *words, *given], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
@@ -163,7 +163,7 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    run(meshes, killed, iterations=400, resume=True)
+    run(meshes, killed, env_steps=400, resume=True)
     assert_same_run(whole, killed)
 
 
@@ -249,15 +249,15 @@ def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tm
 
 
 def test_a_run_is_not_overwritten_and_not_resumed_with_other_options(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "run", iterations=40, validation=0)
+    run(meshes, tmp_path / "run", env_steps=40, validation=0)
     with pytest.raises(OptionError, match="holds a run already"):
         run(meshes, tmp_path / "run", validation=0)
-    with pytest.raises(OptionError, match="batch is 9, but was 8"):
-        run(meshes, tmp_path / "run", resume=True, batch=9, validation=0)
+    with pytest.raises(OptionError, match="batch_size is 9, but was 8"):
+        run(meshes, tmp_path / "run", resume=True, batch_size=9, validation=0)
 
 
 def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "run", iterations=40, validation=0)
+    run(meshes, tmp_path / "run", env_steps=40, validation=0)
     broken = tmp_path / "run" / "checkpoint.npz"
     broken.write_bytes(broken.read_bytes()[:1000])
     with pytest.raises(TrainingError, match="is damaged"):

@@ -27,6 +27,8 @@ class Episode:
     features : float16 [N, D] or [N, A, D]
     masks : bool [N, A]
         Their valid planes.
+    excess : float64 [N]
+        See `CutProcess.excess`.
     state, planes : int64 [T]
         The component that each cut divided, by its number, and the plane.
     rewards : float64 [T]
@@ -41,6 +43,7 @@ class Episode:
 
     features: NDArray[np.float16]
     masks: BoolArray
+    excess: FloatArray
     state: Int64Array
     planes: Int64Array
     rewards: FloatArray
@@ -55,7 +58,7 @@ class Episode:
         """Create an episode without a cut."""
         ints, floats = np.empty(0, np.int64), np.empty(0)
         none = np.empty((0, 0), np.float16), np.empty((0, 0), np.bool_)
-        return cls(*none, ints, ints, floats, ints, ints, floats, 0, ended)
+        return cls(*none, floats, ints, ints, floats, ints, ints, floats, 0, ended)
 
     def children(self) -> list[dict[int, float]]:
         """Discounts of the unfinished children of each cut, by their numbers."""
@@ -63,6 +66,22 @@ class Episode:
         for child, owner, discount in zip(*(a.tolist() for a in (self.child, self.owner, self.discounts)), strict=True):
             left[owner][child] = discount
         return left
+
+    def returns(self, steps: int) -> tuple[FloatArray, list[dict[int, float]]]:
+        """Rewards of each cut and of those below it, `steps` deep in all (0: to the end), and what is left there."""
+        children, cut = self.children(), {int(component): t for t, component in enumerate(self.state)}
+        sums, left, deeper = self.rewards, children, True
+        while deeper and steps != 1:
+            added, below = self.rewards.copy(), [dict[int, float]() for _ in children]
+            for t, own in enumerate(children):
+                for child, discount in own.items():
+                    if child in cut:
+                        added[t] += discount * sums[cut[child]]
+                        below[t].update((c, discount * d) for c, d in left[cut[child]].items())
+                    else:
+                        below[t][child] = discount
+            deeper, sums, left, steps = below != left, added, below, steps - 1
+        return sums, left
 
     def to_bytes(self) -> bytes:
         """Pack it for `from_bytes`."""
@@ -117,6 +136,7 @@ class Player:
         return Episode(
             np.stack([features for features, _ in seen]).astype(np.float16),
             np.stack([mask for _, mask in seen]),
+            np.array([cutting.excess(component) for component in numbers]),
             *(state, planes, rewards, of_child.astype(np.int64), owner.astype(np.int64), discounts),
             parts=len(cutting.all),
             ended="cap" if cutting.unfinished else "terminal" if cutting.terminal else "stuck",

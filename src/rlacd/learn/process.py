@@ -117,6 +117,10 @@ class CutProcess(Settled):
             known[component] = paper_planes(component)
         return known[component]
 
+    def excess(self, component: Component) -> float:
+        """Most that r_1 can still earn from a component on: (|CH(m_i)| - |m_i|) / |CH(m)|."""
+        return max(component.hull.volume - component.volume, 0.0) / self._hull_volume
+
     def largest(self) -> int:
         """Index of the unfinished component with the largest hull, so that coarse cuts come first."""
         return max(range(len(self.unfinished)), key=lambda i: self.unfinished[i].hull.volume)

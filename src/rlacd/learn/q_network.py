@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,35 +24,36 @@ SHARED = (128, 128)
 
 
 class QNetwork(nn.Module):
-    """A multilayer perceptron with ReLU.
+    """One or two multilayer perceptrons with ReLU; the lesser of two values is the value (clipped double Q-learning).
 
     Parameters
     ----------
     inputs, outputs : int
         Features, and values that they give: 1 where each plane has features of its own, and all share the network.
-    unit : float
-        Factor applied to the outputs. Rewards are weighted by 1000; without the factor the last layer needs the first
-        hundred thousand steps just to reach that scale.
+    count : int
     """
 
-    def __init__(self, inputs: int, outputs: int, unit: float = 1.0) -> None:
+    def __init__(self, inputs: int, outputs: int, count: int = 1) -> None:
         super().__init__()
-        self.unit = unit
         hidden = SHARED if outputs == 1 else HIDDEN
-        layers: list[nn.Module] = []
-        for before, after in pairwise((inputs, *hidden)):
-            layers += [nn.Linear(before, after), nn.ReLU()]
-        self.layers = nn.Sequential(*layers, nn.Linear(hidden[-1], outputs))
+        self.each = nn.ModuleList(multilayer((inputs, *hidden, outputs)) for _ in range(count))
 
     def forward(self, features: Tensor) -> Tensor:
-        """Values Q(p, m) [B, 150] of features [B, inputs] or [B, 150, inputs]; [B] of those of one plane each."""
-        out: Tensor = self.unit * self.layers(features)
-        return out.squeeze(-1)
+        """Each network's Q(p, m) [N, B, 150] of features [B, inputs] or [B, 150, inputs]; [N, B] of one plane's."""
+        return torch.stack([one(features).squeeze(-1) for one in self.each])
 
     def plain(self, about: Mapping[str, Any]) -> Network:
-        """Copy the network for a file (`rlacd.policies.network`); its values are in units of `unit`."""
-        linear = [layer for layer in self.layers if isinstance(layer, nn.Linear)]
+        """Copy the first network for a file (`rlacd.policies.network`)."""
+        linear = [layer for layer in self.each[0].modules() if isinstance(layer, nn.Linear)]
         return Network([(x.weight.detach().cpu().numpy(), x.bias.detach().cpu().numpy()) for x in linear], about)
+
+
+def multilayer(widths: Sequence[int]) -> nn.Sequential:
+    """Linear layers with ReLU between them."""
+    layers: list[nn.Module] = []
+    for before, after in pairwise(widths):
+        layers += [nn.Linear(before, after), nn.ReLU()]
+    return nn.Sequential(*layers[:-1])
 
 
 def soft_value(q: Tensor, mask: Tensor, temperature: float) -> Tensor:
@@ -80,13 +81,15 @@ def dual_state_target(reward: Tensor, values: Tensor, discounts: Tensor, owner: 
     return reward.index_add(0, owner, discounts * values)
 
 
-def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, unit: float) -> Tensor:
-    """Half the mean squared error of Q(p, m), in units of `unit`: of q [B, A], those of the planes taken, int64 [B].
+def bellman_loss(q: Tensor, planes: Tensor, target: Tensor, huber: float = 0.0) -> Tensor:
+    """Half the mean squared error of Q(p, m): of q [N, B, A] of N networks, those of the planes taken, int64 [B].
 
-    A network shared by the planes has seen those only: q [B].
+    A network shared by the planes has seen those only: q [N, B]. Beyond an error of `huber`, if any, it is linear.
     """
-    taken = q if q.dim() == 1 else q.gather(1, planes[:, None])[:, 0]
-    return 0.5 * ((taken - target) / unit).square().mean()
+    taken = q if q.dim() == 2 else q.gather(2, planes.expand(len(q), -1)[..., None])[..., 0]
+    error = (taken - target).abs()
+    square = 0.5 * error.square()
+    return (torch.where(error < huber, square, huber * (error - huber / 2)) if huber else square).mean(dim=1).sum()
 
 
 def policy_of(network: QNetwork | Network, encoder: Encoder, **deployment: int) -> QPolicy:

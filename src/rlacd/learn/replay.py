@@ -29,19 +29,20 @@ class Seen:
     fewest: float = math.inf
 
 
-Children = Sequence[tuple[Seen, float]]
-"""The unfinished components that a cut left, with discounts."""
+Children = Sequence[tuple[Seen, float, float]]
+"""The unfinished components that cuts left, with discounts and excess (`CutProcess.excess`)."""
 
 
 @dataclass(frozen=True)
 class Transition:
-    """A cut: what it divided, by which plane, what the network sees of that, its reward, and what it left."""
+    """A cut: what it divided, by which plane, what the network sees of that, its reward, what it left, its excess."""
 
     state: Seen
     plane: int
     features: NDArray[np.float16]
     reward: float
     children: Children
+    excess: float
 
 
 class Replay:
@@ -75,7 +76,7 @@ class Replay:
 
     def cuts(self, children: Children) -> float:
         """The fewest cuts seen, from one on that left `children`."""
-        return 1 + sum(child.fewest if child.fewest < math.inf else self._unknown for child, _ in children)
+        return 1 + sum(child.fewest if child.fewest < math.inf else self._unknown for child, _, _ in children)
 
     def count(self, cuts: Sequence[tuple[Seen, Children]]) -> None:
         """Note the fewest cuts of the components that an episode cut, in its order."""
@@ -97,13 +98,14 @@ class Replay:
         -------
         dict of arrays
             features float32 [B, D], planes int64 [B], rewards float32 [B], and cuts float32 [B], the fewest seen from
-            this one on. Of the C unfinished children: owner int64 [C], their row; child_features float32 [C, D] or
-            [C, A, D]; child_masks bool [C, A], never all False in a row; child_discounts float32 [C].
+            this one on; excess float32 [B]. Of the C children: owner int64 [C], their row; child_features float32
+            [C, D] or [C, A, D]; child_masks bool [C, A], never all False in a row; child_discounts and
+            child_excess float32 [C].
         """
         if not self._held:
-            raise RlacdError("there is nothing to learn from yet; let `warmup` be at least 1.")
+            raise RlacdError("there is nothing to learn from yet; let `learning_starts` be at least 1.")
         drawn = [self._held[i] for i in rng.integers(len(self._held), size=count)]
-        children = [(row, child, discount) for row, t in enumerate(drawn) for child, discount in t.children]
+        children = [(row, *child) for row, t in enumerate(drawn) for child in t.children]
         first = drawn[0].state
         shape = len(children), *first.features.shape
         return {
@@ -111,28 +113,30 @@ class Replay:
             "planes": np.array([t.plane for t in drawn]),
             "rewards": np.array([t.reward for t in drawn], np.float32),
             "cuts": np.array([self.cuts(t.children) for t in drawn], np.float32),
-            "child_features": np.array([c.features for _, c, _ in children], np.float32).reshape(shape),
-            "child_masks": np.array([c.mask for _, c, _ in children], np.bool_).reshape(-1, len(first.mask)),
-            "child_discounts": np.array([discount for _, _, discount in children], np.float32),
-            "owner": np.array([row for row, _, _ in children], np.int64),
+            "excess": np.array([t.excess for t in drawn], np.float32),
+            "child_features": np.array([child[1].features for child in children], np.float32).reshape(shape),
+            "child_masks": np.array([child[1].mask for child in children], np.bool_).reshape(-1, len(first.mask)),
+            "child_discounts": np.array([child[2] for child in children], np.float32),
+            "child_excess": np.array([child[3] for child in children], np.float32),
+            "owner": np.array([child[0] for child in children], np.int64),
         }
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return everything as arrays, for a checkpoint; each component once."""
         number: dict[Seen, int] = {}
         for t in self._held:
-            for seen in (t.state, *(child for child, _ in t.children)):
+            for seen in (t.state, *(child for child, _, _ in t.children)):
                 number.setdefault(seen, len(number))
-        links = [(i, number[c], d) for i, t in enumerate(self._held) for c, d in t.children]
-        cuts = [(number[t.state], t.plane, t.reward) for t in self._held]
+        links = [(i, number[c], *rest) for i, t in enumerate(self._held) for c, *rest in t.children]
+        cuts = [(number[t.state], t.plane, t.reward, t.excess) for t in self._held]
         return {
             "keys": np.array([[*seen.key] for seen in number], np.uint8),
             "features": np.array([seen.features for seen in number], np.float16),
             "masks": np.array([np.packbits(seen.mask) for seen in number], np.uint8),
             "fewest": np.array([seen.fewest for seen in number]),
             "taken": np.array([t.features for t in self._held], np.float16),
-            "cuts": np.array(cuts, np.float64).reshape(-1, 3),
-            "links": np.array(links, np.float64).reshape(-1, 3),
+            "cuts": np.array(cuts, np.float64).reshape(-1, 4),
+            "links": np.array(links, np.float64).reshape(-1, 4),
             "cursor": np.array([self._next, len(next(iter(number)).mask) if number else 0]),
         }
 
@@ -144,8 +148,8 @@ class Replay:
         columns = (keys, state["features"], masks, state["fewest"].tolist())
         seen = [Seen(*row) for row in zip(*columns, strict=True)]
         self._seen = WeakValueDictionary(zip(keys, seen, strict=True))
-        children: list[list[tuple[Seen, float]]] = [[] for _ in state["cuts"]]
-        for owner, child, discount in state["links"].tolist():
-            children[int(owner)].append((seen[int(child)], discount))
+        children: list[list[tuple[Seen, float, float]]] = [[] for _ in state["cuts"]]
+        for owner, child, discount, excess in state["links"].tolist():
+            children[int(owner)].append((seen[int(child)], discount, excess))
         cuts = zip(state["cuts"].tolist(), state["taken"], children, strict=True)
-        self._held = [Transition(seen[int(s)], int(p), f, r, tuple(left)) for (s, p, r), f, left in cuts]
+        self._held = [Transition(seen[int(s)], int(p), f, r, tuple(left), e) for (s, p, r, e), f, left in cuts]

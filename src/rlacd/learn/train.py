@@ -11,12 +11,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
@@ -37,6 +38,9 @@ from rlacd.policies.network import KIND, SHORTLIST
 from rlacd.pool import Pool, ProcessLimits, Shared
 from rlacd.pool.local import InProcessPool
 from rlacd.run import Run
+
+LEAST_EXCESS = 1e-6
+"""Share of the solid's hull: components with less excess have the same unit."""
 
 
 def train(
@@ -110,11 +114,14 @@ class Training:
         self.encoder = make_encoder(options)
         self.device = pick_device(options)
         torch.manual_seed(options.seed)
-        self.network = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)
-        self.target = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)
+        self.network, self.target = (
+            QNetwork(self.encoder.dim, self.encoder.outputs, options.networks).to(self.device) for _ in range(2)
+        )
         self.target.load_state_dict(self.network.state_dict())
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
-        self.replay = Replay(options.replay, options.max_parts, options.objective == "rewards")
+        self.replay = Replay(
+            options.buffer_size, options.max_parts, options.objective == "rewards" and options.n_step != 0
+        )
         self.rng = np.random.default_rng([options.seed, 0])
         self.cuts = self.learned = 0
         self.best = np.inf
@@ -126,7 +133,7 @@ class Training:
     def run(self) -> None:
         """Play episodes and learn from them until the last iteration."""
         options, saved, before = self.options, time.perf_counter(), time.perf_counter() - self.seconds
-        while self.cuts < options.iterations:
+        while self.cuts < options.env_steps:
             cuts = self.cuts
             self.rollouts.begin(*self.acting())
             self.learn_from(self.rollouts.take())
@@ -145,23 +152,31 @@ class Training:
 
     def acting(self) -> tuple[Shared | None, float]:
         """How new episodes are played (4.1): at random at first, then epsilon-greedily; see `Rollouts.begin`."""
-        if self.cuts < self.options.warmup:
+        if self.cuts < self.options.learning_starts:
             return None, 1.0
-        thousands = (self.cuts - self.options.warmup) // 1000
-        network = Shared({"network": self.network.plain({"threshold": 1.0}).to_bytes()})
+        thousands = (self.cuts - self.options.learning_starts) // 1000
+        network = Shared({"network": self.playing.plain({"threshold": 1.0}).to_bytes()})
         return network, self.options.epsilon * self.options.epsilon_decay**thousands
+
+    @property
+    def playing(self) -> QNetwork:
+        """The network that plays and is validated: the average, if there is one."""
+        return self.target if self.options.tau else self.network
 
     def learn_from(self, episode: Episode) -> None:
         """Add an episode to the replay buffer cut by cut, and learn after each."""
         seen = [self.replay.seen(*pair) for pair in zip(episode.features, episode.masks, strict=True)]
-        left = [tuple((seen[child], d) for child, d in children.items()) for children in episode.children()]
-        cuts = list(zip(episode.state.tolist(), episode.planes.tolist(), episode.rewards.tolist(), left, strict=True))
-        self.replay.count([(seen[state], children) for state, _, _, children in cuts])
+        rewards, leaves = episode.returns(1 if self.options.objective == "fewest-cuts" else self.options.n_step)
+        excess = episode.excess.tolist()
+        left = [tuple((seen[child], d, excess[child]) for child, d in children.items()) for children in leaves]
+        cuts = list(zip(episode.state.tolist(), episode.planes.tolist(), rewards.tolist(), left, strict=True))
+        if self.options.objective == "fewest-cuts":
+            self.replay.count([(seen[state], children) for state, _, _, children in cuts])
         for state, plane, reward, children in cuts:
             features = episode.features[state] if self.encoder.outputs > 1 else episode.features[state, plane]
-            self.replay.add(Transition(seen[state], plane, features.copy(), reward, children))
+            self.replay.add(Transition(seen[state], plane, features.copy(), reward, children, excess[state]))
             self.cuts += 1
-            if self.cuts > self.options.warmup and self.cuts % self.options.learn_every == 0:
+            if self.cuts > self.options.learning_starts and self.cuts % self.options.train_frequency == 0:
                 self.learn()
         if len(episode.planes):
             self._add(reward=float(episode.rewards.mean()), parts=float(episode.parts))
@@ -169,21 +184,40 @@ class Training:
 
     def learn(self) -> None:
         """Take a gradient step on one batch: the dual-state Bellman loss (eq. 8), or that to the fewest cuts seen."""
-        options, batch = self.options, self.replay.sample(self.options.batch, self.rng)
+        options, batch = self.options, self.replay.sample(self.options.batch_size, self.rng)
         tensor = {name: torch.from_numpy(array).to(self.device) for name, array in batch.items()}
-        target = -tensor["cuts"].log()
-        if options.objective == "rewards":
-            with torch.no_grad():
-                values = soft_value(self.target(tensor["child_features"]), tensor["child_masks"], options.temperature)
-            target = dual_state_target(tensor["rewards"], values, tensor["child_discounts"], tensor["owner"])
-        loss = bellman_loss(self.network(tensor["features"]), tensor["planes"], target, options.unit)
+        target = self.targets(tensor) if options.objective == "rewards" else -tensor["cuts"].log()
+        loss = bellman_loss(self.network(tensor["features"]), tensor["planes"], target, options.huber)
         self.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.optimizer.step()
         self.learned += 1
-        if self.learned % options.target_every == 0:
+        if options.tau:
+            with torch.no_grad():
+                for mean, new in zip(self.target.parameters(), self.network.parameters(), strict=True):
+                    mean.lerp_(new, options.tau)
+        elif self.learned % options.target_frequency == 0:
             self.target.load_state_dict(self.network.state_dict())
         self._add(loss=float(loss.detach()), target=float(target.mean()))
+
+    @torch.no_grad()
+    def targets(self, batch: Mapping[str, Tensor]) -> Tensor:
+        """Right-hand side of eq. 8 [B], in the unit of each component's values."""
+        options, most = self.options, self.options.volume_reward * batch["child_excess"] + self.options.finish_reward
+        sums = batch["rewards"]
+        if options.n_step:
+            q = self.target(batch["child_features"]) * self.unit(batch["child_excess"])[:, None]
+            values = soft_value(q.amin(dim=0), batch["child_masks"], options.temperature)
+            values = torch.minimum(values.clamp(min=0), most) if options.clip else values
+            sums = dual_state_target(sums, values, batch["child_discounts"], batch["owner"])
+        return sums / self.unit(batch["excess"])
+
+    def unit(self, excess: Tensor) -> Tensor:
+        """What the network's outputs for components of such an excess are multiplied by."""
+        options, weight = self.options, max(self.options.volume_reward, self.options.finish_reward)
+        if options.value_unit == "weight":
+            return torch.full_like(excess, weight)
+        return weight * excess.clamp(min=LEAST_EXCESS)
 
     # Curves, validation, checkpoints
 
@@ -194,12 +228,12 @@ class Training:
 
     def validate(self) -> None:
         """Count the parts of the validation's solids; the network with the fewest is kept as the best."""
-        ratios = self.validation.ratios(self.network, self.encoder)
+        ratios = self.validation.ratios(self.playing, self.encoder)
         self._point({f"validation_{name}": value for name, value in ratios.items()})
         if ratios["own_plane"] <= self.best:
             self.best = ratios["own_plane"]
             about = {"kind": KIND, "threshold": self.options.threshold, "encoder": self.options.encoder}
-            write_file(self.folder / "policy.npz", self.network.plain(about).to_bytes())
+            write_file(self.folder / "policy.npz", self.playing.plain(about).to_bytes())
 
     def save(self) -> None:
         """Write a checkpoint."""
@@ -276,7 +310,7 @@ class Validation:
         where = "solids it has not seen" if self._held_out else "the solids it learned from"
         text = f"On {where}, the network's plane leaves {best:.3f} times greedy's parts (random: {self._random:.3f}). "
         if best > 1:
-            return f"{text}Greedy is better: go on with  --resume --iterations {2 * options.iterations}  in {folder}."
+            return f"{text}Greedy is better: go on with  --resume --env-steps {2 * options.env_steps}  in {folder}."
         if options.encoder == "i2p-mae":
             return f"{text}Use it in Python:  rlacd.learn.q_network.load_policy({str(folder)!r}, shortlist=10)."
         return f"{text}Use it:  rlacd decompose MESH --policy {folder / 'policy.npz'}"
@@ -287,5 +321,5 @@ def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(counts, 1) / np.maximum(others, 1)))))
 
 
-MAY_CHANGE = ["iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"]
+MAY_CHANGE = ["env_steps", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"]
 """Options that may change when a run is resumed: its length, its logging, its place and files."""
