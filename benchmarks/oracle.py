@@ -27,7 +27,7 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
-from rlacd.learn.process import CutProcess, Memory, terminal_reward
+from rlacd.learn.environment import CutEnv, Memory, terminal_reward
 from rlacd.merge import drop_slivers, merge_parts
 from rlacd.planes.candidates import concave_edge_planes
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
@@ -70,6 +70,10 @@ class Node:
     choices: list[Choice] | None = None
     fewest: list[Component] = field(default_factory=list)
 
+    def end(self, which: str) -> list[float]:
+        """Of the intervals, the ends called low or high."""
+        return self.low if which == "low" else self.high
+
 
 class Oracle:
     """The trees of cuts of one connected solid.
@@ -88,7 +92,7 @@ class Oracle:
         self._hull, self._finish, self.expanded = solid.hull.volume, 1.0, 0
         self._nodes: dict[tuple[float, ...], Node] = {}
         self._greedy = make_policy("greedy-hull-sum+edges")
-        self.roots = [self._node(c) for c in CutProcess(solid, criterion, self._memory).unfinished]
+        self.roots = [self._node(c) for c in CutEnv(solid, criterion, self._memory).unfinished]
 
     def fewest(self, node: Node) -> None:
         """Find fewer parts: greedy from every choice first, then all trees of at most so many parts."""
@@ -100,7 +104,7 @@ class Oracle:
         except OutOfBudgetError:
             pass
 
-    def best(self, node: Node, finish: float, mode: int = LAST, tries: int = 30) -> tuple[list[Component], float, bool]:
+    def best(self, node: Node, finish: float, mode: int = LAST, tries: int = 15) -> tuple[list[Component], float, bool]:
         """The tree of greatest return: its parts, what it earns, and whether every choice in it is proved.
 
         Parameters
@@ -155,22 +159,22 @@ class Oracle:
                 child.low[modes[child]] = child.high[modes[child]]
         for m in (REST, LAST):
             for end in ("low", "high"):
-                getattr(node, end)[m] = max(self._value(node, c, m, end) for c in self._expanded(node))
+                node.end(end)[m] = max(self._value(node, c, m, end) for c in self._expanded(node))
         return True
 
     def _value(self, node: Node, choice: Choice, mode: int, end: str) -> float:
-        total = choice.earns + sum(getattr(child, end)[REST] for child in choice.left)
+        total = choice.earns + sum(child.end(end)[REST] for child in choice.left)
         if mode == REST:
             return total
         if not choice.left:
             return total + node.share * self._finish
-        heir = getattr(self._heir(choice, end), end)
-        return total + float(heir[LAST] - heir[REST])
+        heir = self._heir(choice, end).end(end)
+        return total + heir[LAST] - heir[REST]
 
     @staticmethod
     def _heir(choice: Choice, end: str) -> Node:
         """The child that gains most by the last cut."""
-        return max(choice.left, key=lambda k: getattr(k, end)[LAST] - getattr(k, end)[REST])
+        return max(choice.left, key=lambda k: k.end(end)[LAST] - k.end(end)[REST])
 
     # Trees of fewest parts
 
@@ -246,8 +250,8 @@ class Oracle:
         """Cut a component by each of its planes, least hull sum first; outcomes that no plane can finish last."""
         seen, stuck = set(), []
         for plane in planes_of(node.component):
-            cutting = CutProcess(node.component, self._criterion, self._memory)
-            cut = cutting.cut(0, plane)
+            cutting = CutEnv(node.component, self._criterion, self._memory)
+            cut = cutting.step(node.component, plane)
             left = [self._node(child) for child in cut.left.unfinished]
             outcome = tuple(sorted(round(c.volume, 9) for c in cut.left.all))
             if outcome in seen or cut.left.stuck == [node.component]:
@@ -279,7 +283,7 @@ def planes_of(component: Component) -> list[Plane]:
 def measure(solid: Solid, threshold: float, budget: int) -> Row | None:
     """Numbers of one mesh; None unless it is one connected component of `PARTS` parts by greedy-162."""
     root, criterion = Component(solid.shape), Concavity(threshold)
-    cutting = None if criterion.is_met(root) else CutProcess(root, criterion)
+    cutting = None if criterion.is_met(root) else CutEnv(root, criterion)
     if cutting is None or len(cutting.unfinished) != 1 or len(cutting.all) != 1:
         return None
     with Run(1) as run:

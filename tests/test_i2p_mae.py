@@ -24,12 +24,12 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
 
+from rlacd.learn.dqn import QNetwork
 from rlacd.learn.encoders import PublishedEncoder, pick_device
 from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, Sizes, seen_below
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.q_network import QNetwork, load_policy
-from rlacd.learn.train import train
+from rlacd.learn.train import load_policy, train
 from rlacd.policies.plane_features import PLANES
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
@@ -306,9 +306,9 @@ def test_the_paper_preset_sees_what_the_paper_sees() -> None:
     paper = TrainOptions.preset("paper")
     assert (paper.encoder, paper.points) == ("i2p-mae", 2048)
     network = QNetwork(I2PMAEEncoder().dim, PLANES)
-    widths = [layer.out_features for layer in network.layers if isinstance(layer, torch.nn.Linear)]
+    widths = [layer.out_features for layer in network.modules() if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
-    assert network.layers[0].in_features == 384 + 384
+    assert next(network.parameters()).shape == (1024, 384 + 384)
 
 
 def test_a_gpu_is_taken_where_it_pays_or_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

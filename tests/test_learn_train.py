@@ -24,7 +24,9 @@ from rlacd.errors import OptionError, TrainingError
 from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 from rlacd.pool.local import InProcessPool, LocalPool
-from tests.learning import write_meshes
+from rlacd.solid.arrays import Float32Array
+from rlacd.solid.component import Component
+from tests.learning import small_solids, write_meshes
 from tests.pool.obedient import pool_processes
 
 TINY: dict[str, Any] = {
@@ -151,6 +153,15 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path:
     assert_same_run(tmp_path / "whole", tmp_path / "halves")
 
 
+@pytest.mark.slow
+def test_a_run_resumes_before_it_has_learned_anything(meshes: Path, tmp_path: Path) -> None:
+    returns: dict[str, Any] = {"n_step": 0, "value_unit": "excess", "tau": 0.02, "env_steps": 60, "validation": 0}
+    run(meshes, tmp_path / "whole", **returns)
+    run(meshes, tmp_path / "halves", **{**returns, "env_steps": 20})
+    run(meshes, tmp_path / "halves", resume=True, **returns)
+    assert weights(tmp_path / "whole") == weights(tmp_path / "halves")
+
+
 @pytest.mark.nightly
 def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
@@ -198,6 +209,29 @@ class Doomed(InProcessPool):
         return died
 
 
+class Boxes:
+    """An encoder of one's own: a component's extents, for all 150 planes at once."""
+
+    dim, outputs, digest = 3, 150, "boxes"
+
+    def describe(self, component: Component) -> Float32Array:
+        """Get the extents."""
+        extents: Float32Array = np.ptp(component.box, axis=0).astype(np.float32)
+        return extents
+
+
+@pytest.mark.slow
+def test_an_encoder_of_ones_own_trains_and_decides(meshes: Path, tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from rlacd.learn.train import load_policy, train
+
+    options = TrainOptions(**{**TINY, "env_steps": 60})
+    with LocalPool(1) as pool:
+        train(meshes, tmp_path / "run", options, encoder=Boxes(), pool=pool, say=lambda line: None)
+    policy = load_policy(tmp_path / "run", Boxes())
+    assert policy.choose(Component(small_solids()["cross"])) is not None
+
+
 @pytest.mark.slow
 def test_an_episode_that_no_worker_can_play_is_reported_and_left_out(meshes: Path, tmp_path: Path) -> None:
     said: list[str] = []
@@ -231,11 +265,9 @@ def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tm
     path = run(meshes, tmp_path / "run", say=said.append)
     from rlacd.criteria import Concavity
     from rlacd.cut import CutTree
-    from rlacd.learn.q_network import load_policy
+    from rlacd.learn.train import load_policy
     from rlacd.policies import make_policy
     from rlacd.run import Run
-    from rlacd.solid.component import Component
-    from tests.learning import small_solids
 
     assert "times greedy's parts" in said[-1]
     policy, solid = make_policy(str(path), scale=0.04), Component(small_solids()["cross"])

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rlacd.learn.checkpoint import packed, unpacked
 from rlacd.learn.encoders import Encoder
+from rlacd.learn.environment import CutEnv
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.process import CutProcess
 from rlacd.planes.sweep import valid_planes
 from rlacd.policies.network import Network
 from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray, Int64Array
@@ -28,7 +28,7 @@ class Episode:
     masks : bool [N, A]
         Their valid planes.
     excess : float64 [N]
-        See `CutProcess.excess`.
+        See `CutEnv.excess`.
     state, planes : int64 [T]
         The component that each cut divided, by its number, and the plane.
     rewards : float64 [T]
@@ -100,8 +100,8 @@ class Player:
 
     Attributes
     ----------
-    cutting : CutProcess
-        The uncut solid; it must need a cut.
+    env : CutEnv
+        It must need a cut.
     network : Network or None
         None for uniformly random valid planes.
     epsilon : float
@@ -110,7 +110,7 @@ class Player:
         Generator of this episode only.
     """
 
-    cutting: CutProcess
+    env: CutEnv
     options: TrainOptions
     encoder: Encoder
     network: Network | None
@@ -119,35 +119,36 @@ class Player:
 
     def play(self) -> Episode:
         """Cut the largest component again and again, epsilon-greedily."""
-        cutting, numbers = self.cutting, {c: i for i, c in enumerate(self.cutting.unfinished)}
+        env = self.env
+        numbers = {component: i for i, component in enumerate(env.reset())}
         cuts: list[tuple[int, int, float]] = []
         children: list[tuple[int, int, float]] = []
-        while cutting.unfinished and not (cuts and len(cutting.all) >= self.options.max_parts):
-            component = cutting.unfinished[cutting.largest()]
+        while env.unfinished and not (cuts and len(env.all) >= self.options.max_parts):
+            component = env.largest()
             plane = self._choose(component)
-            cut = cutting.cut(cutting.largest(), cutting.candidates(component).plane(plane))
-            for child, share in zip(cut.left.unfinished, cut.discounts, strict=True):
+            step = env.step(component, env.candidates(component).plane(plane))
+            for child, share in zip(step.left.unfinished, step.discounts, strict=True):
                 numbers[child] = len(numbers)
                 children.append((numbers[child], len(cuts), self.options.static_discount or share))
-            cuts.append((numbers[component], plane, cut.reward(self.options)))
+            cuts.append((numbers[component], plane, step.reward(self.options)))
         seen = [self._see(component) for component in numbers]
         state, planes, rewards = (np.array(column) for column in zip(*cuts, strict=True))
         of_child, owner, discounts = (np.array([c[i] for c in children]) for i in range(3))
         return Episode(
             np.stack([features for features, _ in seen]).astype(np.float16),
             np.stack([mask for _, mask in seen]),
-            np.array([cutting.excess(component) for component in numbers]),
+            np.array([env.excess(component) for component in numbers]),
             *(state, planes, rewards, of_child.astype(np.int64), owner.astype(np.int64), discounts),
-            parts=len(cutting.all),
-            ended="cap" if cutting.unfinished else "terminal" if cutting.terminal else "stuck",
+            parts=len(env.all),
+            ended="cap" if env.unfinished else "terminal" if env.terminal else "stuck",
         )
 
     def _see(self, component: Component) -> tuple[Float32Array, BoolArray]:
         """Features, as exact as they are stored, and valid planes."""
-        known: dict[Component, Any] = self.cutting.memory.features
+        known: dict[Component, Any] = self.env.memory.features
         if component not in known:
             features = self.encoder.describe(component).astype(np.float16).astype(np.float32)
-            known[component] = features, valid_planes(component, self.cutting.candidates(component))
+            known[component] = features, valid_planes(component, self.env.candidates(component))
         seen: tuple[Float32Array, BoolArray] = known[component]
         return seen
 
