@@ -17,6 +17,7 @@ COMMANDS = {
     "physics": "the hulls in a simulator: piles, balls dropped into holes; primitives",
     "robots": "whole robots: hulls a link, farthest, MuJoCo's speed, each mesh at its own scale and links as solids",
     "training": "the paper's experiments that train: rewards, discounts",
+    "oracle": "small solids: the best trees of cuts by the paper's objective and by the number of parts",
     "prices": "the prices of rlacd.work against measured times",
 }
 """Name to purpose; each is a module of that name with a click command ``app``."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.criteria import Criterion
-from rlacd.learn.process import CutProcess
+from rlacd.learn.environment import CutEnv
 from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component
@@ -83,16 +83,16 @@ def grow(solid: Component, criterion: Criterion, planes: Sequence[int], depth: i
     list of Node
         The unfinished components of the solid.
     """
-    return [_grow(component, criterion, planes, depth, bins) for component in CutProcess(solid, criterion).unfinished]
+    return [_grow(component, criterion, planes, depth, bins) for component in CutEnv(solid, criterion).unfinished]
 
 
 def _grow(component: Component, criterion: Criterion, planes: Sequence[int], depth: int, bins: int) -> Node:
     node = Node(component.hull.volume, _looks(component, bins))
     for action, plane in enumerate(planes if depth > 0 else ()):
-        cutting = CutProcess(component, criterion)
+        cutting = CutEnv(component, criterion)
         if not cutting.unfinished:
             break
-        cut = cutting.cut(0, cutting.candidates(component).plane(plane))
+        cut = cutting.step(component, cutting.candidates(component).plane(plane))
         if cut.left.stuck != [component]:
             children = [_grow(child, criterion, planes, depth - 1, bins) for child in cut.left.unfinished]
             node.outcomes.append(TabularOutcome(action, cut.saved, cut.finishes, children, cut.discounts))

@@ -47,7 +47,7 @@ VALIDATIONS = 2
 
 
 def train_arms(
-    meshes: Path, folder: Path, preset: str, iterations: int | None, seeds: int, say: Callable[[str], None] = print
+    meshes: Path, folder: Path, preset: str, env_steps: int | None, seeds: int, say: Callable[[str], None] = print
 ) -> Page:
     """Train every arm with every seed, each in a folder of its own; return a page with their last validations.
 
@@ -58,15 +58,15 @@ def train_arms(
     TrainingError
         There are no usable meshes.
     """
-    first = _options(preset, iterations, 0, ARMS["λ1 = λ2"])
+    first = _options(preset, env_steps, 0, ARMS["λ1 = λ2"])
     curves: dict[str, list[Points]] = {label: [] for label in ARMS}
     for seed in range(seeds):
         for number, (label, changes) in enumerate(ARMS.items(), 1):
             say(f"seed {seed}, arm {number} of {len(ARMS)}: {label}")
             run = folder / f"rewards-{number}-seed-{seed}"
-            curves[label].append(_train(meshes, run, _options(preset, iterations, seed, changes), say))
+            curves[label].append(_train(meshes, run, _options(preset, env_steps, seed, changes), say))
     about = (
-        f"Every arm: preset {preset}, {first.iterations:,} cuts (the paper: 1,000,000), {seeds} seeds, meshes of "
+        f"Every arm: preset {preset}, {first.env_steps:,} cuts (the paper: 1,000,000), {seeds} seeds, meshes of "
         f"up to {first.max_faces} triangles, concavity {first.threshold:g}, {first.validation} meshes held out by "
         "each seed. Ratios are geometric means over those, to greedy over 150 planes by the least sum of hull "
         "volumes; deployed: the least sum among the network's ten best planes. Numbers are means over the seeds, "
@@ -79,13 +79,13 @@ def train_arms(
     return Page("Weights of the rewards (4.5.3)", [about, Table(header, lines)])
 
 
-def _options(preset: str, iterations: int | None, seed: int, changes: Mapping[str, Any]) -> TrainOptions:
+def _options(preset: str, env_steps: int | None, seed: int, changes: Mapping[str, Any]) -> TrainOptions:
     options = TrainOptions.preset(preset, seed=seed)
-    length = iterations or options.iterations
+    length = env_steps or options.env_steps
     if length < VALIDATIONS:
-        raise OptionError(f"iterations is {length}; it has to be at least {VALIDATIONS}.")
-    lengths = {"iterations": length, "validate_every": length // VALIDATIONS, "log_every": max(1, length // 50)}
-    lengths["warmup"] = min(options.warmup, length // 5)
+        raise OptionError(f"env_steps is {length}; it has to be at least {VALIDATIONS}.")
+    lengths = {"env_steps": length, "validate_every": length // VALIDATIONS, "log_every": max(1, length // 50)}
+    lengths["learning_starts"] = min(options.learning_starts, length // 5)
     return TrainOptions.preset(preset, seed=seed, **lengths, **changes)
 
 
@@ -169,13 +169,13 @@ def _trees(meshes: Path, names: list[str], count: int, depth: int) -> list[Node]
 @click.argument("meshes", type=PATH)
 @OUT
 @click.option("--preset", default="two-cores", show_default=True, help="Of `rlacd train`.")
-@click.option("--iterations", type=int, help="Cuts an arm.")
+@click.option("--env-steps", type=int, help="Cuts an arm.")
 @click.option("--seeds", type=click.IntRange(1), default=1, show_default=True, help="Training runs of each arm.")
-def rewards(meshes: Path, out: Path, preset: str, iterations: int | None, seeds: int) -> None:
+def rewards(meshes: Path, out: Path, preset: str, env_steps: int | None, seeds: int) -> None:
     """Train with both rewards, and without each (4.5.3)."""
     with exit_codes():
         find_meshes(meshes)
-        write(train_arms(meshes, out, preset, iterations, seeds, click.echo), out, "rewards")
+        write(train_arms(meshes, out, preset, env_steps, seeds, click.echo), out, "rewards")
 
 
 @app.command()

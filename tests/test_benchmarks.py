@@ -381,7 +381,7 @@ class TestCommands:
 def test_arms_differ_in_what_they_say_only(preset: str) -> None:
     arms = [_options(preset, 100, 1, changes) for changes in ARMS.values()]
     assert len(set(arms)) == len(arms)
-    assert {(a.iterations, a.seed, a.warmup, a.validate_every) for a in arms} == {(100, 1, 20, 50)}
+    assert {(a.env_steps, a.seed, a.learning_starts, a.validate_every) for a in arms} == {(100, 1, 20, 50)}
 
 
 @pytest.mark.nightly

@@ -24,12 +24,12 @@ pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
 
+from rlacd.learn.dqn import QNetwork
 from rlacd.learn.encoders import PublishedEncoder, pick_device
 from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, Sizes, seen_below
 from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.q_network import QNetwork, load_policy
-from rlacd.learn.train import train
+from rlacd.learn.train import load_policy, train
 from rlacd.policies.plane_features import PLANES
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
@@ -252,8 +252,8 @@ def test_without_weights_the_error_says_where_to_get_them(meshes: Path, tmp_path
 SHORT: dict[str, Any] = {
     **TINY_RUN,
     "encoder": "i2p-mae",
-    "iterations": 60,
-    "warmup": 20,
+    "env_steps": 60,
+    "learning_starts": 20,
     "points": 64,
     "validate_every": 30,
 }
@@ -277,7 +277,7 @@ def run(meshes: Path, folder: Path, weights: Path, resume: bool = False, **chang
 
 def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: Path, tmp_path: Path) -> None:
     run(meshes, tmp_path / "whole", weights)
-    run(meshes, tmp_path / "halves", weights, iterations=34)
+    run(meshes, tmp_path / "halves", weights, env_steps=34)
     elsewhere = shutil.copy(weights, tmp_path / "the_same.pth")
     run(meshes, tmp_path / "halves", elsewhere, resume=True)
     assert whole_state(tmp_path / "whole") == whole_state(tmp_path / "halves")
@@ -285,7 +285,7 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: 
 
 
 def test_other_weights_do_not_go_on_with_a_run(meshes: Path, weights: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "run", weights, iterations=30, validation=0)
+    run(meshes, tmp_path / "run", weights, env_steps=30, validation=0)
     other = write_tiny_weights(tmp_path / "other.pth", seed=1)
     with pytest.raises(OptionError, match=r"other\.pth holds other weights than the run began with"):
         run(meshes, tmp_path / "run", other, resume=True, validation=0)
@@ -306,9 +306,9 @@ def test_the_paper_preset_sees_what_the_paper_sees() -> None:
     paper = TrainOptions.preset("paper")
     assert (paper.encoder, paper.points) == ("i2p-mae", 2048)
     network = QNetwork(I2PMAEEncoder().dim, PLANES)
-    widths = [layer.out_features for layer in network.layers if isinstance(layer, torch.nn.Linear)]
+    widths = [layer.out_features for layer in network.modules() if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
-    assert network.layers[0].in_features == 384 + 384
+    assert next(network.parameters()).shape == (1024, 384 + 384)
 
 
 def test_a_gpu_is_taken_where_it_pays_or_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,10 +17,10 @@ import torch
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
+from rlacd.learn.dqn import Experience, ReplayBuffer, bellman_loss, dual_state_target, soft_value
+from rlacd.learn.environment import CutEnv, Step, terminal_reward
+from rlacd.learn.episodes import Episode
 from rlacd.learn.meshes import list_meshes
-from rlacd.learn.process import Cut, CutProcess, terminal_reward
-from rlacd.learn.q_network import bellman_loss, dual_state_target, soft_value
-from rlacd.learn.replay import Replay, Seen, Transition
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
@@ -34,15 +34,14 @@ def volumes(components: list[Component]) -> list[tuple[float, float]]:
     return sorted((c.volume, c.hull.volume) for c in components)
 
 
-def cut_greedily(cutting: CutProcess) -> list[Cut]:
+def cut_greedily(cutting: CutEnv) -> list[Step]:
     """Cut to the end."""
     earned = []
     while cutting.unfinished:
-        index = cutting.largest()
-        component = cutting.unfinished[index]
+        component = cutting.largest()
         number = greedy_plane(component)
         assert number is not None
-        cut = cutting.cut(index, cutting.candidates(component).plane(number))
+        cut = cutting.step(component, cutting.candidates(component).plane(number))
         earned.append(cut)
     return earned
 
@@ -52,7 +51,7 @@ def test_the_same_policy_reaches_the_same_components_as_decompose(name: str) -> 
     solid = Component(small_solids()[name])
     with Run(1) as run:
         done, left = CutTree(solid, GreedyOverMask(), run).cut_until(CRITERION)
-    cutting = CutProcess(solid, CRITERION)
+    cutting = CutEnv(solid, CRITERION)
     start = sum(c.hull.volume for c in cutting.all)
     earned = cut_greedily(cutting)
     assert volumes(cutting.finished) == volumes(done)
@@ -65,9 +64,9 @@ def test_the_same_policy_reaches_the_same_components_as_decompose(name: str) -> 
 
 def test_reward_of_an_angle_by_hand() -> None:
     solid = Component(small_solids()["angle"])  # two boxes, 2 x 1 x 0.3 and 0.3 x 1 x 1.2 on top of it
-    cutting = CutProcess(solid, CRITERION)
+    cutting = CutEnv(solid, CRITERION)
     plane = Plane((0.0, 0.0, 1.0), 0.3)
-    cut = cutting.cut(0, plane)
+    cut = cutting.step(cutting.unfinished[0], plane)
     hull = (2 * 1.5 - (2 - 0.3) * (1.5 - 0.3) / 2) * 1.0
     assert solid.hull.volume == pytest.approx(hull)
     assert cut.saved == pytest.approx((hull - 0.6 - 0.36) / hull)
@@ -77,11 +76,11 @@ def test_reward_of_an_angle_by_hand() -> None:
 
 
 def test_rewards_are_relative_to_the_whole_solids_hull_and_discounts_to_the_components() -> None:
-    cutting = CutProcess(Component(small_solids()["table"]), CRITERION)
+    cutting = CutEnv(Component(small_solids()["table"]), CRITERION)
     hull = before = cutting.unfinished[0].hull.volume
     while cutting.unfinished:
         component = cutting.unfinished[0]
-        cut = cutting.cut(0, cutting.candidates(component).plane(greedy_plane(component) or 0))
+        cut = cutting.step(component, cutting.candidates(component).plane(greedy_plane(component) or 0))
         after = sum(c.hull.volume for c in cutting.all)
         assert cut.saved == pytest.approx((before - after) / hull)
         before = after
@@ -140,61 +139,95 @@ def test_dual_state_target_by_hand() -> None:
 
 
 def test_loss_by_hand_and_only_through_the_planes_taken() -> None:
-    q = Q.clone().requires_grad_()
-    loss = bellman_loss(q, torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0)
-    assert loss.item() == pytest.approx(0.5 * (1 + 0) / 2)
-    assert (
-        bellman_loss(torch.tensor([2.0, 4.0]), torch.tensor([1, 0]), torch.tensor([12.0, 4.0]), 10.0) == loss.detach()
-    )
+    q = Q.clone()[None].requires_grad_()
+    planes, target = torch.tensor([1, 0]), torch.tensor([5.0, 4.0])
+    loss = bellman_loss(q, planes, target)
+    assert loss.item() == pytest.approx(0.5 * (9 + 0) / 2)
+    assert bellman_loss(torch.tensor([[2.0, 4.0], [5.0, 4.0]]), planes, target) == loss.detach(), "the sum of networks"
+    assert bellman_loss(q, planes, target, huber=1.0).item() == pytest.approx((3 - 0.5) / 2)
     loss.backward()
     assert q.grad is not None
-    assert q.grad.tolist() == [pytest.approx([0, -1.0 / 10 / 2, 0]), [0, 0, 0]]
+    assert q.grad[0].tolist() == [pytest.approx([0, -3.0 / 2, 0]), [0, 0, 0]]
 
 
-def component(number: int, replay: Replay) -> Seen:
-    return replay.seen(np.full(3, number, np.float16), np.arange(11) == number % 11)
+def test_returns_over_a_tree_by_hand() -> None:
+    # 0 is cut into 1 and 2; 1 into 3, which is never cut; 2 to the end.
+    episode = Episode(
+        np.zeros((4, 1), np.float16),
+        np.ones((4, 1), np.bool_),
+        np.zeros(4),
+        *(np.array([0, 1, 2]), np.zeros(3, np.int64), np.array([100.0, 10.0, 1.0])),
+        *(np.array([1, 2, 3]), np.array([0, 0, 1]), np.array([0.5, 0.25, 0.9])),
+        parts=9,
+        ended="cap",
+    )
+    one, whole = [100, 10, 1], [100 + 5 + 0.25, 10, 1]
+    for steps, sums, left in ((1, one, {1: 0.5, 2: 0.25}), (2, whole, {3: 0.45}), (0, whole, {3: 0.45})):
+        rewards, leaves = episode.returns(steps)
+        assert rewards.tolist() == sums
+        assert leaves == [left, {3: 0.9}, {}]
+
+
+def experience(number: int, children: list[int], keys: bool = False) -> Experience:
+    """An episode whose cut t divides component 9 * number + t; it leaves so many of the components that follow."""
+    cuts, left = len(children), sum(children)
+    names = 9.0 * number + np.arange(cuts + left)
+    return Experience(
+        taken=np.array(names[:cuts, None], np.float16),
+        planes=np.arange(cuts) % 11,
+        rewards=-names[:cuts],
+        excess=names[:cuts] / 100,
+        state=np.arange(cuts),
+        owner=np.repeat(np.arange(cuts), children),
+        child=cuts + np.arange(left),
+        discounts=0.5 / (1 + np.arange(left)),
+        features=np.array(names[:, None], np.float16),
+        masks=np.arange(11) == (np.arange(cuts + left) % 11)[:, None],
+        left_excess=names / 10,
+        keys=names.astype(np.uint8)[:, None] if keys else np.zeros((cuts + left, 0), np.uint8),
+    )
 
 
 def test_fewest_cuts_by_hand() -> None:
-    replay = Replay(9, unknown=100)
-    a, b, c, d = (component(i, replay) for i in range(4))
-    replay.count([(a, ((b, 1.0), (c, 1.0))), (b, ()), (c, ((d, 1.0),))])  # d is left when the episode ends
-    assert [x.fewest for x in (a, b, c, d)] == [1 + 1 + 101, 1, 1 + 100, math.inf]
-    replay.count([(component(2, replay), ((d, 1.0),)), (d, ())])  # another episode comes to the same component
-    assert [x.fewest for x in (a, b, c, d)] == [103, 1, 2, 1]
-    assert replay.cuts(((b, 1.0), (c, 1.0))) == 4
+    replay = ReplayBuffer(9, unknown=100)
+    first = experience(0, [2, 0, 1], keys=True)  # 0 is cut into 3 and 4; 1 and 2 are others', and 2 leaves 5
+    first.keys[3:5] = first.keys[1:3]  # which were 1 and 2 themselves
+    replay.add(first)
+    assert [replay.cuts(first, t) for t in range(3)] == [1 + 1 + 101, 1, 101]
+    second = experience(0, [1, 0], keys=True)  # another episode comes to 2, and finishes what it leaves
+    second.keys[:] = first.keys[[2, 5, 5]]
+    replay.add(second)
+    assert [replay.cuts(first, t) for t in range(3)] == [1 + 1 + 2, 1, 2]
 
 
-@given(st.integers(1, 9), st.lists(st.integers(0, 3), min_size=1, max_size=60))
+@given(st.integers(1, 9), st.lists(st.lists(st.integers(0, 3), min_size=1, max_size=4), min_size=1, max_size=20))
 @settings(max_examples=40, deadline=None)
-def test_replay_gives_back_the_last_transitions_also_when_restored(capacity: int, children: list[int]) -> None:
-    replay, made, added = Replay(capacity), 1, {}
-    for count in children:
-        state, *below = (component(made + i, replay) for i in range(count + 1))
-        left = tuple((child, 0.5 / (i + 1)) for i, child in enumerate(below))
-        replay.count([(state, left)])
-        added[float(made)] = Transition(state, made % 11, state.features, -made, left)
-        replay.add(added[float(made)])
-        made += 1 + count
-    restored = Replay(capacity)
+def test_replay_gives_back_the_last_cuts_also_when_restored(capacity: int, episodes: list[list[int]]) -> None:
+    replay, added = ReplayBuffer(capacity), []
+    for number, children in enumerate(episodes):
+        added.append(experience(number, children))
+        replay.add(added[-1])
+    restored = ReplayBuffer(capacity)
     restored.restore(replay.state())
-    kept = dict(list(added.items())[-capacity:])
-    assert len(replay) == len(restored) == len(kept)
+    kept = {float(e.taken[t, 0]): (e, t) for e in added for t in range(len(e.planes))}
+    least = min(capacity, len(kept))
+    assert least <= len(replay) == len(restored) < capacity + 4
     batch, again = (r.sample(40, np.random.default_rng(0)) for r in (replay, restored))
     for name in batch:
         assert np.array_equal(batch[name], again[name]), name
-    for i in range(40):
-        cut, mine = kept[float(batch["features"][i, 0])], batch["owner"] == i
-        assert (batch["planes"][i], batch["rewards"][i], batch["cuts"][i]) == (
-            cut.plane,
-            cut.reward,
-            1 + len(cut.children),
-        )
-        assert batch["child_features"][mine, 0].tolist() == [float(c.features[0]) for c, _ in cut.children]
-        assert [m.tolist() for m in batch["child_masks"][mine]] == [c.mask.tolist() for c, _ in cut.children]
-        assert batch["child_discounts"][mine] == pytest.approx([d for _, d in cut.children])
+    last = list(kept)[-len(replay) :]
+    for i, name in enumerate(batch["features"][:, 0].tolist()):
+        assert name in last
+        (cut, t), mine = kept[name], batch["owner"] == i
+        assert (batch["planes"][i], batch["rewards"][i]) == (cut.planes[t], np.float32(cut.rewards[t]))
+        assert batch["excess"][i] == np.float32(cut.excess[t])
+        left = cut.child[cut.owner == t]
+        assert batch["child_features"][mine, 0].tolist() == cut.features[left, 0].tolist()
+        assert np.array_equal(batch["child_masks"][mine], cut.masks[left])
+        assert batch["child_discounts"][mine] == pytest.approx(cut.discounts[cut.owner == t])
+        assert batch["child_excess"][mine] == pytest.approx(cut.left_excess[left])
 
 
 def test_nothing_to_sample_is_reported() -> None:
     with pytest.raises(RlacdError, match="nothing to learn from"):
-        Replay(4).sample(1, np.random.default_rng(0))
+        ReplayBuffer(4).sample(1, np.random.default_rng(0))

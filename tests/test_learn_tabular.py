@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,13 @@ pytest.importorskip("torch", reason="needs the extra train")
 from benchmarks.tabular import Node, all_nodes, grow, middle_planes, process_of, q_learning
 
 from rlacd.criteria import Concavity
+from rlacd.learn.dqn import Experience, ReplayBuffer
 from rlacd.learn.encoders import make_encoder
+from rlacd.learn.environment import CutEnv, Memory
 from rlacd.learn.episodes import Player
 from rlacd.learn.meshes import Solids
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.process import CutProcess, Memory
-from rlacd.learn.q_network import load_policy
-from rlacd.learn.replay import Children, Replay
-from rlacd.learn.train import train
+from rlacd.learn.train import load_policy, train
 from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy
 from rlacd.solid.component import Component
@@ -100,7 +100,7 @@ def two_planes(monkeypatch: pytest.MonkeyPatch) -> None:
         allowed = np.isin(np.arange(150), TWO)
         return allowed & valid_planes(component, paper_planes(component))
 
-    for module in ("learn.process", "learn.episodes", "policies.network"):
+    for module in ("learn.environment", "learn.episodes", "policies.network"):
         monkeypatch.setattr(f"rlacd.{module}.valid_planes", two)
 
 
@@ -126,52 +126,66 @@ def fewest(node: Node) -> int:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(
-    "changes", [{"finish_reward": 0.0}, {"objective": "fewest-cuts"}], ids=["volume", "fewest cuts"]
+    "changes",
+    [
+        {"finish_reward": 0.0},
+        {"finish_reward": 0.0, "clip": True, "networks": 2, "tau": 0.02, "n_step": 2},
+        {"finish_reward": 0.0, "value_unit": "excess", "tau": 0.02},
+        {"objective": "fewest-cuts"},
+    ],
+    ids=["volume", "cures", "unit", "fewest cuts"],
 )
 def test_networks_reach_the_optimum_of_their_objective(u_shape: Component, tmp_path: Path, changes: Any) -> None:
     """The reward for finishing the whole solid is no part of a component's own value: there is none to compare with."""
-    steps = {"iterations": 1500, "warmup": 100, "batch": 32, "replay": 5000, "target_every": 50, "environments": 1}
+    steps = {
+        "env_steps": 1500,
+        "learning_starts": 100,
+        "batch_size": 32,
+        "buffer_size": 5000,
+        "target_frequency": 50,
+        "environments": 1,
+    }
     given = {"learning_rate": 1e-3, "epsilon": 0.3, "validation": 0, "rotate": False, **steps, **changes}
     options = TrainOptions(threshold=LIMIT.threshold, **given)
     train(tmp_path / "meshes", tmp_path / "run", options, say=lambda line: None)
     policy = load_policy(tmp_path / "run")
     [root] = grow(u_shape, LIMIT, TWO, depth=8)
     counts = "objective" in changes
-    known = -math.log(fewest(root)) if counts else 1000 * volume_worth(root, root.hull_volume)
-    assert (policy._values(u_shape)[TWO] * options.unit).max() == pytest.approx(known, abs=0.03 * options.unit)
+    known = -math.log(fewest(root)) if counts else volume_worth(root, root.hull_volume)
+    unit = CutEnv(u_shape, LIMIT).excess(u_shape) if options.value_unit == "excess" else 1
+    assert (policy._values(u_shape)[TWO] * unit).max() == pytest.approx(known, abs=0.03)
     assert cuts_by(policy, u_shape) in ([3] if counts else range(3, 11))
 
 
 def cuts_by(policy: Policy, solid: Component) -> int:
     """Number of cuts that a policy needs, at most 40."""
-    cutting, made = CutProcess(solid, LIMIT), 0
+    cutting, made = CutEnv(solid, LIMIT), 0
     while cutting.unfinished and made < 40:
-        plane = policy.choose(cutting.unfinished[0])
+        component = cutting.unfinished[0]
+        plane = policy.choose(component)
         assert plane is not None
-        cutting.cut(0, plane)
+        cutting.step(component, plane)
         made += 1
     return made
 
 
 def test_a_table_in_place_of_the_network_is_never_worse_than_the_best_sequence_it_has_seen() -> None:
     """One mesh, 150 planes. The table is the trainer's own: components with the same features are the same."""
-    solid, memory, options = Component(small_solids()["table"]), Memory(), TrainOptions(threshold=CRITERION.threshold)
-    encoder, replay, lengths = make_encoder(options), Replay(9, values=False), []
-    tried: dict[bytes, dict[int, Children]] = {}
+    solid, memory, lengths = Component(small_solids()["table"]), Memory(), []
+    options = TrainOptions(threshold=CRITERION.threshold, objective="fewest-cuts")
+    encoder, replay = make_encoder(options), ReplayBuffer(10_000)
+    tried: dict[bytes, dict[int, tuple[Experience, int]]] = {}
     for number in range(12):
-        cutting, rng = CutProcess(solid, CRITERION, memory), np.random.default_rng(number)
-        episode = Player(cutting, options, encoder, None, 1.0, rng).play()
-        seen = [replay.seen(*pair) for pair in zip(episode.features, episode.masks, strict=True)]
-        left = [tuple((seen[child], d) for child, d in children.items()) for children in episode.children()]
-        replay.count([(seen[s], children) for s, children in zip(episode.state, left, strict=True)])
-        for state, plane, children in zip(episode.state, episode.planes, left, strict=True):
-            tried.setdefault(seen[state].key, {})[int(plane)] = children
-        lengths.append(len(episode.planes))
-    cutting, made = CutProcess(solid, CRITERION, memory), 0
-    while cutting.unfinished:
-        component = cutting.unfinished[0]
-        features = encoder.describe(component).astype(np.float16)
-        known = tried[replay.seen(features, np.ones(150, bool)).key]
-        cutting.cut(0, cutting.candidates(component).plane(min(known, key=lambda p: replay.cuts(known[p]))))
+        env, rng = CutEnv(solid, CRITERION, memory), np.random.default_rng(number)
+        seen = Experience.of(Player(env, options, encoder, None, 1.0, rng).play(), options, per_plane=True)
+        replay.add(seen)
+        for t, plane in enumerate(seen.planes.tolist()):
+            tried.setdefault(seen.keys[seen.state[t]].tobytes(), {})[plane] = seen, t
+        lengths.append(len(seen.planes))
+    env, made = CutEnv(solid, CRITERION, memory), 0
+    while env.unfinished:
+        component = env.unfinished[0]
+        known = tried[hashlib.sha256(encoder.describe(component).astype(np.float16).tobytes()).digest()]
+        env.step(component, env.candidates(component).plane(min(known, key=lambda p: replay.cuts(*known[p]))))
         made += 1
     assert made <= min(lengths) < lengths[0]

@@ -24,21 +24,23 @@ from rlacd.errors import OptionError, TrainingError
 from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 from rlacd.pool.local import InProcessPool, LocalPool
-from tests.learning import write_meshes
+from rlacd.solid.arrays import Float32Array
+from rlacd.solid.component import Component
+from tests.learning import small_solids, write_meshes
 from tests.pool.obedient import pool_processes
 
 TINY: dict[str, Any] = {
-    "iterations": 120,
-    "warmup": 30,
-    "batch": 8,
+    "env_steps": 120,
+    "learning_starts": 30,
+    "batch_size": 8,
     "max_faces": 500,
     "environments": 2,
     "validation": 1,
     "validate_every": 60,
     "log_every": 20,
-    "target_every": 10,
+    "target_frequency": 10,
     "max_parts": 12,
-    "replay": 50,
+    "buffer_size": 50,
     "checkpoint_seconds": 0.0,
 }
 
@@ -84,7 +86,7 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         assert isinstance(TrainOptions.preset(name), TrainOptions)
     paper = TrainOptions.preset("paper")
     assert (paper.threshold, paper.volume_reward, paper.finish_reward) == (0.04, 1000, 1000)
-    assert (paper.replay, paper.iterations, paper.warmup) == (100_000, 1_000_000, 10_000)
+    assert (paper.buffer_size, paper.env_steps, paper.learning_starts) == (100_000, 1_000_000, 10_000)
     assert (paper.epsilon, paper.epsilon_decay, paper.points, paper.encoder) == (0.2, 0.99, 2048, "i2p-mae")
     assert (paper.temperature, paper.objective) == (0, "rewards")
     assert paper.max_parts >= 512
@@ -95,8 +97,8 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"batch": 0}, "batch is"),
-        ({"batch": 2.5}, "batch is"),
+        ({"batch_size": 0}, "batch_size is"),
+        ({"batch_size": 2.5}, "batch_size is"),
         ({"threshold": float("nan")}, "threshold is"),
         ({"epsilon": 1.1}, "epsilon is"),
         ({"objective": "both"}, "objective is"),
@@ -148,17 +150,26 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(
     meshes: Path, tmp_path: Path, stop: int, validated: int
 ) -> None:
     run(meshes, tmp_path / "whole", validate_every=validated)
-    run(meshes, tmp_path / "halves", validate_every=validated, iterations=stop)
+    run(meshes, tmp_path / "halves", validate_every=validated, env_steps=stop)
     (tmp_path / "halves" / "checkpoint.npz.1.part").write_bytes(b"what a crash left")
     run(meshes, tmp_path / "halves", validate_every=validated, resume=True)
     assert_same_run(tmp_path / "whole", tmp_path / "halves")
 
 
+@pytest.mark.slow
+def test_a_run_resumes_before_it_has_learned_anything(meshes: Path, tmp_path: Path) -> None:
+    returns: dict[str, Any] = {"n_step": 0, "value_unit": "excess", "tau": 0.02, "env_steps": 60, "validation": 0}
+    run(meshes, tmp_path / "whole", **returns)
+    run(meshes, tmp_path / "halves", **{**returns, "env_steps": 20})
+    run(meshes, tmp_path / "halves", resume=True, **returns)
+    assert weights(tmp_path / "whole") == weights(tmp_path / "halves")
+
+
 @pytest.mark.nightly
 def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    run(meshes, whole, iterations=400)
-    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "iterations": 400, "jobs": 2}.items()]
+    run(meshes, whole, env_steps=400)
+    given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "env_steps": 400, "jobs": 2}.items()]
     words = ["train", str(meshes), "--run", str(killed), "--preset", "paper", "--encoder", "sweep"]  # the defaults
     process = subprocess.Popen([sys.executable, "-m", "rlacd", *words, *given], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
@@ -166,7 +177,7 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    run(meshes, killed, iterations=400, resume=True)
+    run(meshes, killed, env_steps=400, resume=True)
     assert_same_run(whole, killed)
 
 
@@ -199,6 +210,29 @@ class Doomed(InProcessPool):
         died: Future[Answer] = Future()
         died.set_exception(WorkerDiedError("it took more than 600 s"))
         return died
+
+
+class Boxes:
+    """An encoder of one's own: a component's extents, for all 150 planes at once."""
+
+    dim, outputs, digest = 3, 150, "boxes"
+
+    def describe(self, component: Component) -> Float32Array:
+        """Get the extents."""
+        extents: Float32Array = np.ptp(component.box, axis=0).astype(np.float32)
+        return extents
+
+
+@pytest.mark.slow
+def test_an_encoder_of_ones_own_trains_and_decides(meshes: Path, tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from rlacd.learn.train import load_policy, train
+
+    options = TrainOptions(**{**TINY, "env_steps": 60})
+    with LocalPool(1) as pool:
+        train(meshes, tmp_path / "run", options, encoder=Boxes(), pool=pool, say=lambda line: None)
+    policy = load_policy(tmp_path / "run", Boxes())
+    assert policy.choose(Component(small_solids()["cross"])) is not None
 
 
 @pytest.mark.slow
@@ -234,11 +268,9 @@ def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tm
     path = run(meshes, tmp_path / "run", say=said.append)
     from rlacd.criteria import Concavity
     from rlacd.cut import CutTree
-    from rlacd.learn.q_network import load_policy
+    from rlacd.learn.train import load_policy
     from rlacd.policies import make_policy
     from rlacd.run import Run
-    from rlacd.solid.component import Component
-    from tests.learning import small_solids
 
     assert "times greedy's parts" in said[-1]
     policy, solid = make_policy(str(path), scale=0.04), Component(small_solids()["cross"])
@@ -252,15 +284,15 @@ def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tm
 
 
 def test_a_run_is_not_overwritten_and_not_resumed_with_other_options(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "run", iterations=40, validation=0)
+    run(meshes, tmp_path / "run", env_steps=40, validation=0)
     with pytest.raises(OptionError, match="holds a run already"):
         run(meshes, tmp_path / "run", validation=0)
-    with pytest.raises(OptionError, match="batch is 9, but was 8"):
-        run(meshes, tmp_path / "run", resume=True, batch=9, validation=0)
+    with pytest.raises(OptionError, match="batch_size is 9, but was 8"):
+        run(meshes, tmp_path / "run", resume=True, batch_size=9, validation=0)
 
 
 def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "run", iterations=40, validation=0)
+    run(meshes, tmp_path / "run", env_steps=40, validation=0)
     broken = tmp_path / "run" / "checkpoint.npz"
     broken.write_bytes(broken.read_bytes()[:1000])
     with pytest.raises(TrainingError, match="is damaged"):

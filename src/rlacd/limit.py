@@ -60,7 +60,7 @@ def cut_to_limits(
         if len(cut) > len(parts) and options.merge:
             with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_WORK)):
                 cut = merge_parts(cut, limited, run, solid=solid)
-                context = SearchContext(solid, limited, options.seed, SweepCache(), first_policy=options.first_policy)
+                context = SearchContext(solid, limited, options.seed)
                 cut = eliminate_parts(context, cut, run)
     except Stopped:
         run.note_stop()

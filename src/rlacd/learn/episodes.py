@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rlacd.learn.checkpoint import packed, unpacked
 from rlacd.learn.encoders import Encoder
+from rlacd.learn.environment import CutEnv
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.process import CutProcess
 from rlacd.planes.sweep import valid_planes
 from rlacd.policies.network import Network
 from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray, Int64Array
@@ -27,6 +27,8 @@ class Episode:
     features : float16 [N, D] or [N, A, D]
     masks : bool [N, A]
         Their valid planes.
+    excess : float64 [N]
+        See `CutEnv.excess`.
     state, planes : int64 [T]
         The component that each cut divided, by its number, and the plane.
     rewards : float64 [T]
@@ -41,6 +43,7 @@ class Episode:
 
     features: NDArray[np.float16]
     masks: BoolArray
+    excess: FloatArray
     state: Int64Array
     planes: Int64Array
     rewards: FloatArray
@@ -55,7 +58,7 @@ class Episode:
         """Create an episode without a cut."""
         ints, floats = np.empty(0, np.int64), np.empty(0)
         none = np.empty((0, 0), np.float16), np.empty((0, 0), np.bool_)
-        return cls(*none, ints, ints, floats, ints, ints, floats, 0, ended)
+        return cls(*none, floats, ints, ints, floats, ints, ints, floats, 0, ended)
 
     def children(self) -> list[dict[int, float]]:
         """Discounts of the unfinished children of each cut, by their numbers."""
@@ -63,6 +66,22 @@ class Episode:
         for child, owner, discount in zip(*(a.tolist() for a in (self.child, self.owner, self.discounts)), strict=True):
             left[owner][child] = discount
         return left
+
+    def returns(self, steps: int) -> tuple[FloatArray, list[dict[int, float]]]:
+        """Rewards of each cut and of those below it, `steps` deep in all (0: to the end), and what is left there."""
+        children, cut = self.children(), {int(component): t for t, component in enumerate(self.state)}
+        sums, left, deeper = self.rewards, children, True
+        while deeper and steps != 1:
+            added, below = self.rewards.copy(), [dict[int, float]() for _ in children]
+            for t, own in enumerate(children):
+                for child, discount in own.items():
+                    if child in cut:
+                        added[t] += discount * sums[cut[child]]
+                        below[t].update((c, discount * d) for c, d in left[cut[child]].items())
+                    else:
+                        below[t][child] = discount
+            deeper, sums, left, steps = below != left, added, below, steps - 1
+        return sums, left
 
     def to_bytes(self) -> bytes:
         """Pack it for `from_bytes`."""
@@ -81,8 +100,8 @@ class Player:
 
     Attributes
     ----------
-    cutting : CutProcess
-        The uncut solid; it must need a cut.
+    env : CutEnv
+        It must need a cut.
     network : Network or None
         None for uniformly random valid planes.
     epsilon : float
@@ -91,7 +110,7 @@ class Player:
         Generator of this episode only.
     """
 
-    cutting: CutProcess
+    env: CutEnv
     options: TrainOptions
     encoder: Encoder
     network: Network | None
@@ -100,34 +119,36 @@ class Player:
 
     def play(self) -> Episode:
         """Cut the largest component again and again, epsilon-greedily."""
-        cutting, numbers = self.cutting, {c: i for i, c in enumerate(self.cutting.unfinished)}
+        env = self.env
+        numbers = {component: i for i, component in enumerate(env.reset())}
         cuts: list[tuple[int, int, float]] = []
         children: list[tuple[int, int, float]] = []
-        while cutting.unfinished and not (cuts and len(cutting.all) >= self.options.max_parts):
-            component = cutting.unfinished[cutting.largest()]
+        while env.unfinished and not (cuts and len(env.all) >= self.options.max_parts):
+            component = env.largest()
             plane = self._choose(component)
-            cut = cutting.cut(cutting.largest(), cutting.candidates(component).plane(plane))
-            for child, share in zip(cut.left.unfinished, cut.discounts, strict=True):
+            step = env.step(component, env.candidates(component).plane(plane))
+            for child, share in zip(step.left.unfinished, step.discounts, strict=True):
                 numbers[child] = len(numbers)
                 children.append((numbers[child], len(cuts), self.options.static_discount or share))
-            cuts.append((numbers[component], plane, cut.reward(self.options)))
+            cuts.append((numbers[component], plane, step.reward(self.options)))
         seen = [self._see(component) for component in numbers]
         state, planes, rewards = (np.array(column) for column in zip(*cuts, strict=True))
         of_child, owner, discounts = (np.array([c[i] for c in children]) for i in range(3))
         return Episode(
             np.stack([features for features, _ in seen]).astype(np.float16),
             np.stack([mask for _, mask in seen]),
+            np.array([env.excess(component) for component in numbers]),
             *(state, planes, rewards, of_child.astype(np.int64), owner.astype(np.int64), discounts),
-            parts=len(cutting.all),
-            ended="cap" if cutting.unfinished else "terminal" if cutting.terminal else "stuck",
+            parts=len(env.all),
+            ended="cap" if env.unfinished else "terminal" if env.terminal else "stuck",
         )
 
     def _see(self, component: Component) -> tuple[Float32Array, BoolArray]:
         """Features, as exact as they are stored, and valid planes."""
-        known: dict[Component, Any] = self.cutting.memory.features
+        known: dict[Component, Any] = self.env.memory.features
         if component not in known:
             features = self.encoder.describe(component).astype(np.float16).astype(np.float32)
-            known[component] = features, valid_planes(component, self.cutting.candidates(component))
+            known[component] = features, valid_planes(component, self.env.candidates(component))
         seen: tuple[Float32Array, BoolArray] = known[component]
         return seen
 

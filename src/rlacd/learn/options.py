@@ -47,24 +47,38 @@ class TrainOptions:
     objective
         What a plane is worth: rewards, its reward plus the values of the two sides (eq. 8); or fewest-cuts, minus the
         logarithm of the fewest cuts that any episode has needed from there.
-    iterations
+    env_steps
         Cuts made, each followed by learning (4.1).
-    warmup
+    learning_starts
         Random cuts at the start, without learning (4.1).
     epsilon
         Share of random cuts after those (4.1).
     epsilon_decay
         Factor applied to epsilon every 1000 cuts (4.1).
-    replay
+    buffer_size
         Transitions kept for learning (4.1).
-    batch
+    batch_size
         Transitions for each gradient step.
-    learn_every
+    train_frequency
         Cuts between gradient steps.
     learning_rate
         Learning rate of Adam.
-    target_every
+    target_frequency
         Gradient steps between copies to the target network.
+    n_step
+        Cuts down the tree whose rewards a target adds up before it asks for values; 0: all, which asks for none.
+    value_unit
+        What the network's outputs are multiplied by: weight, the greater of the two rewards' weights; or excess, what
+        a component can still earn by r1, the excess volume of its hull.
+    clip
+        Limit values to what is possible: between 0 and what the excess volume and the end of the solid can earn.
+    networks
+        With 2, values are the lesser of two networks' (clipped double Q-learning).
+    tau
+        Share of the network that its average takes up each gradient step; the average is then the target network, and
+        plays. With 0 the target network is a copy.
+    huber
+        Error, in units of the values, beyond which the loss is linear; 0 leaves it a square.
     temperature
         Temperature of the soft value, in units of reward; 0 takes the greatest value (eq. 7).
     static_discount
@@ -107,15 +121,21 @@ class TrainOptions:
 
     # Q-learning (3.5, 4.1)
     objective: str = option("rewards", one_of=("rewards", "fewest-cuts"))
-    iterations: int = option(1_000_000, least=1)
-    warmup: int = option(10_000, least=0)
+    env_steps: int = option(1_000_000, least=1)
+    learning_starts: int = option(10_000, least=0)
     epsilon: float = option(0.2, least=0, most=1)
     epsilon_decay: float = option(0.99, least=0, most=1)
-    replay: int = option(100_000, least=1)
-    batch: int = option(256, least=1)
-    learn_every: int = option(1, least=1)
+    buffer_size: int = option(100_000, least=1)
+    batch_size: int = option(256, least=1)
+    train_frequency: int = option(1, least=1)
     learning_rate: float = option(1e-4, least=0)
-    target_every: int = option(1000, least=1)
+    target_frequency: int = option(1000, least=1)
+    n_step: int = option(1, least=0)
+    value_unit: str = option("weight", one_of=("weight", "excess"))
+    clip: bool = option(False)
+    networks: int = option(1, least=1, most=2)
+    tau: float = option(0.0, least=0, most=1)
+    huber: float = option(0.0, least=0)
     temperature: float = option(0.0, least=0, most=0.1)
     static_discount: float = option(0.0, least=0, most=1)
 
@@ -134,11 +154,6 @@ class TrainOptions:
         if self.volume_reward == self.finish_reward == 0:
             raise OptionError("volume_reward and finish_reward are both 0; there is nothing to learn from.")
 
-    @property
-    def unit(self) -> float:
-        """Scale of the values: the network predicts them in this unit, so that its outputs are of order 1."""
-        return max(self.volume_reward, self.finish_reward, 1e-9) if self.objective == "rewards" else 1.0
-
     @classmethod
     def preset(cls, name: str, **changes: Any) -> TrainOptions:
         """Get the preset `name` from `TRAIN_PRESETS` with the given changes.
@@ -155,20 +170,32 @@ class TrainOptions:
 
 _TWO_CORES: Mapping[str, Any] = {
     "objective": "fewest-cuts",
-    "iterations": 100_000,
-    "warmup": 1_000,
+    "env_steps": 100_000,
+    "learning_starts": 1_000,
     "epsilon": 0.1,
-    "batch": 64,
-    "learn_every": 2,
+    "batch_size": 64,
+    "train_frequency": 2,
     "learning_rate": 1e-3,
     "max_faces": 700,
 }
 
+_RETURNS: Mapping[str, Any] = {
+    **_TWO_CORES,
+    "objective": "rewards",
+    "finish_reward": 0.0,
+    "n_step": 0,
+    "value_unit": "excess",
+    "tau": 0.01,
+    "buffer_size": 10_000,
+    "max_parts": 128,
+    "environments": 1,
+}
+
 _ONE_MESH: Mapping[str, Any] = {
     **_TWO_CORES,
-    "iterations": 5_000,
-    "warmup": 200,
-    "learn_every": 1,
+    "env_steps": 5_000,
+    "learning_starts": 200,
+    "train_frequency": 1,
     "rotate": False,
     "max_faces": 5000,
     "environments": 1,
@@ -176,6 +203,11 @@ _ONE_MESH: Mapping[str, Any] = {
     "validate_every": 250,
 }
 
-TRAIN_PRESETS = {"paper": {"encoder": "i2p-mae"}, "two-cores": _TWO_CORES, "one-mesh": _ONE_MESH}
-"""Changes to the defaults: the paper's run; cheap features and the fewest cuts seen, for two cores; the same for a few
-meshes that are learned by heart in a minute."""
+TRAIN_PRESETS = {
+    "paper": {"encoder": "i2p-mae"},
+    "returns": _RETURNS,
+    "two-cores": _TWO_CORES,
+    "one-mesh": _ONE_MESH,
+}
+"""Changes to the defaults: the paper's run; its loss without r2 (4.5.3), by returns of the whole tree, and the fewest
+cuts seen, both on cheap features for two cores; the latter for a few meshes that are learned by heart in a minute."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import pickle
 from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -20,11 +21,11 @@ from numpy.typing import NDArray
 
 from rlacd.criteria import Concavity
 from rlacd.errors import TrainingError
-from rlacd.learn.encoders import make_encoder
+from rlacd.learn.encoders import Encoder
+from rlacd.learn.environment import CutEnv, Memory
 from rlacd.learn.episodes import Episode, Player
 from rlacd.learn.meshes import TURNS, Solids, turned
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.process import CutProcess, Memory
 from rlacd.policies.network import Network, parse_network
 from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError
 from rlacd.solid.component import Component
@@ -50,6 +51,7 @@ class Rollouts:
     names : sequence of str
         The meshes to draw from.
     options : TrainOptions
+    encoder : Encoder
     limits : ProcessLimits
         Limits of one episode.
     say : callable
@@ -62,15 +64,14 @@ class Rollouts:
         solids: Solids,
         names: Sequence[str],
         options: TrainOptions,
+        encoder: Encoder,
         limits: ProcessLimits,
         say: Callable[[str], None],
     ) -> None:
         self._pool, self._solids, self._names, self._options = pool, solids, names, options
         self._limits, self._say = limits, say
-        setting = {"options": json.dumps(dataclasses.asdict(options)).encode()}
-        if options.encoder_weights:
-            setting["encoder"] = Path(options.encoder_weights).read_bytes()
-        self._setting = Shared(setting)
+        stated = json.dumps(dataclasses.asdict(options)).encode()
+        self._setting = Shared({"options": stated, "encoder": pickle.dumps(encoder)})
         self._ahead: deque[tuple[int, str, Future[Answer]] | Episode] = deque()
         self._begun = self._without_cuts = self._lost = 0
 
@@ -157,9 +158,9 @@ class RolloutServer:
     """
 
     def __init__(self, staging: Path) -> None:
-        self._staging = staging
         self._setting = self._key = ""
         self._options: TrainOptions
+        self._encoder: Encoder
         self._network: Network
         self._known: OrderedDict[str, tuple[Component, Memory]] = OrderedDict()
 
@@ -175,7 +176,7 @@ class RolloutServer:
         blobs : dict of bytes
             ``solid``: see `rlacd.learn.meshes.Solids.packed`.
         shared : dict of Shared
-            ``setting``: ``options`` as JSON, and the ``encoder``'s file of weights if it has one. ``network``: see
+            ``setting``: ``options`` as JSON, and the ``encoder``, pickled by the trainer itself. ``network``: see
             `Rollouts.begin`.
 
         Returns
@@ -189,12 +190,12 @@ class RolloutServer:
         key = f"{values['name']} {values['axis'] if values['degrees'] else 0} {values['degrees']}"
         known = self._known.pop(key) if key in self._known else None
         component, memory = known or (turned(blobs["solid"], values["axis"], values["degrees"]), Memory())
-        cutting = None if component is None else CutProcess(component, Concavity(self._options.threshold), memory)
-        if component is None or cutting is None or not cutting.unfinished or len(cutting.all) > self._options.max_parts:
+        env = None if component is None else CutEnv(component, Concavity(self._options.threshold), memory)
+        if component is None or env is None or not env.unfinished or len(env.all) > self._options.max_parts:
             return {}, {"episode": Episode.empty("nothing").to_bytes()}
         network = self._network if "network" in shared else None
         rng = np.random.default_rng(values["seed"])
-        player = Player(cutting, self._options, self._encoder, network, values["epsilon"], rng)
+        player = Player(env, self._options, self._encoder, network, values["epsilon"], rng)
         episode = player.play()
         self._known[key] = component, memory
         while sum(len(memory.met) for _, memory in self._known.values()) > REMEMBERED:
@@ -205,12 +206,9 @@ class RolloutServer:
         """Rebuild whatever changed in the shared data since the last request."""
         setting = shared["setting"]
         if setting.key != self._setting:
-            options = TrainOptions(**json.loads(setting.blobs["options"]))
-            if "encoder" in setting.blobs:
-                file = self._staging / Path(options.encoder_weights).name
-                file.write_bytes(setting.blobs["encoder"])
-                options = dataclasses.replace(options, encoder_weights=str(file))
-            self._options, self._encoder, self._setting, self._key = options, make_encoder(options), setting.key, ""
+            self._options = TrainOptions(**json.loads(setting.blobs["options"]))
+            self._encoder = pickle.loads(setting.blobs["encoder"])
+            self._setting, self._key = setting.key, ""
             self._known.clear()
         if "network" in shared and shared["network"].key != self._key:
             self._network, self._key = parse_network(shared["network"].blobs["network"]), shared["network"].key

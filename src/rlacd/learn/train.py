@@ -1,4 +1,4 @@
-"""RL-ACD's training (the paper's 3.5 and 4.1), from top to bottom: cut, store, learn from the children of each cut.
+"""A run of `rlacd.learn.dqn`: its folder, curves, validation and checkpoints.
 
 A pool of processes plays episodes (`rlacd.learn.rollouts`), and this process learns from them. On CPU the same meshes,
 options and seed give the same weights bit for bit, wherever episodes are played and whether or not the run was
@@ -23,18 +23,17 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError, TrainingError
 from rlacd.io.write.atomic import write_file
-from rlacd.learn.checkpoint import adam_state, load_checkpoint, restore_adam, save_checkpoint, tensors
-from rlacd.learn.encoders import Encoder, make_encoder, pick_device
+from rlacd.learn.checkpoint import load_checkpoint, save_checkpoint
+from rlacd.learn.dqn import DQN, QNetwork
+from rlacd.learn.encoders import Encoder, make_encoder
 from rlacd.learn.episodes import Episode
 from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.q_network import QNetwork, bellman_loss, dual_state_target, policy_of, soft_value
-from rlacd.learn.replay import Replay, Transition
 from rlacd.learn.rollouts import Rollouts
 from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import RandomShortlist
-from rlacd.policies.network import KIND, SHORTLIST
-from rlacd.pool import Pool, ProcessLimits, Shared
+from rlacd.policies.network import KIND, SHORTLIST, Network, QPolicy, load_network
+from rlacd.pool import Pool, ProcessLimits
 from rlacd.pool.local import InProcessPool
 from rlacd.run import Run
 
@@ -46,6 +45,7 @@ def train(
     *,
     resume: bool = False,
     say: Callable[[str], None] = print,
+    encoder: Encoder | None = None,
     pool: Pool | None = None,
     limits: ProcessLimits | None = None,
 ) -> Path:
@@ -62,6 +62,8 @@ def train(
         Continue exactly from the checkpoint in `run`; without one, start afresh.
     say : callable
         Receives lines of progress.
+    encoder : Encoder, optional
+        What the network sees, in place of the options' encoder; it must be picklable.
     pool : Pool, optional
         Where episodes are played; in this process by default. It affects only the time taken.
     limits : ProcessLimits, optional
@@ -88,104 +90,51 @@ def train(
     say(f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; {left_out}")
     with ExitStack() as stack:
         where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
-        rollouts = Rollouts(where, solids, listed.training, options, limits or ProcessLimits(), say)
-        training = Training(run, options, rollouts, Validation(listed, solids, options), say)
+        agent = DQN(options, encoder or make_encoder(options))
+        rollouts = Rollouts(where, solids, listed.training, options, agent.encoder, limits or ProcessLimits(), say)
+        training = Training(run, agent, rollouts, Validation(listed, solids, options), say)
         training.restore()
         training.run()
     return run / "policy.npz"
 
 
 class Training:
-    """The state of a run, and the loop."""
+    """A run: the agent, its curves, validation and checkpoints."""
 
     def __init__(
-        self,
-        folder: Path,
-        options: TrainOptions,
-        rollouts: Rollouts,
-        validation: Validation,
-        say: Callable[[str], None],
+        self, folder: Path, agent: DQN, rollouts: Rollouts, validation: Validation, say: Callable[[str], None]
     ) -> None:
-        self.folder, self.options, self.rollouts, self.validation, self.say = folder, options, rollouts, validation, say
-        self.encoder = make_encoder(options)
-        self.device = pick_device(options)
-        torch.manual_seed(options.seed)
-        self.network = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)
-        self.target = QNetwork(self.encoder.dim, self.encoder.outputs, options.unit).to(self.device)
-        self.target.load_state_dict(self.network.state_dict())
-        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
-        self.replay = Replay(options.replay, options.max_parts, options.objective == "rewards")
-        self.rng = np.random.default_rng([options.seed, 0])
-        self.cuts = self.learned = 0
-        self.best = np.inf
-        self.seconds = 0.0
+        self.folder, self.agent, self.rollouts, self.validation, self.say = folder, agent, rollouts, validation, say
+        self.options, self.best, self.seconds = agent.options, np.inf, 0.0
         self.seen: dict[str, list[float]] = {}  # since the last point of the curves
 
-    # The algorithm
-
     def run(self) -> None:
-        """Play episodes and learn from them until the last iteration."""
-        options, saved, before = self.options, time.perf_counter(), time.perf_counter() - self.seconds
-        while self.cuts < options.iterations:
-            cuts = self.cuts
-            self.rollouts.begin(*self.acting())
-            self.learn_from(self.rollouts.take())
-            self.seconds = time.perf_counter() - before
-            if self.cuts // options.log_every > cuts // options.log_every:
+        """Train until the last step."""
+        options, before = self.options, time.perf_counter() - self.seconds
+        saved, steps = time.perf_counter(), self.agent.env_steps
+        for episode in self.agent.train(self.rollouts):
+            self.see(episode)
+            done, self.seconds = self.agent.env_steps, time.perf_counter() - before
+            if done // options.log_every > steps // options.log_every:
                 self.log()
-            if self.cuts // options.validate_every > cuts // options.validate_every:
+            if done // options.validate_every > steps // options.validate_every:
                 self.validate()
             if time.perf_counter() - saved >= options.checkpoint_seconds:
                 self.save()
                 saved = time.perf_counter()
+            steps = done
         if not np.isfinite(self.best):
             self.validate()
         self.save()
         self.say(self.validation.verdict(self.best, self.folder, options))
 
-    def acting(self) -> tuple[Shared | None, float]:
-        """How new episodes are played (4.1): at random at first, then epsilon-greedily; see `Rollouts.begin`."""
-        if self.cuts < self.options.warmup:
-            return None, 1.0
-        thousands = (self.cuts - self.options.warmup) // 1000
-        network = Shared({"network": self.network.plain({"threshold": 1.0}).to_bytes()})
-        return network, self.options.epsilon * self.options.epsilon_decay**thousands
-
-    def learn_from(self, episode: Episode) -> None:
-        """Add an episode to the replay buffer cut by cut, and learn after each."""
-        seen = [self.replay.seen(*pair) for pair in zip(episode.features, episode.masks, strict=True)]
-        left = [tuple((seen[child], d) for child, d in children.items()) for children in episode.children()]
-        cuts = list(zip(episode.state.tolist(), episode.planes.tolist(), episode.rewards.tolist(), left, strict=True))
-        self.replay.count([(seen[state], children) for state, _, _, children in cuts])
-        for state, plane, reward, children in cuts:
-            features = episode.features[state] if self.encoder.outputs > 1 else episode.features[state, plane]
-            self.replay.add(Transition(seen[state], plane, features.copy(), reward, children))
-            self.cuts += 1
-            if self.cuts > self.options.warmup and self.cuts % self.options.learn_every == 0:
-                self.learn()
+    def see(self, episode: Episode) -> None:
+        """Note what an episode adds to the next point of the curves."""
+        for loss, target in self.agent.losses:
+            self._add(loss=loss, target=target)
         if len(episode.planes):
             self._add(reward=float(episode.rewards.mean()), parts=float(episode.parts))
         self._add(**{f"ended_{episode.ended}": 1.0})
-
-    def learn(self) -> None:
-        """Take a gradient step on one batch: the dual-state Bellman loss (eq. 8), or that to the fewest cuts seen."""
-        options, batch = self.options, self.replay.sample(self.options.batch, self.rng)
-        tensor = {name: torch.from_numpy(array).to(self.device) for name, array in batch.items()}
-        target = -tensor["cuts"].log()
-        if options.objective == "rewards":
-            with torch.no_grad():
-                values = soft_value(self.target(tensor["child_features"]), tensor["child_masks"], options.temperature)
-            target = dual_state_target(tensor["rewards"], values, tensor["child_discounts"], tensor["owner"])
-        loss = bellman_loss(self.network(tensor["features"]), tensor["planes"], target, options.unit)
-        self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        self.optimizer.step()
-        self.learned += 1
-        if self.learned % options.target_every == 0:
-            self.target.load_state_dict(self.network.state_dict())
-        self._add(loss=float(loss.detach()), target=float(target.mean()))
-
-    # Curves, validation, checkpoints
 
     def log(self) -> None:
         """Append a point to the curves: means since the last one; for ways to end, counts."""
@@ -194,20 +143,19 @@ class Training:
 
     def validate(self) -> None:
         """Count the parts of the validation's solids; the network with the fewest is kept as the best."""
-        ratios = self.validation.ratios(self.network, self.encoder)
+        ratios = self.validation.ratios(self.agent.playing, self.agent.encoder)
         self._point({f"validation_{name}": value for name, value in ratios.items()})
         if ratios["own_plane"] <= self.best:
             self.best = ratios["own_plane"]
             about = {"kind": KIND, "threshold": self.options.threshold, "encoder": self.options.encoder}
-            write_file(self.folder / "policy.npz", self.network.plain(about).to_bytes())
+            write_file(self.folder / "policy.npz", self.agent.playing.plain(about).to_bytes())
 
     def save(self) -> None:
         """Write a checkpoint."""
-        arrays = {"network": self.network.state_dict(), "target": self.target.state_dict()}
-        arrays |= {"adam": adam_state(self.optimizer), "replay": self.replay.state(), "rollouts": self.rollouts.state()}
-        state = {name: getattr(self, name) for name in ("cuts", "learned", "seconds", "seen", "best")}
-        state |= {"options": dataclasses.asdict(self.options), "encoder": self.encoder.digest}
-        save_checkpoint(self.folder / "checkpoint.npz", arrays, {**state, "generator": self.rng.bit_generator.state})
+        arrays, plain = self.agent.state()
+        state = {"seconds": self.seconds, "seen": self.seen, "best": self.best, "encoder": self.agent.encoder.digest}
+        state |= {"options": dataclasses.asdict(self.options), "agent": plain}
+        save_checkpoint(self.folder / "checkpoint.npz", {**arrays, "rollouts": self.rollouts.state()}, state)
 
     def restore(self) -> None:
         """Go on from the checkpoint, if there is one; the curves after it are dropped and will be computed again."""
@@ -218,31 +166,44 @@ class Training:
             return
         arrays, state = found
         for name, value in dataclasses.asdict(self.options).items():
-            if name not in MAY_CHANGE and (was := state["options"][name]) != value:
+            if name not in MAY_CHANGE and (was := state["options"].get(name)) != value:
                 raise OptionError(
                     f"{name} is {value!r}, but was {was!r} when the run began: give that, or begin another run."
                 )
-        if state["encoder"] != self.encoder.digest:
+        if state["encoder"] != self.agent.encoder.digest:
             raise OptionError(f"{self.options.encoder_weights} holds other weights than the run began with.")
-        self.network.load_state_dict(tensors(arrays["network"]))
-        self.target.load_state_dict(tensors(arrays["target"]))
-        restore_adam(self.optimizer, tensors(arrays["adam"]))
-        self.replay.restore(arrays["replay"])
+        self.agent.restore(arrays, state["agent"])
         self.rollouts.restore(arrays["rollouts"])
-        self.cuts, self.learned, self.seconds, self.best = (state[k] for k in ("cuts", "learned", "seconds", "best"))
-        self.seen, self.rng.bit_generator.state = state["seen"], state["generator"]
+        self.seconds, self.seen, self.best = state["seconds"], state["seen"], state["best"]
         kept = [line for line in curves.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
-        curves.write_text("".join(x for x in kept if json.loads(x)["cuts"] <= self.cuts), encoding="utf-8")
-        self.say(f"resuming at cut {self.cuts}")
+        done = self.agent.env_steps
+        curves.write_text("".join(x for x in kept if json.loads(x)["env_steps"] <= done), encoding="utf-8")
+        self.say(f"resuming at step {done}")
 
     def _point(self, values: dict[str, float]) -> None:
+        done, seconds = self.agent.env_steps, self.seconds
         with open(self.folder / "curves.jsonl", "a", encoding="utf-8") as file:
-            file.write(json.dumps({"cuts": self.cuts, **values, "seconds": round(self.seconds, 3)}) + "\n")
-        self.say("  ".join([f"cut {self.cuts}", *(f"{k} {v:.4g}" for k, v in values.items()), f"{self.seconds:.0f} s"]))
+            file.write(json.dumps({"env_steps": done, **values, "seconds": round(seconds, 3)}) + "\n")
+        self.say("  ".join([f"step {done}", *(f"{k} {v:.4g}" for k, v in values.items()), f"{seconds:.0f} s"]))
 
     def _add(self, **values: float) -> None:
         for name, value in values.items():
             self.seen.setdefault(name, []).append(value)
+
+
+def policy_of(network: QNetwork | Network, encoder: Encoder, **deployment: int) -> QPolicy:
+    """Make a policy of a network; `deployment` is `QPolicy`'s shortlist and concave_edges."""
+    fixed = network if isinstance(network, Network) else network.plain({"threshold": 1.0})
+    return QPolicy(lambda component: fixed(encoder.describe(component)).reshape(-1), **deployment)
+
+
+def load_policy(run: Path, encoder: Encoder | None = None, **deployment: int) -> QPolicy:
+    """Get the best network of a run as a policy, whatever its encoder; `deployment` as in `policy_of`."""
+    if not (run / "options.json").is_file():
+        raise OptionError(f"{run} holds no run.")
+    options = TrainOptions(**json.loads((run / "options.json").read_text(encoding="utf-8")))
+    sees = encoder or make_encoder(options)
+    return policy_of(load_network(str(run / "policy.npz"), KIND, sees.dim, sees.outputs), sees, **deployment)
 
 
 class Validation:
@@ -276,9 +237,9 @@ class Validation:
         where = "solids it has not seen" if self._held_out else "the solids it learned from"
         text = f"On {where}, the network's plane leaves {best:.3f} times greedy's parts (random: {self._random:.3f}). "
         if best > 1:
-            return f"{text}Greedy is better: go on with  --resume --iterations {2 * options.iterations}  in {folder}."
+            return f"{text}Greedy is better: go on with  --resume --env-steps {2 * options.env_steps}  in {folder}."
         if options.encoder == "i2p-mae":
-            return f"{text}Use it in Python:  rlacd.learn.q_network.load_policy({str(folder)!r}, shortlist=10)."
+            return f"{text}Use it in Python:  rlacd.learn.train.load_policy({str(folder)!r}, shortlist=10)."
         return f"{text}Use it:  rlacd decompose MESH --policy {folder / 'policy.npz'}"
 
 
@@ -287,5 +248,5 @@ def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(counts, 1) / np.maximum(others, 1)))))
 
 
-MAY_CHANGE = ["iterations", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"]
+MAY_CHANGE = ["env_steps", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"]
 """Options that may change when a run is resumed: its length, its logging, its place and files."""

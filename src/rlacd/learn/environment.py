@@ -1,4 +1,4 @@
-"""The decision process: a solid's unfinished components, the valid cuts, and the reward of each.
+"""The environment (the paper's 3.1): a solid's unfinished components, the valid cuts, and the reward of each.
 
 The components, planes, splitting and criterion are those of `rlacd.decompose` (see `rlacd.cut`).
 """
@@ -42,7 +42,7 @@ class Settled:
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class Step:
     """Outcome of a cut.
 
     Attributes
@@ -82,12 +82,11 @@ class Memory:
         self.features: dict[Component, Any] = {}
 
 
-class CutProcess(Settled):
-    """The decision process of one solid.
+class CutEnv(Settled):
+    """The decision process of one solid; `reset` and `step` are those of Gymnasium, with components for observations.
 
     The state is the connected components that miss the criterion, and the parts finished so far. Every unfinished
-    component has to be cut eventually, and its cuts do not depend on the other components, so the order is no part of
-    the process.
+    component has to be cut eventually, and its cuts do not depend on the others, so the order matters for r_2 alone.
 
     Parameters
     ----------
@@ -102,8 +101,14 @@ class CutProcess(Settled):
         super().__init__()
         self._criterion = criterion
         self.memory = memory or Memory()
-        self._hull_volume = solid.hull.volume
-        self._settle(solid, self)
+        self._solid, self._hull_volume = solid, solid.hull.volume
+        self.reset()
+
+    def reset(self) -> list[Component]:
+        """Begin again with the whole solid; returns its unfinished components."""
+        self.unfinished, self.finished, self.stuck = [], [], []
+        self._settle(self._solid, self)
+        return self.unfinished
 
     @property
     def terminal(self) -> bool:
@@ -117,13 +122,17 @@ class CutProcess(Settled):
             known[component] = paper_planes(component)
         return known[component]
 
-    def largest(self) -> int:
-        """Index of the unfinished component with the largest hull, so that coarse cuts come first."""
-        return max(range(len(self.unfinished)), key=lambda i: self.unfinished[i].hull.volume)
+    def excess(self, component: Component) -> float:
+        """Most that r_1 can still earn from a component on: (|CH(m_i)| - |m_i|) / |CH(m)|."""
+        return max(component.hull.volume - component.volume, 0.0) / self._hull_volume
 
-    def cut(self, index: int, plane: Plane) -> Cut:
-        """Cut unfinished component `index` by a plane."""
-        component = self.unfinished.pop(index)
+    def largest(self) -> Component:
+        """The unfinished component with the largest hull, which the policy cuts first."""
+        return max(self.unfinished, key=lambda component: component.hull.volume)
+
+    def step(self, component: Component, plane: Plane) -> Step:
+        """Cut an unfinished component by a plane."""
+        self.unfinished.remove(component)
         sides, left = self.memory.cache.sides(component, plane), Settled()
         for side in sides:
             self._settle(side, left)
@@ -137,7 +146,7 @@ class CutProcess(Settled):
         # Hulls of connected pieces may overlap (two links of a chain, say); discounts must not add up to more than 1.
         discounts = [child.hull.volume / max(own, hulls) for child in left.unfinished]
         finishes = terminal_reward(len(self.finished)) if self.terminal else 0.0
-        return Cut(left, (own - hulls) / self._hull_volume, finishes, discounts)
+        return Step(left, (own - hulls) / self._hull_volume, finishes, discounts)
 
     def _settle(self, component: Component, into: Settled) -> None:
         """Evaluate a component, split it if it has to be cut, and evaluate its pieces."""
