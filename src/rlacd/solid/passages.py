@@ -26,6 +26,9 @@ PUSHES, MORE = 12, 8
 """... so often by each, since in the corner of two walls it goes a third of its way; and then to and fro by the last,
 to see whether it drifts."""
 
+STRAY = 0.75
+"""A ball that goes so much of the way nearly straight finds no other wall: to the middle, it is a third or half."""
+
 SHRINKS = 32
 """So often a ball shrinks at most. In the holes of a thin plate it halves each time."""
 
@@ -35,7 +38,7 @@ GROWTH = 1.5
 ALIKE = 1.02
 """Times as large as another, a ball does not count as larger."""
 
-FACES = 3000
+FACES = 2000
 """Triangles of which each is a start; of more, those whose middles lie in different cells, or that face elsewhere."""
 
 CELLS, COARSER = 256, 1.5
@@ -144,7 +147,9 @@ def _shrunk(
 def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
     """The balls that are held, in the best place near theirs."""
     for step in STEPS:
-        balls, _ = _pushed_by(step * balls.radii, PUSHES, balls.centres, surface, threads)
+        size = step * balls.radii
+        balls, ways = _pushed_by(size, PUSHES, balls.centres, surface, threads)
+        balls = balls.some(np.sqrt(dots(ways, ways)) <= STRAY * PUSHES * size)
     size = STEPS[-1] * balls.radii
     balls, ways = _pushed_by(size, MORE, balls.centres, surface, threads)
     return balls.some(np.sqrt(dots(ways, ways)) <= LARGEST_DRIFT * MORE * size)
