@@ -247,7 +247,7 @@ def test_the_ground_keeps_balls_above_it() -> None:
 
 
 ODD = {
-    "radius": [0, float("nan"), None, "wide"],
+    "radius": [0, float("nan"), "wide"],
     "tolerance": [-0.1, float("inf")],
     "radius_abs": [0.0],
     "tolerance_abs": [-1],
@@ -415,8 +415,9 @@ def test_lengths_in_the_meshs_own_unit() -> None:
     by_length = rlacd.decompose(mesh, criterion=rlacd.NavigableSpace(radius_abs=100.0, tolerance_abs=40.0))
     assert len(by_share) == len(by_length) == 2
     assert np.allclose(by_share.balls.centres * 1000, by_length.balls.centres, atol=1e-3)
-    with pytest.raises(rlacd.OptionError, match="it has to be left out with radius_abs"):
-        rlacd.NavigableSpace(0.1, radius_abs=1.0)
+    for share in (0.1, rlacd.NavigableSpace().radius):  # the default, but given
+        with pytest.raises(rlacd.OptionError, match="it has to be left out with radius_abs"):
+            rlacd.NavigableSpace(share, radius_abs=1.0)
 
 
 def bumpy_ball() -> trimesh.Trimesh:
