@@ -220,3 +220,12 @@ def test_nodes_of_a_scene_that_do_not_touch_do_not_as_hulls() -> None:
     alone = [Body(b.name, b.mesh, [(h.vertices, h.faces) for h in one]) for b, one in zip(bodies, apart, strict=True)]
     assert len(check(alone, at_rest(list(parts)))) == 1, "each for itself, their hulls touch"
     assert not [warning for warning in done.report["warnings"] if "touch" in warning]
+
+
+def test_a_model_that_mujoco_does_not_load_is_checked_at_rest_and_that_is_said(arm: Path) -> None:
+    arm.write_text(arm.read_text().replace('joint1="k"', 'joint1="none"'))
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), samples=5, threads=1)
+    assert (done.samples, len(done.pairs)) == (1, 6)
+    (said,) = [warning for warning in done.warnings if "at rest only" in warning]
+    assert "MuJoCo cannot place the links of arm.xml" in said
+    assert {pair.kind for pair in done.pairs} == {"sometimes"}

@@ -11,9 +11,11 @@ import trimesh
 from click.testing import CliRunner
 
 import rlacd
+from rlacd.clear import Body, at_rest, check
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
 from tests.models import TABLE_VOLUME, inside, table
+from tests.moving import drawer
 
 pytest.importorskip("pxr", reason="the extra usd is not installed")
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdValidation, Vt
@@ -210,3 +212,31 @@ def test_what_cannot_be_rewritten_is_refused(tmp_path: Path) -> None:
     damaged.write_text("#usda 1.0\ndef Xform {")
     with pytest.raises(MeshFileError, match="damaged"):
         rlacd.rewrite_robot(damaged, tmp_path / "out.usda")
+
+
+@pytest.mark.promise("links-clear")
+def test_bodies_that_do_not_touch_do_not_as_hulls_and_fixed_meshes_may(tmp_path: Path) -> None:
+    """A drawer that slides in a cabinet, which is no rigid body; both are turned, scaled and mirrored."""
+    pytest.importorskip("coal", reason="extra clear")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "in.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    root = UsdGeom.Xform.Define(stage, "/scene")
+    root.AddRotateXYZOp().Set((20, 30, 40))
+    root.AddScaleOp().Set((-2, 2, 2))
+    for name, shape in drawer(0.004).links.items():
+        mesh = add_mesh(stage, f"/scene/{name}", shape.vertices, shape.faces)
+        UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
+    UsdPhysics.RigidBodyAPI.Apply(stage.GetPrimAtPath("/scene/drawer"))
+    stage.Save()
+    done = rlacd.rewrite_robot(tmp_path / "in.usda", tmp_path / "out.usda", threshold=0.06, quality="fast", threads=1)
+    (pair,) = done.pairs
+    assert (pair.kept_clear, pair.share, pair.loose) == (True, 0, True)
+    after = Usd.Stage.Open(str(done.path))
+    hulls = [(placed(prim), str(prim.GetPath())) for prim in colliders(after)]
+    groups = [[hull.convex_hull for hull, path in hulls if f"/{name}" in path] for name in ("cabinet", "drawer")]
+    assert all(groups)
+    bodies = [
+        Body(name, (own[0].vertices, own[0].faces), [(h.vertices, h.faces) for h in own])
+        for name, own in zip("ab", groups, strict=True)
+    ]
+    assert check(bodies, at_rest("ab")) == {}

@@ -224,7 +224,7 @@ def mjcf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
         mujoco.mj_kinematics(model, data)
         sample[:, :3, :3], sample[:, :3, 3] = data.xmat.reshape(-1, 3, 3), data.xpos
     positions[0] = model.qpos0[at]
-    links = [model.body(i).name or f"body {i}" for i in range(model.nbody)]
+    links = [model.body(i).name or f"body_{i}" for i in range(model.nbody)]
     parents = {i: int(p) for i, p in enumerate(model.body_parentid) if i}
     held = {int(model.jnt_bodyid[j]) for j in range(model.njnt)} - {int(model.jnt_bodyid[j]) for j in sampled}
     names, carrier = tuple(joint.name for joint in joints), _carriers(parents, held, model.nbody)

@@ -91,7 +91,7 @@ def check(
         The extra ``clear`` is not installed.
     """
     import_extra("coal", "checking that bodies stay clear of each other", "clear")
-    filled = [i for i, body in enumerate(bodies) if body.hulls]
+    filled = [i for i, body in enumerate(bodies) if body.hulls and len(body.mesh[1])]
     if len(filled) < 2:
         return {}
     boxes = np.stack([bodies[i].box for i in filled])
@@ -116,7 +116,7 @@ def check(
 
 def size_of(bodies: Sequence[Body], motion: Motion) -> float:
     """The longest side of the box around all bodies at rest."""
-    filled = [i for i, body in enumerate(bodies) if len(body.mesh[0])]
+    filled = [i for i, body in enumerate(bodies) if body.hulls and len(body.mesh[1])]
     boxes = np.stack([bodies[i].box for i in filled])
     return float(np.ptp(placed_boxes(boxes, motion.poses[:1, filled]).reshape(-1, 3), axis=0).max())
 

@@ -84,11 +84,12 @@ def motion_of(
     try:
         found = (urdf_motion if kind == "urdf" else mjcf_motion)(path, robot.samples, seed)
         return found.some(names), []
-    except (ValueError, KeyError) as error:  # MuJoCo reads fewer meshes than we do; links may be in no tree
-        said = " ".join(str(error).split())[:80]
-        return resting(bodies), [
-            f"Links were checked against each other at rest only: {path.name} is refused ({said})."
-        ]
+    except MissingExtraError:
+        raise
+    except Exception as error:  # MuJoCo reads fewer meshes than we do; a URDF may say anything
+        reader, why = "yourdfpy" if kind == "urdf" else "MuJoCo", " ".join(str(error).split())[:80]
+        said = f"{reader} cannot place the links of {path.name} ({why})"
+        return resting(bodies), [f"Links were checked against each other at rest only: {said}."]
 
 
 def resting(bodies: Sequence[Body], fixed: Collection[str] = ()) -> Motion:
