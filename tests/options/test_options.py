@@ -201,11 +201,9 @@ def test_an_option_that_another_overrides_is_refused_even_with_its_default(
 ) -> None:
     mesh = tmp_path / "box.stl"
     creation.box().export(mesh)
-    for call in (
-        lambda: rlacd.decompose(mesh, **given),
-        lambda: JobSpec.of(given),
-        lambda: rlacd.rewrite_robot("no such file.urdf", "out.urdf", **given),
-    ):
+    robot = lambda: rlacd.rewrite_robot("no such file.urdf", "out.urdf", **given)  # noqa: E731
+    of_robots = () if "relative_to" in given else (robot,)  # whose lengths are relative to all of it, or to a mesh
+    for call in (lambda: rlacd.decompose(mesh, **given), lambda: JobSpec.of(given), *of_robots):
         with pytest.raises(OptionError, match=says):
             call()
     words = {"--" + ("tolerance" if n == "volume_tolerance" else n.replace("_", "-")): v for n, v in given.items()}
