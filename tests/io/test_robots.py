@@ -172,6 +172,21 @@ def test_the_meshes_of_a_link_become_one_solid_where_its_first_mesh_was(lever: P
     assert sum(hull.volume for hull in hulls) == pytest.approx(sum(abs(mesh.volume) for mesh in before), rel=0.05)
 
 
+def test_a_link_of_sheets_and_points_is_covered(tmp_path: Path) -> None:
+    trimesh.PointCloud(trimesh.creation.box().vertices + np.array([5, 0, 0])).export(tmp_path / "points.ply")
+    trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "flat.stl")
+    trimesh.creation.box().export(tmp_path / "box.stl")
+    robot = urdf(tmp_path, "filename='flat.stl'", "filename='points.ply'", "filename='box.stl' scale='-1 2 1'")
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threads=1)
+    assert [len(result.source.faces) for result in done.links[0].results] == [14, 0]
+    assert trimesh.util.concatenate(collisions(done.path)).bounds == pytest.approx(
+        np.array([[-0.5, -1, -0.5], [5.5, 1, 0.5]]), abs=0.01
+    )
+    trimesh.Trimesh().export(tmp_path / "empty.stl")
+    with pytest.raises(MeshFileError, match=r"empty\.stl"):
+        rlacd.rewrite_robot(urdf(tmp_path, "filename='box.stl'", "filename='empty.stl'"), tmp_path / "no.urdf")
+
+
 def test_lengths_are_shares_of_the_robot_at_rest(lever: Path) -> None:
     size = np.ptp(np.concatenate([mesh.vertices for mesh in collision_meshes(lever)]), axis=0).max()
     assert size > 10, "the joint turns the hand away"

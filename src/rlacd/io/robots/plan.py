@@ -66,7 +66,7 @@ class Sources(NamedTuple):
 
 
 def colliders(body: str, uses: Sequence[tuple[Hashable | None, PlacedMesh, Found]]) -> dict[Collider, list[Found]]:
-    """Join the meshes of a body that are of the same kind; those of the kind None stay apart.
+    """Join the meshes of a body that are of the same kind; those of the kind None, and clouds of points, stay apart.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def colliders(body: str, uses: Sequence[tuple[Hashable | None, PlacedMesh, Found
     """
     kinds: dict[Hashable, list[tuple[PlacedMesh, Found]]] = {}
     for index, (kind, placed, use) in enumerate(uses):
-        kinds.setdefault(index if kind is None else (kind,), []).append((placed, use))
+        kinds.setdefault((kind,) if kind is not None and len(placed.surface.faces) else index, []).append((placed, use))
     made = {}
     for group in kinds.values():
         meshes = tuple(placed for placed, _ in group)
