@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -138,8 +139,8 @@ def urdf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
         The extra ``clear`` is not installed.
     """
     yourdfpy = import_extra("yourdfpy", _FOR, "clear")
-    logging.getLogger("yourdfpy").setLevel(logging.ERROR)
-    robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_collision_scene_graph=False)
+    with _quiet("yourdfpy"):
+        robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_collision_scene_graph=False)
     said: list[str] = []
     found = [_range(*_urdf_limits(joint), said) for joint in robot.actuated_joints]
     joints = [joint for joint in found if joint is not None]
@@ -173,6 +174,18 @@ def _carriers(parents: Mapping[int, int], held: Collection[int], count: int) -> 
         return link
 
     return tuple(carrier(link) for link in range(count))
+
+
+@contextmanager
+def _quiet(name: str) -> Iterator[None]:
+    """Keep a library from logging anything but errors: what it warns of does not concern kinematics."""
+    logger = logging.getLogger(name)
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _urdf_limits(joint: Any) -> tuple[str, str, tuple[float, float] | None]:

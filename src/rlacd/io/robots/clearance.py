@@ -68,6 +68,8 @@ def checked_links(
 
         cleared = kept_clear(own, moves, redo)
     except MissingExtraError as error:
+        if robot.exclude or robot.srdf:
+            raise
         return Checked(results, [], 0, [f"Links were not checked against each other: {error}"])
     found = warnings_of(cleared, moves, lambda length: f"{1000 * metres * length:.3g} mm")
     more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []

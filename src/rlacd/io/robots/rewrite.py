@@ -108,7 +108,6 @@ def rewrite_robot(
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     asked = RobotOptions(per, links, samples, exclude, None if srdf is None else os.fspath(srdf))
-    _check_matrix(source, asked)
     check_options(options)
     if source.suffix.lower() in usd.ENDINGS:
         _check_place(source, place, usd.ENDINGS)
@@ -117,6 +116,7 @@ def rewrite_robot(
         raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
     packages, began = checked(OutputOptions, "package_dirs", package_dirs) or (), time.perf_counter()
     kind, root, folder = _opened(source, place)
+    _check_matrix(source, place, asked)
     plan, warnings = _plan(root, kind, References(source, packages), place, folder, apart=asked.per == "mesh")
     if not plan.bodies:
         write_file(place, root.file.data)
@@ -135,7 +135,7 @@ def rewrite_robot(
     warnings += [*warnings_of(results), *clear.warnings, *said]
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
-    if asked.srdf is not None:
+    if asked.srdf is not None and (clear.samples or len(plan.bodies) < 2):
         write_file(Path(asked.srdf), srdf_of(root.attributes.get("name", "robot"), clear.pairs))
     made = [RewrittenLink.of(body, results, names) for body in plan.bodies]
     seconds, size = time.perf_counter() - began, size_of(plan.bodies)
@@ -149,6 +149,7 @@ def rewrite_stage(
     began = time.perf_counter()
     _check_place(stage.source, place, usd.ENDINGS)
     check_options(options)
+    _check_matrix(stage.source, place, robot)
     bodies, prims = usd.bodies_of(stage, apart=robot.per == "mesh")
     results = decompose_bodies(bodies, options, robot)
     fixed = {node["path"] for node in stage.nodes if not node["body"]}
@@ -165,7 +166,7 @@ def rewrite_stage(
     return Rewritten(place, place, made, warnings, seconds, size, stage.metres, clear.pairs, clear.samples)
 
 
-def _check_matrix(source: Path, robot: RobotOptions) -> None:
+def _check_matrix(source: Path, place: Path, robot: RobotOptions) -> None:
     """Check that what is asked about pairs of links is for this kind of file."""
     ending = source.suffix.lower()
     if robot.exclude and ending != ".xml":
@@ -173,6 +174,8 @@ def _check_matrix(source: Path, robot: RobotOptions) -> None:
     if robot.srdf is not None:
         if ending != ".urdf":
             raise OptionError("srdf (--srdf) is for a URDF; for MJCF give exclude (--exclude).")
+        if os.path.realpath(robot.srdf) in map(os.path.realpath, (source, place)):
+            raise OptionError(f"srdf (--srdf) {robot.srdf} would overwrite the URDF; choose another name.")
         check_file(Path(robot.srdf))
 
 
