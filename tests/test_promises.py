@@ -91,7 +91,7 @@ REPORTS: list[dict[str, Any]] = [
     {"criterion": "volume"},
     {"criterion": rlacd.NavigableSpace(radius=0.1, tolerance=0.05)},
     {"primitives": True, "overlap": 0.005},
-    {"per_node": True},
+    {"per_node": True, "avoid": [trimesh.creation.box(bounds=[(9, 9, 9), (10, 10, 10)])]},
 ]
 
 
