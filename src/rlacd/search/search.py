@@ -20,7 +20,7 @@ from rlacd.solid.component import Part
 BEST_SECONDS = 5.0
 """What ``best`` may take by default, more if its first search takes longer."""
 
-TIMES_FIRST_PASS = 5.5
+TIMES_FIRST_PASS = 5.0
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 8e6
@@ -186,7 +186,7 @@ class _Search:
     Attributes
     ----------
     early, best : list of Part
-        The first start when each part had been offered to others, and the best parts so far.
+        What ``fast`` ends with, and the best parts so far.
     gained : float
         When they became so few, by `time.perf_counter`.
     starts, steps, accepted : int
@@ -214,8 +214,9 @@ class _Search:
             before = len(self.best)
             if self._state is None:
                 self._state = self._begun(self.best)
-                self.early = self._state.parts
-                self._ahead = len(self.early)
+                self._ahead = len(self._state.parts)
+                if self._context.criterion.eliminates:
+                    self.early = self._state.parts
             self._improve(self._state, most)
             if self.steps < most and not run.is_over:
                 with run.quietly():
@@ -253,6 +254,8 @@ class _Search:
         run, context = self._run, self._context
         with run.limited(self._first_pass):
             parts = grow_cover(parts, context.criterion, run, context.root)
+        if self._state is None:
+            self.early = parts
         state = Neighbourhood(replace(context, seed=context.seed + self.starts), parts, run)
         self.starts += 1
         state.redistribute_all()
