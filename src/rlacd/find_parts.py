@@ -34,10 +34,6 @@ COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
 only tangles take so long. In between, parts are united two at a time; pairs are measured for as much work."""
 
-CATCH_UP = 0.9
-"""Parts found on a proxy are carried to the solid beside those of the first pass if they end as more hulls than this
-share of what that pass left: the others could end as fewer."""
-
 
 class Reached(NamedTuple):
     """The decomposition reached: complete, or the state when it was stopped.
@@ -140,8 +136,9 @@ class _Decomposer:
             if self.model.proxy is None:
                 return best, done.criterion, found
             lifted = self._lifted(best, goal)
-            for parts in states[:-1]:  # of the levels below
-                if parts is not best and len(lifted) > CATCH_UP * len(parts) and self.run.stopped_by is None:
+            least = found.at_least if found is not None else 1
+            for parts in states[:-1]:  # of the levels below: on the solid they may be fewer
+                if parts is not best and len(lifted) > least and self.run.stopped_by is None:
                     lifted = min(lifted, self._lifted(parts, goal), key=cost)
             return lifted, goal, found
 

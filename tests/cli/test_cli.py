@@ -169,6 +169,17 @@ def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> N
     assert "(threshold 0.05)" in run.stderr
 
 
+def test_the_summary_says_what_more_time_may_gain() -> None:
+    frame = trimesh.creation.annulus(0.8, 1.0, 0.3, sections=64)
+    best = decompose(frame, quality="best", budget=0.2, threads=1)
+    search = best.report["search"]
+    assert 0 <= search["last_gain"] <= search["seconds"]
+    idle = search["seconds"] - search["last_gain"]
+    said = f"saved no hull in the last {idle:.1f} of {search['seconds']:.1f} s"
+    assert (said in summary(best, "out.xml")) == (best.report["at_least"] < len(best))
+    assert "saved no hull" not in summary(decompose(frame, threads=1), "out.xml")
+
+
 def test_the_summary_counts_primitives_by_kind() -> None:
     boxes = [trimesh.creation.box((1, 2, 3)), trimesh.creation.box((1, 1, 1))]
     boxes[1].apply_translation((5, 0, 0))

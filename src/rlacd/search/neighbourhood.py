@@ -18,7 +18,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
 
@@ -79,35 +79,11 @@ CLUSTER = 3
 """Parts that are recut together: two rarely become one, and of more, hardly any trial saves a part
 (docs/search.md)."""
 
+MOST_TRIES = 3
+"""How often a part is divided between the same parts: of 470 further trials none saved one."""
+
 DRAWS = 10
 """Draws of a cluster before it is given up to find a new one."""
-
-
-@dataclass(frozen=True)
-class SearchOutcome:
-    """Result of a neighbourhood search.
-
-    Attributes
-    ----------
-    parts : list of Part
-        The best parts found.
-    steps : int
-        Recuts tried.
-    accepted : int
-        Trials accepted.
-    gained : float
-        When the last part was saved, by `time.perf_counter`.
-    """
-
-    parts: list[Part]
-    steps: int = 0
-    accepted: int = 0
-    gained: float = 0.0
-
-    def then(self, other: SearchOutcome) -> SearchOutcome:
-        """Combine this outcome with that of another search."""
-        best = min(self, other, key=lambda outcome: cost(outcome.parts))
-        return replace(best, steps=self.steps + other.steps, accepted=self.accepted + other.accepted)
 
 
 class Operator(Enum):
@@ -145,6 +121,15 @@ class Neighbourhood:
     parts : sequence of Part
         Made of components with disjoint interiors.
     run : Run
+
+    Attributes
+    ----------
+    best : list of Part
+        The best parts so far.
+    gained : float
+        When they became so few, by `time.perf_counter`.
+    steps, accepted : int
+        Recuts tried, and trials accepted.
     """
 
     def __init__(self, context: SearchContext, parts: Sequence[Part], run: Run) -> None:
@@ -153,9 +138,9 @@ class Neighbourhood:
         self._policies = [Greedy(score, sweeps=context.near_sweeps) for score in context.scores]
         self._random = np.random.default_rng(context.seed)
         self._graph = PartGraph(parts, context.criterion, run)
-        self._best = list(parts)
-        self._steps = self._accepted = 0
-        self._gained = time.perf_counter()
+        self.best = list(parts)
+        self.gained = time.perf_counter()
+        self.steps = self.accepted = 0
         self._nears: dict[int, Cluster] = {}
         self._begun: deque[_UnderWay] = deque()
         self._again: deque[_Trial] = deque()  # what they found came too late
@@ -165,11 +150,6 @@ class Neighbourhood:
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     @property
-    def outcome(self) -> SearchOutcome:
-        """The best found so far."""
-        return SearchOutcome(self._best, self._steps, self._accepted, self._gained)
-
-    @property
     def parts(self) -> list[Part]:
         """The parts as they are."""
         return list(self._graph.parts.values())
@@ -177,21 +157,21 @@ class Neighbourhood:
     @property
     def is_least(self) -> bool:
         """Whether no fewer parts can do."""
-        return len(self._best) <= self._context.enough()
+        return len(self.best) <= self._context.enough()
 
     def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
         """Search until the run is over, `most` recuts are made in total, so many units have saved nothing, or no fewer
         parts can do."""
         self._in_vain = dict.fromkeys(Operator, 0)
-        self._make(self._trials(most, patience))
+        self._make(self._trials(patience), most)
 
     def redistribute_all(self) -> None:
         """Offer each part to those around, the smallest first."""
         self._make(_Trial(Operator.REDISTRIBUTE, (which,)) for which in self._by_size())
 
-    def _trials(self, most: float, patience: float) -> Iterator[_Trial]:
+    def _trials(self, patience: float) -> Iterator[_Trial]:
         """Trials of the operator that has done the least work in vain."""
-        while self._steps < most and sum(self._in_vain.values()) < patience and not self.is_least:
+        while sum(self._in_vain.values()) < patience and not self.is_least:
             for operator in sorted(Operator, key=self._in_vain.__getitem__):
                 trial = self._cluster() if operator is Operator.RECUT else self._least_tried(operator)
                 if trial is not None:
@@ -211,14 +191,14 @@ class Neighbourhood:
             policy = int(self._random.integers(len(self._policies)))
             if (cluster, policy) not in self._recut:
                 self._recut.add((cluster, policy))
-                self._steps += 1
                 return _Trial(Operator.RECUT, cluster, policy)
         return None
 
     def _least_tried(self, operator: Operator) -> _Trial | None:
         """The part that was tried the fewest times between the same parts, of those the smallest."""
         tries = {i: self._tries.get((operator, i, near), 0) for i in self._by_size() if (near := self._around(i))}
-        return _Trial(operator, (min(tries, key=tries.__getitem__),)) if tries else None
+        which = min(tries, key=tries.__getitem__, default=None)
+        return None if which is None or tries[which] == MOST_TRIES else _Trial(operator, (which,))
 
     def _by_size(self) -> list[int]:
         parts = self._graph.parts
@@ -246,11 +226,11 @@ class Neighbourhood:
         divide = give if operator is Operator.GIVE else partial(redistribute, again=tries > 1)
         return partial(divide, parts[0], graph.of(near), context.criterion, random, context.root)
 
-    def _make(self, trials: Iterator[_Trial]) -> None:
-        """Make trials, `LAG` at a time, and apply what they find."""
+    def _make(self, trials: Iterator[_Trial], most: float = math.inf) -> None:
+        """Make trials, `LAG` at a time, and apply what they find, until there are `most` recuts."""
         run = self._run
         try:
-            while run.step(self._steps, None, len(self._best)):
+            while self.steps < most and run.step(self.steps, None, len(self.best)):
                 trial = self._again.popleft() if self._again else next(trials, None)
                 if trial is None and not self._begun:
                     return
@@ -272,6 +252,7 @@ class Neighbourhood:
         self._run.work.pay(begun.run.work.done)
         if begun.run.work.is_spent:  # it was given all that was left
             self._run.work.close()
+        self.steps += begun.trial.operator is Operator.RECUT
         self._in_vain[begun.trial.operator] += begun.run.work.done
         if exchange is None:
             return
@@ -279,13 +260,13 @@ class Neighbourhood:
             self._again.append(begun.trial)
             return
         self._nears.clear()
-        self._accepted += 1
+        self.accepted += 1
         if exchange.gain > 0:
             self._in_vain[begun.trial.operator] = 0
-        if cost(self.parts) < cost(self._best):
-            if len(self.parts) < len(self._best):
-                self._gained = time.perf_counter()
-            self._best = self.parts
+        if cost(self.parts) < cost(self.best):
+            if len(self.parts) < len(self.best):
+                self.gained = time.perf_counter()
+            self.best = self.parts
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

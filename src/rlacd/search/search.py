@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import reduce
 from typing import Any
 
 from rlacd.cut import CutTree
@@ -15,13 +14,13 @@ from rlacd.merge import drop_slivers, grow_cover
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import Greedy
 from rlacd.run import Run
-from rlacd.search.neighbourhood import Neighbourhood, SearchContext, SearchOutcome, cost
+from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
 from rlacd.solid.component import Part
 
 BEST_SECONDS = 5.0
 """What ``best`` may take by default, more if its first search takes longer."""
 
-TIMES_FIRST_PASS = 5.5
+TIMES_FIRST_PASS = 5.0
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 8e6
@@ -40,11 +39,14 @@ STARTS = ("excess-norm", "hull-sum")
 ANOTHER_PASS = 1.5
 """Another pass is abandoned when it exceeds this multiple of the work of the first, ..."""
 
+HOPELESS = 5
+"""... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
+
 BOUNDED_STARTS = 2
 """A bounded search ends when it has saved nothing from the last of so many starts for that long."""
 
-HOPELESS = 5
-"""... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
+IN_VAIN = 8
+"""Any search ends when so many starts in a row have found nothing better."""
 
 
 @dataclass
@@ -137,25 +139,24 @@ def search(
     most = math.inf if steps is None else steps
     with run.limited(allowed, math.inf if seconds is None else seconds):
         state.go_on(most, BOUNDED_STARTS if bounded else math.inf)
-    earlier = state.outcome.parts
+    earlier = state.best
     if bounded and quality == "best":
         with run.limited(seconds=BEST_SECONDS - (time.perf_counter() - begin)):
             state.go_on(most, math.inf)
-    done = state.outcome
     summary = SearchSummary(
         level=quality,
         seconds=time.perf_counter() - begin,
-        last_gain=max(done.gained - begin, 0.0),
+        last_gain=max(state.gained - begin, 0.0),
         first_pass=len(parts),
-        parts=len(done.parts),
+        parts=len(state.best),
         starts=state.starts,
-        steps=done.steps,
-        accepted=done.accepted,
+        steps=state.steps,
+        accepted=state.accepted,
         work=run.work.done - first_pass,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
         at_least=context.enough(),
     )
-    return [state.early, earlier, done.parts], summary
+    return [state.early, earlier, state.best], summary
 
 
 def eliminate_parts(context: SearchContext, parts: Sequence[Part], run: Run) -> list[Part]:
@@ -181,69 +182,93 @@ class _Search:
     run : Run
     first_pass : int
         The work of the first pass.
+
+    Attributes
+    ----------
+    early, best : list of Part
+        What ``fast`` ends with, and the best parts so far.
+    gained : float
+        When they became so few, by `time.perf_counter`.
+    starts, steps, accepted : int
+        Starts searched from, recuts tried and trials accepted.
     """
 
     def __init__(self, context: SearchContext, parts: list[Part], run: Run, first_pass: int) -> None:
-        self.starts = self._passes = 0
-        self.early = parts
+        self.early = self.best = parts
+        self.gained = 0.0
+        self.starts = self.steps = self.accepted = 0
         self._context = context
-        self._parts = parts
         self._run = run
         self._first_pass = first_pass
-        self._best: Neighbourhood | None = None
-        self._early = len(parts)  # of the best: how many were left when each had been offered to those around
-        self._others = [SearchOutcome(parts)]
+        self._most = HOPELESS * len(parts)
+        self._passes = 1
+        self._state: Neighbourhood | None = None
+        self._ahead = 0  # parts of that when each had been offered to others
 
-    @property
-    def outcome(self) -> SearchOutcome:
-        """The best found so far."""
-        return reduce(SearchOutcome.then, self._others if self._best is None else [*self._others, self._best.outcome])
-
-    def go_on(self, steps: float, starts: float) -> None:
-        """Search until the run is over, so many recuts are made, no fewer parts can do or so many starts were tried."""
-        run, enough = self._run, self._context.enough
-        while steps > self.outcome.steps and not run.is_over and len(self.outcome.parts) > enough():
-            if self._best is None:
-                self._best = self._begun(self._parts)
-                self.early = self._best.parts
-                self._early = len(self.early)
-            self._improve(self._best, steps)
-            if (start := self._another_pass()) is not None:
-                self._challenge(self._begun(start), steps)
-            if self._passes + 1 >= starts:
+    def go_on(self, most: float, starts: float) -> None:
+        """Search until the run is over, `most` recuts are made, no fewer parts can do, or so many starts were tried."""
+        run, enough, in_vain = self._run, self._context.enough, 0
+        while self.steps < most and not run.is_over and len(self.best) > enough():
+            if in_vain == IN_VAIN or self._passes >= starts:
                 return
+            before = len(self.best)
+            if self._state is None:
+                self._state = self._begun(self.best)
+                self._ahead = len(self._state.parts)
+                if self._context.criterion.eliminates:
+                    self.early = self._state.parts
+            self._improve(self._state, most)
+            if self.steps < most and not run.is_over:
+                with run.quietly():
+                    self._challenge(self._state, most)
+            in_vain = in_vain + 1 if len(self.best) == before else 0
 
-    def _challenge(self, other: Neighbourhood, steps: float) -> None:
+    def _challenge(self, best: Neighbourhood, most: float) -> None:
         """Search from another start unless it is behind already; the better of two goes on."""
-        assert self._best is not None
+        start = self._another_pass()
+        if start is None:
+            return
+        other = self._begun(start)
         early = len(other.parts)
-        if early < self._early:
-            self._improve(other, steps)
-        if cost(other.outcome.parts) < cost(self._best.outcome.parts):
-            self._best, self._early, other = other, early, self._best
-        self._others.append(other.outcome)
+        if early < self._ahead:
+            self._improve(other, most)
+        if cost(other.best) < cost(best.best):
+            self._state, self._ahead = other, early
 
-    def _improve(self, state: Neighbourhood, steps: float) -> None:
-        state.improve(steps - self.outcome.steps + state.outcome.steps, PATIENCE * self._first_pass)
+    def _improve(self, state: Neighbourhood, most: float) -> None:
+        """Search from a start until it saves nothing any more."""
+        steps, accepted = state.steps, state.accepted
+        state.improve(most - self.steps + steps, PATIENCE * self._first_pass)
+        self.steps += state.steps - steps
+        self.accepted += state.accepted - accepted
+        self._note(state)
+
+    def _note(self, state: Neighbourhood) -> None:
+        if cost(state.best) < cost(self.best):
+            if len(state.best) < len(self.best):
+                self.gained = state.gained
+            self.best = state.best
 
     def _begun(self, parts: list[Part]) -> Neighbourhood:
+        """Offer each part of a start to those around."""
         run, context = self._run, self._context
         with run.limited(self._first_pass):
             parts = grow_cover(parts, context.criterion, run, context.root)
+        if self._state is None:
+            self.early = parts
         state = Neighbourhood(replace(context, seed=context.seed + self.starts), parts, run)
         self.starts += 1
         state.redistribute_all()
+        self.accepted += state.accepted
+        self._note(state)
         return state
 
     def _another_pass(self) -> list[Part] | None:
         """The parts of a pass by another score, among other planes; None if it takes too much work."""
         run, context = self._run, self._context
-        if run.is_over:
-            return None
+        policy = Greedy(STARTS[self._passes % len(STARTS)], sweeps=SweepCache(seed=(context.seed, self._passes)))
         self._passes += 1
-        sweeps = SweepCache(seed=(context.seed, self._passes))
-        tree = CutTree(context.root, Greedy(STARTS[self._passes % len(STARTS)], sweeps=sweeps), run)
-        with run.quietly(), run.limited(ANOTHER_PASS * self._first_pass):
-            most = HOPELESS * len(self._parts)
-            other = cut_and_merge(tree, context.criterion, run, most=most, strict=True)
+        with run.limited(ANOTHER_PASS * self._first_pass):
+            tree = CutTree(context.root, policy, run)
+            other = cut_and_merge(tree, context.criterion, run, most=self._most, strict=True)
             return None if other.unmet or run.is_over else other.parts
