@@ -203,7 +203,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("chair.glb", "house.glb", "link.obj", "block.stl"):
         ell.export(tmp_path / name)
     (tmp_path / "robot.urdf").write_text(
-        '<robot name="r"><link name="l"><collision><geometry><mesh filename="link.obj"/></geometry></collision></link>'
+        '<robot name="r"><link name="finger_tip"><collision><geometry><mesh filename="link.obj"/></geometry></collision></link>'
         "</robot>"
     )
     monkeypatch.chdir(tmp_path)
