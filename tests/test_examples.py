@@ -203,8 +203,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("chair.glb", "house.glb", "link.obj", "block.stl"):
         ell.export(tmp_path / name)
     (tmp_path / "robot.urdf").write_text(
-        '<robot name="r"><link name="finger_tip"><collision><geometry><mesh filename="link.obj"/></geometry></collision></link>'
-        "</robot>"
+        '<robot name="r"><link name="finger_tip"><collision><geometry>'
+        '<mesh filename="link.obj" scale="0.1 0.1 0.1"/></geometry></collision></link></robot>'
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(viewer.ViewServer, "wait", lambda self: None)

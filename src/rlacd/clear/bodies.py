@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray, dots, heights
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray
 
 Surface = tuple[FloatArray, IntArray]
 """Vertices [V, 3] and triangles [F, 3]."""
@@ -42,19 +42,6 @@ class Body:
         return np.stack(
             [np.min([p.min(axis=0) for p in filled], axis=0), np.max([p.max(axis=0) for p in filled], axis=0)]
         )
-
-
-def moved(points: FloatArray, pose: FloatArray) -> FloatArray:
-    """Points [N, 3] carried by a pose [4, 4]."""
-    return heights(points, np.ascontiguousarray(pose[:3, :3])) + pose[:3, 3]
-
-
-def inverse(pose: FloatArray) -> FloatArray:
-    """The way back from a pose [4, 4]."""
-    back = np.eye(4)
-    back[:3, :3] = pose[:3, :3].T
-    back[:3, 3] = -dots(pose[:3, :3].T, pose[:3, 3])
-    return back
 
 
 def may_touch(bodies: Sequence[Body]) -> bool:

@@ -14,12 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rlacd.clear.bodies import Body, Surface, inverse, moved
+from rlacd.clear.bodies import Body, Surface
 from rlacd.clear.motion import Motion
 from rlacd.clear.touching import TOUCH, Offence, Shapes, Touching, check, size_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import concatenated
 from rlacd.solid.obstacle import Obstacle
+from rlacd.solid.poses import inverse, moved
 
 MOST_ROUNDS = 8
 """After which pairs that still touch are told."""
@@ -167,7 +168,7 @@ def _obstacle(bodies: Sequence[Body], wish: _Wish, wishes: _Wishes, motion: Moti
     lower, upper = own.box[0] - margin, own.box[1] + margin
     near = []
     for pose in wishes.places[wish].values():
-        triangles = moved(vertices, pose)[faces]
+        triangles = moved(pose, vertices)[faces]
         meets = (triangles.min(axis=1) <= upper).all(axis=1) & (triangles.max(axis=1) >= lower).all(axis=1)
         near.append(triangles[meets])
     corners = np.ascontiguousarray(np.concatenate(near).reshape(-1, 3))

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rlacd import _native
-from rlacd.clear.bodies import Body, Surface, inverse, moved, overlapping, placed_boxes
+from rlacd.clear.bodies import Body, Surface, overlapping, placed_boxes
 from rlacd.clear.motion import Motion
 from rlacd.errors import import_extra
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
+from rlacd.solid.poses import inverse, moved
 
 TOUCH = 1e-6
 """Share of the size of all bodies at rest up to which an overlap of hulls, or a gap between bodies, means nothing."""
@@ -207,7 +208,7 @@ class Shapes:
         request.enable_contact, request.security_margin = False, reach
         if coal.collide(self.mesh, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()):
             return True
-        return self._holds(moved(other.corner, pose)) or other._holds(moved(self.corner, inverse(pose)))
+        return self._holds(moved(pose, other.corner)) or other._holds(moved(inverse(pose), self.corner))
 
     def gap(self, other: Shapes, pose: FloatArray) -> float:
         """How far the surfaces of the bodies are apart, the other seen at a pose."""

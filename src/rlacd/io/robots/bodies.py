@@ -17,9 +17,9 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.poses import inverse, moved, product
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.hull import Hull
+from rlacd.solid.poses import inverse, moved, product
 
 
 @dataclass(frozen=True, eq=False)

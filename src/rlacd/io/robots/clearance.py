@@ -15,9 +15,9 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError
 from rlacd.io.robots.bodies import Body, Collider
 from rlacd.io.robots.decomposed import decomposed, options_of_bodies
-from rlacd.io.robots.poses import inverse, moved
 from rlacd.options.robots import RobotOptions
 from rlacd.solid.obstacle import Obstacle
+from rlacd.solid.poses import inverse, moved
 
 MOST_SAID = 5
 """Pairs that touch, each with a warning of its own."""

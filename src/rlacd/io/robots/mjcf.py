@@ -25,8 +25,9 @@ import trimesh
 from rlacd.io.robots.bodies import Body, Collider, PlacedMesh
 from rlacd.io.robots.mjcf_model import FILES, Compiler, Defaults
 from rlacd.io.robots.plan import HullFiles, Plan, Sources, colliders, read_scale
-from rlacd.io.robots.poses import Angles, inverse
+from rlacd.io.robots.poses import Angles
 from rlacd.io.robots.spans import Edit, Element
+from rlacd.solid.poses import inverse
 
 SHOWN, HIDDEN = ("0", "1", "2"), "3"
 """Groups that MuJoCo shows by default, and one that it does not."""

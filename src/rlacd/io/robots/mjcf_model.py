@@ -13,10 +13,11 @@ from itertools import takewhile
 from pathlib import Path
 
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.poses import Angles, product
+from rlacd.io.robots.poses import Angles
 from rlacd.io.robots.references import References
 from rlacd.io.robots.spans import Element, expand
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.poses import product
 
 STRIPPED = ("mesh", "texture", "hfield", "skin")
 FILES = (*STRIPPED, "include", "model")

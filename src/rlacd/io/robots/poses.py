@@ -1,7 +1,4 @@
-"""Rigid transforms ``[4, 4]``, and how URDF and MJCF write them.
-
-Entries are rounded, so that the last bits of a machine's sines do not reach the points that are decomposed.
-"""
+"""Rigid transforms ``[4, 4]``, and how URDF and MJCF write them."""
 
 from __future__ import annotations
 
@@ -13,39 +10,10 @@ import numpy as np
 from trimesh.transformations import euler_matrix, quaternion_matrix, rotation_matrix
 
 from rlacd.errors import MeshFileError
-from rlacd.solid.arrays import FloatArray, heights
-
-DIGITS = 12
-"""Decimals that are kept of each entry."""
+from rlacd.solid.arrays import FloatArray
+from rlacd.solid.poses import product, rounded
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-def moved(pose: FloatArray, points: FloatArray) -> FloatArray:
-    """Points ``[N, 3]`` of the frame whose pose is given, where that stands."""
-    return np.ascontiguousarray(heights(points, pose[:3, :3]) + pose[:3, 3])
-
-
-def product(*poses: FloatArray) -> FloatArray:
-    """The pose of the last in a chain, each given in the frame of the one before."""
-    whole = np.eye(4)
-    for pose in poses:
-        whole[:3, 3] = moved(whole, pose[None, :3, 3])[0]
-        whole[:3, :3] = heights(np.ascontiguousarray(whole[:3, :3]), np.ascontiguousarray(pose[:3, :3].T))
-    return rounded(whole)
-
-
-def inverse(pose: FloatArray) -> FloatArray:
-    """The pose of the outer frame in the one whose pose is given."""
-    back = np.eye(4)
-    back[:3, :3] = pose[:3, :3].T
-    back[:3, 3] = -heights(pose[None, :3, 3], back[:3, :3])[0]
-    return back
-
-
-def rounded(pose: FloatArray) -> FloatArray:
-    """The same without its last bits, nor negative zeros."""
-    return np.asarray(np.round(pose, DIGITS) + 0.0, dtype=np.float64)
 
 
 def at(position: Sequence[float], rotation: FloatArray) -> FloatArray:

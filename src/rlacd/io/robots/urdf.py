@@ -13,9 +13,10 @@ import numpy as np
 from rlacd.errors import MeshFileError
 from rlacd.io.robots.bodies import Body, Collider, PlacedMesh
 from rlacd.io.robots.plan import HullFiles, Plan, Sources, colliders, read_scale
-from rlacd.io.robots.poses import product, urdf_origin
+from rlacd.io.robots.poses import urdf_origin
 from rlacd.io.robots.spans import Edit, Element
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.poses import product
 
 
 class _Collision(NamedTuple):

@@ -16,10 +16,10 @@ from rlacd.decomposition import Decomposition
 from rlacd.io.read.apart import answer_of
 from rlacd.io.robots.bodies import Body, Collider, PlacedMesh, Surface
 from rlacd.io.robots.plan import colliders
-from rlacd.io.robots.poses import inverse, product, rounded
 from rlacd.io.write.single_precision import required_hull
 from rlacd.io.write.usd import require_usd
 from rlacd.solid.arrays import FloatArray, Int64Array
+from rlacd.solid.poses import inverse, product, rounded
 
 ENDINGS = (".usd", ".usda", ".usdc")
 """Of stages that are rewritten."""
