@@ -11,6 +11,7 @@ import re
 import shlex
 import socket
 import sys
+import tempfile
 import threading
 import time
 import urllib.parse
@@ -211,6 +212,16 @@ def test_bad_options_are_answered_in_a_sentence_and_change_nothing(viewer: ViewS
     assert (viewer.session.state.state, viewer.session.state.run) == ("idle", 1)
 
 
+def test_a_mesh_that_has_gone_is_told_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "cube.stl"
+    trimesh.creation.box().export(path)
+    with open_viewer(path, port=0) as viewer:
+        settled(viewer, run=1)
+        path.unlink()
+        assert ask(viewer, "POST", "/decompose", {}).status == 202
+        assert next(state["error"] for state in events(viewer) if state["error"]).startswith("cube.stl does not exist")
+
+
 def test_the_input_is_there_before_any_hull(mesh: Path) -> None:
     go = threading.Event()
 
@@ -234,9 +245,11 @@ def post_file(viewer: ViewServer, name: str, content: bytes, **headers: str) -> 
 
 def test_another_mesh_is_opened(viewer: ViewServer) -> None:
     settled(viewer, run=1)
+    assert ask(viewer, "POST", "/decompose", {"threshold": -1}).status == 400
     content = trimesh.creation.icosphere(1).export(file_type="glb")
-    assert post_file(viewer, "../../a ball.glb", content).status == 202
+    assert post_file(viewer, "../../a ball.glb", content).status == 202, "a refused option is in no file's way"
     settled(viewer, run=2)
+    assert viewer.session.result[1].report["options"]["threshold"] == 0.05
     scene = ask(viewer, "GET", "/scene").json
     assert (scene["name"], scene["up"], scene["unit"], len(scene["parts"])) == ("a ball", "y", "m", 1)
     folder = viewer.subject.path.parent
@@ -269,6 +282,7 @@ def test_a_file_that_is_no_mesh_is_refused_and_nothing_is_lost(
     answer = post_file(viewer, name, content)
     assert answer.status == status
     assert says in answer.json["error"]
+    assert tempfile.gettempdir() not in answer.json["error"]
     assert viewer.session.state.run == 1
     assert len(ask(viewer, "GET", "/scene").json["parts"]) == 2
 

@@ -28,7 +28,7 @@ import threading
 import time
 import urllib.parse
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -82,6 +82,7 @@ class ViewServer(BoundedServer):
         self.session, self.subject = session, subject
         self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
         self.uploads = threading.BoundedSemaphore(UPLOADS)
+        self.controls = options
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making, self._opening = threading.Lock(), threading.Lock()
         self.uploaded: tempfile.TemporaryDirectory[str] | None = None
@@ -112,11 +113,12 @@ class ViewServer(BoundedServer):
 
     def decompose(self, controls: dict[str, Any], *, other_input: bool = False) -> None:
         """Decompose the subject next: first a draft, then with the requested options."""
+        self.controls = controls
         passes = [{"mesh": self.subject.path, **options} for options in passes_of(controls)]
         self.session.decompose(*passes, other_input=other_input)
 
-    def open_mesh(self, name: str, content: bytes, controls: dict[str, Any]) -> None:
-        """Replace the subject by an uploaded file.
+    def open_mesh(self, name: str, content: bytes) -> None:
+        """Replace the subject by an uploaded file, decomposed with the options accepted last.
 
         Raises
         ------
@@ -132,10 +134,15 @@ class ViewServer(BoundedServer):
             except BaseException:
                 folder.cleanup()
                 raise
-            self.decompose(controls, other_input=True)
+            self.decompose(self.controls, other_input=True)
             if self.uploaded is not None:
                 self.uploaded.cleanup()
             self.uploaded = folder
+
+    def without_folders(self, said: str) -> str:
+        """Name the mesh in a message by its file name alone."""
+        uploads = rf"{re.escape(tempfile.gettempdir())}.rlacd-view-\w+[/\\]"
+        return re.sub(uploads, "", said.replace(str(self.subject.path), self.subject.path.name))
 
     def server_close(self) -> None:
         """Stop listening, and remove uploaded files."""
@@ -227,11 +234,10 @@ class _Handler(BoundedHandler):
     def _open(self, query: dict[str, list[str]]) -> None:
         if self.headers.get_content_type() != "application/octet-stream":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
-        controls = read_controls(_object(query.get("options", ["{}"])[0]))
         with _one_of(self.server.uploads):
             content = self._read(LARGEST_MESH, ANSWER_SECONDS)
         with self.server.heavy:
-            self.server.open_mesh(query.get("name", [""])[0], content, controls)
+            self.server.open_mesh(query.get("name", [""])[0], content)
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
@@ -247,7 +253,7 @@ class _Handler(BoundedHandler):
         except Exception as error:
             known = isinstance(error, RlacdError)
             status = HTTPStatus.BAD_REQUEST if known else HTTPStatus.INTERNAL_SERVER_ERROR
-            self._send_json({"error": sentence_of(error)}, status)
+            self._send_json({"error": self.server.without_folders(sentence_of(error))}, status)
 
     def _check_sender(self) -> None:
         """Refuse requests for another host, and those from pages of other origins."""
@@ -290,6 +296,8 @@ class _Handler(BoundedHandler):
         self._send_head(HTTPStatus.OK, "text/event-stream", {"Connection": "close"})
         # After 3 s of silence a sign of life, which shows whether the client still reads.
         for state in self.server.session.changes(3.0):
+            if state is not None and state.error is not None:
+                state = replace(state, error=self.server.without_folders(state.error))
             event = ": still here" if state is None else f"data: {json.dumps(asdict(state))}"
             self.wfile.write(f"{event}\n\n".encode())
             self.wfile.flush()

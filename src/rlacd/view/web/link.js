@@ -24,9 +24,8 @@ export class Link {
   command = (options) => post("command", options).then(({ command }) => command);
 
   /** Look at another mesh: a file of the user's. */
-  async open(file, options) {
-    const query = new URLSearchParams({ name: file.name, options: JSON.stringify(options) });
-    const answer = await fetch(`open?${query}`, {
+  async open(file) {
+    const answer = await fetch(`open?${new URLSearchParams({ name: file.name })}`, {
       method: "POST",
       headers: { "Content-Type": "application/octet-stream" },
       body: file,

@@ -24,7 +24,6 @@ export class PartList {
   }
 
   load(scene) {
-    this.scene = scene;
     const navigable = Boolean(scene.report?.navigable);
     const all = scene.parts.reduce((sum, part) => sum + part.volume, 0) || 1;
     const volume = scene.report?.volume;
@@ -38,12 +37,11 @@ export class PartList {
       share: part.volume / all,
       error: part.error,
     }));
-    const unit = scene.unit ? `, ${scene.unit}` : "";
     this.columns = [
       ["index", "Part", "In the order of the file."],
       ["faces", "Faces", scene.report?.primitives ? "Triangles of the hull, or the primitive that the part is." : "Triangles of the hull."],
       ["share", "Volume", "Share of all hulls' volume."],
-      volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", `Intrusion${unit}`, HINTS.intrusion] : ["error", `${scene.report?.distance ? "Distance" : "Concavity"}${unit}`, `${HINTS.concavity} The bar is full at the threshold.`],
+      volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", "Intrusion", HINTS.intrusion] : ["error", scene.report?.distance ? "Distance" : "Concavity", `${HINTS.concavity} The bar is full at the threshold.`],
     ];
     this.head.replaceChildren(
       ...this.columns.map(([key, text, hint]) =>
@@ -92,7 +90,7 @@ export class PartList {
       make("td", {}, swatch, String(part.index).padStart(3, "0")),
       make("td", {}, part.primitive ?? String(part.faces)),
       make("td", {}, `${column(100 * part.share)}\u00a0%`),
-      make("td", { class: "error" }, part.error == null ? "–" : this.asShare ? `${column(100 * part.error)}\u00a0%` : column(part.error / this.scene.scale), this.limit ? make("span", { class: "track" }, gauge) : null),
+      make("td", { class: "error" }, part.error == null ? "–" : this.asShare ? `${column(100 * part.error)}\u00a0%` : column(part.error), this.limit ? make("span", { class: "track" }, gauge) : null),
     );
     row.number = part.index;
     return row;

@@ -152,8 +152,10 @@ function say(text) {
 // --- the toolbar ---
 
 const explode = make("input", { type: "range", id: "explode", min: 0, max: 1.5, step: 0.01, value: 0, "aria-label": "Pull apart" });
-explode.addEventListener("input", () => stage?.set({ pull: Number(explode.value) }));
-explode.addEventListener("change", () => stage?.fit());
+explode.addEventListener("input", () => {
+  stage?.set({ pull: Number(explode.value) });
+  stage?.fit();
+});
 const body = [
   ["off", "Off", "Not shown."],
   ["ghost", "Ghost", "A shadow around the hulls."],
@@ -292,9 +294,15 @@ async function keep(format, button) {
   button.removeAttribute("aria-busy");
 }
 
+let refused = false; // whether the server keeps other options than the page shows
+
 async function ask(options) {
   say(null);
-  await link.decompose(options).catch((error) => say(error.message));
+  refused = false;
+  await link.decompose(options).catch((error) => {
+    refused = true;
+    say(error.message);
+  });
 }
 
 /** Look at a file of the user's. */
@@ -302,10 +310,13 @@ async function open(file) {
   if (!file) return;
   say(null);
   at("summary").textContent = `Reading ${file.name} …`;
-  await link.open(file, controls.values()).catch((error) => {
+  try {
+    await link.open(file);
+  } catch (error) {
     at("summary").replaceChildren(...summary(shown));
-    say(error.message);
-  });
+    return say(error.message);
+  }
+  if (refused) await ask(controls.values()); // says again why
 }
 
 function stop() {
@@ -324,7 +335,6 @@ async function follow(state) {
     const words = [stageName(state.stage), state.parts > 1 ? plural(state.parts, "part") : "", `${state.seconds.toFixed(1)} s`];
     at("progress").querySelector(".stage-name").textContent = words.filter(Boolean).join(" · ");
   } else if (state.error) say(state.error);
-  if (!working && !state.error) say(null);
   if (state.version !== version) {
     version = state.version;
     loading = link.scene().then(
@@ -367,7 +377,6 @@ if (config.live) {
 const step = (by) => {
   explode.value = Number(explode.value) + by;
   explode.dispatchEvent(new Event("input"));
-  explode.dispatchEvent(new Event("change"));
 };
 const cycle = (bar) => {
   const inputs = [...bar.querySelectorAll("input")];

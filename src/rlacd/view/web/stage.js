@@ -48,7 +48,10 @@ export class Stage {
     this.hovered = this.picked = null;
     this.refresh();
     if (frame) this.turn(scene.up);
-    else this.#ground();
+    else {
+      this.#ground();
+      if (this.look.pull) this.fit();
+    }
   }
 
   /** Let an axis of the input, "x", "y" or "z", point up; nothing is mirrored. */
