@@ -243,6 +243,10 @@ def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
     if once is not None and again is not None:
         check(once, part, around, CRITERION)
         assert [p.volume for p in once.into] == [p.volume for p in again.into]
+    given = give(part, around, CRITERION, np.random.default_rng(seed), solid, Run(1))
+    if given is not None:
+        assert own_volume(given.into) == pytest.approx(own_volume(given.out), rel=1e-6)
+        assert all(CRITERION.is_met(new) for new in given.into)
 
 
 @pytest.mark.promise("same-bytes")

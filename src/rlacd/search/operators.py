@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -185,13 +186,20 @@ def give(
     left = [component for member in part.members for component in division.left_of(_Piece(member))]
     if run.is_over or all(now is before for now, before in zip(division.now, around, strict=True)):
         return None
-    rest: list[Part] = []
-    if left:
-        hull = Hull.around(*(component.hull for component in left))
-        rest = [left[0] if len(left) == 1 else ClippedPart(solid, left, hull)]
-        if not run.work.pay(work.judging(rest[0].size, len(hull.faces))) or not criterion.is_met(rest[0]):
+    rest = [_whole(left, criterion, solid)] if len(left) > 1 else left
+    for whole in rest:
+        is_lost = isinstance(whole, ClippedPart) and not whole.is_whole
+        if is_lost or not run.work.pay(work.judging(whole.size, len(whole.hull.faces))) or not criterion.is_met(whole):
             return None
     return _exchanged(part, around, [*division.now, *rest], criterion)
+
+
+def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) -> Part:
+    """Get disjoint pieces as a part, with all that the solid fills of their hull if the criterion looks at that."""
+    if not criterion.screen.looks_inside:
+        parts: Sequence[Part] = pieces
+        return reduce(Part.glued, parts)
+    return ClippedPart(solid, pieces, Hull.around(*(piece.hull for piece in pieces)))
 
 
 def _exchanged(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
