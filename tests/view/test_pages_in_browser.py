@@ -357,6 +357,15 @@ def test_the_list_is_walked_and_sorted_by_keyboard(seen: Watched) -> None:
     assert page.locator("th[aria-sort='descending']").inner_text().startswith("Volume")
 
 
+def test_a_laptop_shows_ten_rows(seen: Watched) -> None:
+    page = seen.page
+    page.set_viewport_size({"width": 1366, "height": 800})
+    height = page.locator("#list tbody tr").first.bounding_box()["height"]
+    shown = page.locator("#list").bounding_box()
+    head = page.locator("#list thead").bounding_box()
+    assert min(shown["y"] + shown["height"], 800) - (head["y"] + head["height"]) >= 10 * height
+
+
 @pytest.mark.nightly
 def test_the_heat_map_is_drawn_with_its_scale(seen: Watched) -> None:
     page = seen.page
