@@ -12,7 +12,8 @@ import json
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 
 import click
@@ -326,9 +327,9 @@ def measure(solid: Solid, threshold: float, budget: int) -> Row | None:
         oracle.budget = sys.maxsize
         greedy = oracle.greedy(node)
         for name, finish in (("r1", 0.0), ("r1+r2", terminal_reward(node.least))):
-            found = oracle.best(node, finish)
-            returns = [tree.whole if finish else tree.earned for tree in (found, greedy)]
-            row |= dict(zip((f"{name}.return", f"{name}.greedy"), returns, strict=True))
+            found, returns = oracle.best(node, finish), attrgetter("whole" if finish else "earned")
+            found = max(found, replace(greedy, proved=False), key=returns)
+            row |= {f"{name}.return": returns(found), f"{name}.greedy": returns(greedy)}
             row |= {f"{name}.bound": node.high[LAST], f"{name}.proved": found.proved}
             trees[name] = found.parts
         for name, parts in trees.items():

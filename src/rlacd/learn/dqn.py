@@ -350,11 +350,14 @@ class DQN:
         if options.n_step:
             q = self.target(batch["child_features"]) * self.unit(batch["child_excess"])[:, None]
             values = soft_value(q.amin(dim=0), batch["child_masks"], options.temperature)
-            if options.clip:
-                most = options.volume_reward * batch["child_excess"] + options.finish_reward
-                values = torch.minimum(values.clamp(min=0), most)
+            values = self.possible(values, batch["child_excess"])
             sums = dual_state_target(sums, values, batch["child_discounts"], batch["owner"])
-        return sums / self.unit(batch["excess"])
+        return self.possible(sums, batch["excess"]) / self.unit(batch["excess"])
+
+    def possible(self, values: Tensor, excess: Tensor) -> Tensor:
+        """Values limited to what components of such an excess can earn, if the options ask for that."""
+        most = self.options.volume_reward * excess + self.options.finish_reward
+        return torch.minimum(values.clamp(min=0), most) if self.options.clip else values
 
     def unit(self, excess: Tensor) -> Tensor:
         """What the network's outputs for components of such an excess are multiplied by."""

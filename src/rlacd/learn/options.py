@@ -71,7 +71,8 @@ class TrainOptions:
         What the network's outputs are multiplied by: weight, the greater of the two rewards' weights; or excess, what
         a component can still earn by r1, the excess volume of its hull.
     clip
-        Limit values to what is possible: between 0 and what the excess volume and the end of the solid can earn.
+        Limit values and targets to what is possible: between 0 and what the excess volume and the end of the solid can
+        earn.
     networks
         With 2, values are the lesser of two networks' (clipped double Q-learning).
     tau
@@ -185,6 +186,7 @@ _RETURNS: Mapping[str, Any] = {
     "finish_reward": 0.0,
     "n_step": 0,
     "value_unit": "excess",
+    "clip": True,
     "tau": 0.01,
     "buffer_size": 10_000,
     "max_parts": 128,

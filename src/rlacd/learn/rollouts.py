@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rlacd.criteria import Concavity
 from rlacd.errors import TrainingError
-from rlacd.learn.encoders import Encoder
+from rlacd.learn.encoders import Encoder, make_encoder
 from rlacd.learn.environment import CutEnv, Memory
 from rlacd.learn.episodes import Episode, Player
 from rlacd.learn.meshes import TURNS, Solids, turned
@@ -51,7 +51,8 @@ class Rollouts:
     names : sequence of str
         The meshes to draw from.
     options : TrainOptions
-    encoder : Encoder
+    encoder : Encoder, optional
+        The user's, in place of the options'.
     limits : ProcessLimits
         Limits of one episode.
     say : callable
@@ -64,14 +65,18 @@ class Rollouts:
         solids: Solids,
         names: Sequence[str],
         options: TrainOptions,
-        encoder: Encoder,
+        encoder: Encoder | None,
         limits: ProcessLimits,
         say: Callable[[str], None],
     ) -> None:
         self._pool, self._solids, self._names, self._options = pool, solids, names, options
         self._limits, self._say = limits, say
-        stated = json.dumps(dataclasses.asdict(options)).encode()
-        self._setting = Shared({"options": stated, "encoder": pickle.dumps(encoder)})
+        setting = {"options": json.dumps(dataclasses.asdict(options)).encode()}
+        if encoder is not None:
+            setting["encoder"] = pickle.dumps(encoder)
+        elif options.encoder_weights:
+            setting["weights"] = Path(options.encoder_weights).read_bytes()
+        self._setting = Shared(setting)
         self._ahead: deque[tuple[int, str, Future[Answer]] | Episode] = deque()
         self._begun = self._without_cuts = self._lost = 0
 
@@ -158,6 +163,7 @@ class RolloutServer:
     """
 
     def __init__(self, staging: Path) -> None:
+        self._staging = staging
         self._setting = self._key = ""
         self._options: TrainOptions
         self._encoder: Encoder
@@ -176,7 +182,8 @@ class RolloutServer:
         blobs : dict of bytes
             ``solid``: see `rlacd.learn.meshes.Solids.packed`.
         shared : dict of Shared
-            ``setting``: ``options`` as JSON, and the ``encoder``, pickled by the trainer itself. ``network``: see
+            ``setting``: ``options`` as JSON, and either the user's ``encoder``, pickled by the trainer itself, or the
+            ``weights`` of the options'. ``network``: see
             `Rollouts.begin`.
 
         Returns
@@ -206,9 +213,14 @@ class RolloutServer:
         """Rebuild whatever changed in the shared data since the last request."""
         setting = shared["setting"]
         if setting.key != self._setting:
-            self._options = TrainOptions(**json.loads(setting.blobs["options"]))
-            self._encoder = pickle.loads(setting.blobs["encoder"])
-            self._setting, self._key = setting.key, ""
+            options = TrainOptions(**json.loads(setting.blobs["options"]))
+            if "weights" in setting.blobs:  # this machine may lack the file
+                file = self._staging / Path(options.encoder_weights).name
+                file.write_bytes(setting.blobs["weights"])
+                options = dataclasses.replace(options, encoder_weights=str(file))
+            own = setting.blobs.get("encoder")
+            self._encoder = make_encoder(options) if own is None else pickle.loads(own)
+            self._options, self._setting, self._key = options, setting.key, ""
             self._known.clear()
         if "network" in shared and shared["network"].key != self._key:
             self._network, self._key = parse_network(shared["network"].blobs["network"]), shared["network"].key

@@ -91,7 +91,7 @@ def train(
     with ExitStack() as stack:
         where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
         agent = DQN(options, encoder or make_encoder(options))
-        rollouts = Rollouts(where, solids, listed.training, options, agent.encoder, limits or ProcessLimits(), say)
+        rollouts = Rollouts(where, solids, listed.training, options, encoder, limits or ProcessLimits(), say)
         training = Training(run, agent, rollouts, Validation(listed, solids, options), say)
         training.restore()
         training.run()

@@ -21,7 +21,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
       concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
     - ``learned``: of the most promising planes, the one after which networks predict the fewest parts.
-    - ``rl-acd``, or the path of a Q network as written by ``rlacd train`` (.npz): the paper's rule, the plane with
+    - ``rl-acd``, or the path of a network as written by ``rlacd train`` (.npz): the paper's rule, the plane with
       the least sum of hull volumes among the network's ten best planes and those of four concave edges.
 
     Parameters
