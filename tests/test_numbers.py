@@ -94,7 +94,7 @@ LIMITS = {
     ],
     "docs/reference/report.md": [
         f"narrower than {50 * 2 * narrowed.NARROWEST:g} % of the longest side",
-        f"Over {FACES:,} triangles or {narrowed.MOST} places",
+        f"Over {FACES:,} triangles or {narrowed.MOST_BALLS} places",
         f"at most {report.MOST_HOLES:,}: `body`",
     ],
     "docs/policies.md": [

@@ -22,7 +22,7 @@ from rlacd.solid.component import Component, Part
 TIMES_PARTS = 2
 """Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
 
-SHARE_OF_WORK, LEAST_WORK = 0.3, 0.4e6
+SHARE_OF_WORK, LEAST_SHARE = 0.3, 0.4e6
 """Of the work done so far, that cutting on may take, and as much again to merge; at least so many units."""
 
 PIECES = 2
@@ -46,7 +46,7 @@ def cut_to_limits(
     cut = parts
     try:
         met = run.map(limited.is_met, parts)
-        with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_WORK)):
+        with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_SHARE)):
             pieces: dict[Part, list[Part]] = {}
             for part, is_met in zip(parts, met, strict=True):
                 if not is_met and limited.criterion.is_met(part):
@@ -58,7 +58,7 @@ def cut_to_limits(
                     kept[part] = new
             cut = [piece for part in parts for piece in kept[part]]
         if len(cut) > len(parts) and options.merge:
-            with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_WORK)):
+            with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_SHARE)):
                 cut = merge_parts(cut, limited, run, solid=solid)
                 context = SearchContext(solid, limited, options.seed)
                 cut = eliminate_parts(context, cut, run)

@@ -25,7 +25,7 @@ from rlacd.solid.poses import inverse, moved
 MOST_ROUNDS = 8
 """After which pairs that still touch are told."""
 
-MOST_PLACES = 24
+MOST_OFFENCES = 24
 """Of one pair, looked at in one round: the deepest, and those that differ most from it."""
 
 OFF_HULLS = 10 * TOUCH
@@ -151,7 +151,7 @@ def _spread(offences: Sequence[Offence]) -> list[Offence]:
     poses = np.stack([one.pose[:3].ravel() for one in offences])
     poses[:, 3::4] /= max(float(np.abs(poses[:, 3::4]).max()), 1e-300)
     chosen, away = [0], np.full(len(offences), np.inf)
-    while len(chosen) < min(MOST_PLACES, len(offences)):
+    while len(chosen) < min(MOST_OFFENCES, len(offences)):
         away = np.minimum(away, np.abs(poses - poses[chosen[-1]]).sum(axis=1))
         chosen.append(int(away.argmax()))
     return [offences[i] for i in chosen]

@@ -16,10 +16,10 @@ from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.solid import Solid
 
-FINEST = 0.01
+FINEST_SHARE = 0.01
 """Share of the threshold down to which parts are cut whose hulls enter what they are to avoid."""
 
-SMALLEST = 0.02
+SMALL = 0.02
 """Triangles that cross the solid are halved until their sides are at most this long, then left out."""
 
 _HALVINGS = 40
@@ -128,7 +128,7 @@ def _outside(triangles: FloatArray, surface: _native.Surface) -> tuple[FloatArra
         triangles = triangles[~is_off]
         sides = np.roll(triangles, -1, axis=1) - triangles
         lengths = dots(sides, sides)
-        is_small = lengths.max(axis=1, initial=0.0) <= SMALLEST**2
+        is_small = lengths.max(axis=1, initial=0.0) <= SMALL**2
         is_crossed |= bool(is_small.any())
         triangles = _halved(triangles[~is_small], lengths[~is_small])
         if not len(triangles):

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.avoided import FINEST, Avoided
+from rlacd.criteria.avoided import FINEST_SHARE, Avoided
 from rlacd.criteria.concavity import Concavity, Distance
 from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
 from rlacd.criteria.navigable import Intrusions, Navigable
@@ -114,7 +114,7 @@ class LimitedCriterion(Criterion):
         made = cls(criterion)
         if options.avoid:
             avoided = Avoided.of(options.avoid, solid, 1 if run is None else run.threads)
-            made = replace(made, avoided=avoided, finest=Distance(FINEST * options.threshold))
+            made = replace(made, avoided=avoided, finest=Distance(FINEST_SHARE * options.threshold))
         if run is not None and (options.keep_open is not None or options.keep_open_abs is not None):
             free, kept = _passages(criterion, options, solid, run)
             return replace(made, free=free, kept=kept)

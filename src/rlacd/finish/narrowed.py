@@ -30,7 +30,7 @@ MOSTLY = 1 / 2
 
 DENSITY = Density(600, 0.5)
 
-MOST = 600
+MOST_BALLS = 600
 """Balls that are looked at: the wide ones that lose most come first."""
 
 MOST_NAMED = 3
@@ -74,11 +74,11 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> 
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
 
     balls = passage_balls(solid, surface, (NARROWEST, most), DENSITY, threads, lose)
-    is_every = len(solid[1]) <= FACES and len(balls) <= MOST
+    is_every = len(solid[1]) <= FACES and len(balls) <= MOST_BALLS
     # Wide and narrow ones apart: neither hides what is left of the other.
     wide = (balls.radii[:, None] >= _wide(reached)).sum(axis=1)
     covered = union.distance(balls.centres, threads) / balls.radii
-    kept = np.lexsort([covered, -wide])[:MOST]
+    kept = np.lexsort([covered, -wide])[:MOST_BALLS]
     balls, wide, covered = balls.some(kept), wide[kept], covered[kept]
     order = np.argsort(covered, kind="stable")
     passage = _passages(balls, wide, surface, threads)[order]

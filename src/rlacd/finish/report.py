@@ -12,7 +12,7 @@ import trimesh
 
 from rlacd import _native
 from rlacd._version import __version__
-from rlacd.criteria.avoided import FINEST, warnings_of
+from rlacd.criteria.avoided import FINEST_SHARE, warnings_of
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
@@ -88,16 +88,13 @@ def make_report(
     apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
         weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
-        warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
-        if has_surface and apart is None:
-            warnings += _unmeasured(solid)
-        if options.overlap > 0:
-            warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale)
-        warnings += _stuck_out(parts, reached)
-        missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
-        warnings += [*summary.warnings, *missed]
-        warnings += too_narrow(apart.narrowed, reached, run.stopped_by is not None) if apart else []
         entered = criterion.avoided and criterion.avoided.found(parts, solid.frame.scale)
+        missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
+        warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
+        warnings += _unmeasured(solid) if has_surface and apart is None else []
+        warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale) if options.overlap > 0 else []
+        warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
+        warnings += too_narrow(apart.narrowed, reached, run.stopped_by is not None) if apart else []
         warnings += warnings_of(entered, _why_entered(run)) if entered else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
@@ -107,8 +104,7 @@ def make_report(
             "complete": run.stopped_by is None,
             "stopped_by": run.stopped_by,
             "parts": len(hulls),
-            "faces": sum(len(hull.faces) for hull in hulls),
-            "vertices": sum(len(hull.vertices) for hull in hulls),
+            **{name: sum(len(getattr(hull, name)) for hull in hulls) for name in ("faces", "vertices")},
             **({"primitives": _primitives(parts)} if options.primitives else {}),
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
@@ -129,7 +125,7 @@ def _why_entered(run: Run) -> str:
     """Why finer cuts did not help."""
     if run.stopped_by is not None:
         return "the work was stopped before"
-    return f"parts within {FINEST:.0%} of the threshold, and those that limits leave no way, are cut no further"
+    return f"parts within {FINEST_SHARE:.0%} of the threshold, and those that limits leave no way, are cut no further"
 
 
 def _holes(solid: Solid) -> list[dict[str, Any]]:

@@ -116,7 +116,7 @@ def hull_volume(parts: Sequence[Part]) -> float:
 TAKERS = 6
 """Number of parts a piece is offered to, starting with those whose hulls would grow the least."""
 
-HALVINGS = 3
+PIECE_HALVINGS = 3
 """Maximum depth of halving for a piece that no part can take."""
 
 PATCHES = 4
@@ -241,12 +241,12 @@ class _Division:
         feasible = self._uniter.feasible(piece.component, self.now)
         return [i for i, _ in sorted(feasible, key=lambda found: found[1] - self.now[found[0]].hull.volume)[:TAKERS]]
 
-    def may_go(self, piece: _Piece, halvings: int = HALVINGS) -> bool:
+    def may_go(self, piece: _Piece, halvings: int = PIECE_HALVINGS) -> bool:
         """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger may."""
         smaller = self._halves(piece) if halvings > 0 else []
         return all(self.may_go(half, halvings - 1) for half in smaller) if smaller else bool(self.takers(piece))
 
-    def left_of(self, piece: _Piece, halvings: int = HALVINGS, stop: bool = False) -> list[Component]:
+    def left_of(self, piece: _Piece, halvings: int = PIECE_HALVINGS, stop: bool = False) -> list[Component]:
         """Give away what the parts can take of a piece: what is left, or the first of it that is found."""
         for i in self.takers(piece):
             union = self._uniter.unite_feasible(self.now[i], piece.component)

@@ -18,7 +18,7 @@ from rlacd.pool import Blobs, Values
 
 SERVER = "rlacd.io.read.cad:triangulate"
 
-MOST = 500_000
+MOST_OF_CAD = 500_000
 """Triangles, about: with a smaller deviation their number grows in proportion, and the time faster."""
 
 ANGLE = 0.5
@@ -31,7 +31,7 @@ ROUGH = 0.1
 def read_cad(path: Path, content: bytes, fineness: Fineness) -> Contents:
     """Read the solids and surfaces of an assembly: a node for each, in metres and the axes of the file.
 
-    A deviation that takes more than `MOST` triangles becomes larger, with a warning.
+    A deviation that takes more than `MOST_OF_CAD` triangles becomes larger, with a warning.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def read_cad(path: Path, content: bytes, fineness: Fineness) -> Contents:
     if deviation > sought:
         said.append(
             f"the triangles of {path.name} are up to {deviation:.4g} m from its surfaces, more than a tenth of the "
-            f"threshold: {sought:.4g} m would take over {MOST} of them"
+            f"threshold: {sought:.4g} m would take over {MOST_OF_CAD} of them"
         )
     return contents._replace(warnings=(*contents.warnings, *said), up="z", deviation=deviation)
 
@@ -85,7 +85,7 @@ def triangulate(values: Values, blobs: Blobs) -> Answered:
         glb = converted(tol_linear=usual / UNITS["mm"])
     if sought < usual:
         count = sum(len(shape.faces) for _, shape in contents_of(glb).geometry)
-        deviation = max(sought, usual * min(count / MOST, 1.0))
+        deviation = max(sought, usual * min(count / MOST_OF_CAD, 1.0))
         glb = converted(tol_linear=deviation / UNITS["mm"])
     facts = {"deviation": deviation, "sought": sought}
     return facts, {"glb": _scaled(glb, unit) if values["kind"] == "iges" else glb}
