@@ -26,6 +26,7 @@ class Closed:
     vertices: Floats
     faces: Ints
     tree: None = None
+    exact: None = None
 
     @property
     def volume(self) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd.clear import Body, Surface, at_rest, kept_clear, may_touch, warnings_of
+from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.find_parts import Reached, covered, find_parts
@@ -336,12 +336,12 @@ def _clear_of_each_other(
         return body(number).hulls
 
     bodies, rest = [body(number) for number in range(len(names))], at_rest(names)
-    if not may_touch(bodies):
-        return []
     try:
+        if not may_touch(bodies):
+            return []
         with run.stage("clear"):
             cleared = run.if_in_time(lambda: kept_clear(bodies, rest, redo), lambda: None)
-    except MissingExtraError as error:
+    except (MissingExtraError, CrowdedError) as error:
         return [f"Nodes were not checked against each other: {error}"]
     if cleared is None:
         return ["There was no time to check nodes against each other."]

@@ -239,7 +239,7 @@ def test_a_share_and_a_radius_are_told_apart() -> None:
         OptionError, match=r"keep_open_abs \(--keep-open as a length\) is 0\.001; .* between 0\.002 and 1"
     ):
         rlacd.decompose(trimesh.creation.box(), keep_open_abs=0.001)
-    with pytest.raises(OptionError, match="keep_open_abs, a radius"):
+    with pytest.raises(OptionError, match="keep_open_abs, a length"):
         rlacd.decompose(trimesh.creation.box(), keep_open=0.9, keep_open_abs=0.1)
 
 

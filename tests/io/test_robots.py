@@ -368,12 +368,12 @@ def test_warnings_of_a_kind_are_one_that_names_the_worst(tmp_path: Path) -> None
         mesh = f'<mesh filename="ring{index}.dae"/>'
         links.append(f'<link name="l{index}"><collision><geometry>{mesh}</geometry></collision></link>')
     (tmp_path / "r.urdf").write_text(f"<robot name='r'>{''.join(links)}</robot>")
-    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.2, threads=1)
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.015, max_hulls=1, threads=1)
     said = [warning for warning in done.warnings if "passage" in warning]
     assert len(said) == 1
-    assert said[0].startswith("ring1 and 2 others: 3 passages narrow by over a third, such as")
+    assert said[0].startswith("ring1 and 2 others: 3 passages narrow by over half, 3 to nothing: near")
     assert sum("Y_UP" in warning for warning in done.warnings) == 1
-    assert len(done.warnings) == 3, "one more about the links, which stand in each other"
+    assert len(done.warnings) == 4, "one more about the threshold, and one about the links, which stand in each other"
 
 
 def test_going_elsewhere_says_which_files_will_be_missed(ear: Path, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Bodies that move against each other: which of their hulls touch where the bodies themselves do not."""
 
-from rlacd.clear.bodies import Body, Surface, may_touch
+from rlacd.clear.bodies import Body, CrowdedError, Surface, may_touch
 from rlacd.clear.mend import Cleared, kept_clear
 from rlacd.clear.motion import Motion, at_rest, mjcf_motion, urdf_motion
 from rlacd.clear.pairs import LinkPair, link_pairs, warnings_of
@@ -9,6 +9,7 @@ from rlacd.clear.touching import Offence, Touching, check
 __all__ = [
     "Body",
     "Cleared",
+    "CrowdedError",
     "LinkPair",
     "Motion",
     "Offence",

@@ -7,7 +7,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rlacd.errors import RlacdError
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray
+
+MOST_NEAR = 4_000_000
+"""Pairs of boxes that come near each other along the x axis, over all samples; robots of a hundred links have fewer."""
+
+
+class CrowdedError(RlacdError, ValueError):
+    """More bodies stand in each other than can be checked."""
+
 
 Surface = tuple[FloatArray, IntArray]
 """Vertices [V, 3] and triangles [F, 3]."""
@@ -66,6 +75,11 @@ def overlapping(boxes: FloatArray) -> Int64Array:
 
     Boxes are swept along the x axis, all samples one behind the other, so the work grows with the pairs that come near
     along it.
+
+    Raises
+    ------
+    CrowdedError
+        More than `MOST_NEAR` do.
     """
     samples, count = boxes.shape[:2]
     span = np.ptp(boxes[..., 0]) + 1.0
@@ -74,6 +88,8 @@ def overlapping(boxes: FloatArray) -> Int64Array:
     order = np.argsort(lower, kind="stable")
     begin = np.arange(1, len(order) + 1)
     behind = np.maximum(np.searchsorted(lower[order], upper[order], side="right") - begin, 0)
+    if behind.sum() > MOST_NEAR:
+        raise CrowdedError(f"more than {MOST_NEAR:,} pairs of them stand in each other")
     ahead = np.repeat(begin - 1, behind)
     within = np.arange(behind.sum()) - np.repeat(np.cumsum(behind) - behind, behind)
     first, second = order[ahead], order[ahead + 1 + within]

@@ -226,7 +226,7 @@ def limit_part(
     """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
 
     Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
-    For `sides` see `limit_hull`; if the limits leave no room for them, the criterion comes first.
+    For `sides` see `limit_hull`: if the limits leave no hull that meets the criterion too, the sides come first.
     """
     enough = math.inf if criterion is None else criterion.of_facets.overhang
     limited = limited_part(part, limits, enough, sides=sides)
@@ -235,7 +235,9 @@ def limit_part(
     if (criterion if limited.exact is None else criterion.of_facets).is_met(limited):
         return limited
     if len(sides):
-        return limit_part(part, limits, criterion)
+        free = limit_part(part, limits, criterion)
+        stays = (heights(free.hull.vertices, sides[:, :3]) <= sides[:, 3] + TOLERANCE).all()
+        return free if stays else limited
     return part if keeps(part.hull, limits) and criterion.is_met(part) else limited
 
 

@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 
 from rlacd.clear import Body as Moving
-from rlacd.clear import LinkPair, Motion, at_rest, kept_clear, link_pairs, mjcf_motion, urdf_motion, warnings_of
+from rlacd.clear import (
+    CrowdedError,
+    LinkPair,
+    Motion,
+    at_rest,
+    kept_clear,
+    link_pairs,
+    mjcf_motion,
+    urdf_motion,
+    warnings_of,
+)
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError
 from rlacd.io.robots.bodies import Body, Collider
@@ -67,7 +77,7 @@ def checked_links(
             return _moving(bodies[number], results).hulls
 
         cleared = kept_clear(own, moves, redo)
-    except MissingExtraError as error:
+    except (MissingExtraError, CrowdedError) as error:
         if robot.exclude or robot.srdf:
             raise
         return Checked(results, [], 0, [f"Links were not checked against each other: {error}"])
