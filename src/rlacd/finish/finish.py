@@ -124,7 +124,8 @@ def _cleaned(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
         shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
         if shaped is not part:
             return shaped
-        near = within_reach(sides, part.hull, SHARE_OF_OVERHANG * goal.overhang)
+        share = SHARE_OF_OVERHANG if keeps(part.hull, limits) else REACH_OF_LIMITED
+        near = within_reach(sides, part.hull, share * goal.overhang)
         part = kept_within(part, near, goal)
         return limit_part(
             simple_part(part, goal, limits, near) if options.detail == SIMPLE else part, limits, goal, near
@@ -194,6 +195,9 @@ def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
 
 SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
+
+REACH_OF_LIMITED = 2.0
+"""A hull within limits may reach farther: sides so near, in shares of the same, hold it."""
 
 GROWTHS_TRIED = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
