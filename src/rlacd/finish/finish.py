@@ -197,7 +197,7 @@ SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
 
 REACH_OF_LIMITED = 2.0
-"""A hull within limits may reach farther: sides so near, in shares of the same, hold it."""
+"""Limits make a hull reach farther beyond its part: sides within so many times what the criterion allows hold it."""
 
 GROWTHS_TRIED = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
