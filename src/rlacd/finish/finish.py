@@ -199,6 +199,9 @@ SHARE_OF_OVERHANG = 0.2
 REACH_OF_LIMITED = 2.0
 """Limits make a hull reach farther beyond its part: sides within so many times what the criterion allows hold it."""
 
+SPARE_CORNERS = (0, 4, 8)
+"""Corners left for cutting a limited hull back to the sides on which the solid rests."""
+
 GROWTHS_TRIED = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
 
@@ -230,7 +233,7 @@ def limit_part(
     """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
 
     Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
-    For `sides` see `limit_hull`: if the limits leave no hull that meets the criterion too, the sides come first.
+    For `sides` see `limit_hull`; if the limits leave no hull in them that meets the criterion, the criterion comes first.
     """
     enough = math.inf if criterion is None else criterion.of_facets.overhang
     limited = limited_part(part, limits, enough, sides=sides)
@@ -239,10 +242,24 @@ def limit_part(
     if (criterion if limited.exact is None else criterion.of_facets).is_met(limited):
         return limited
     if len(sides):
-        free = limit_part(part, limits, criterion)
-        stays = (heights(free.hull.vertices, sides[:, :3]) <= sides[:, 3] + TOLERANCE).all()
-        return free if stays else limited
+        return _cut_back(part, limits, criterion, sides)
     return part if keeps(part.hull, limits) and criterion.is_met(part) else limited
+
+
+def _cut_back(part: Part, limits: HullLimits, criterion: Criterion, sides: FloatArray) -> Part:
+    """Get the part with a hull of fewer corners that was made without the sides, and cut back to them."""
+    free = limit_part(part, limits, criterion)
+    for spare in SPARE_CORNERS:
+        fewer = HullLimits(
+            *(limit and max(limit - each * spare, 4) for limit, each in zip(limits, (1, 2), strict=True))
+        )
+        loose = limit_part(part, fewer, criterion)
+        cut = kept_within(loose, sides, criterion.of_facets)
+        cut.exact = loose.exact
+        stays = (heights(cut.hull.vertices, sides[:, :3]) <= sides[:, 3] + TOLERANCE).all()
+        if stays and keeps(cut.hull, limits) and criterion.of_facets.is_met(cut):
+            return cut
+    return free
 
 
 def _has_room(hull: Hull, limits: HullLimits) -> bool:
