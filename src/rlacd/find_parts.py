@@ -26,8 +26,9 @@ from rlacd.run import Run
 from rlacd.search import SearchContext, SearchSummary, at_least, cost, eliminate_parts, search
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
-from rlacd.solid.hull import Hull
+from rlacd.solid.hull import NO_SIDES, Hull
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.resting import resting_sides
 from rlacd.solid.solid import Solid
 
 COARSER = 1.5
@@ -79,7 +80,8 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     solid.pieces.clear()
     decomposer = _Decomposer.of(model, goal, options, run)
     parts, goal, found = decomposer.decompose(goal)
-    limited, most = LimitedCriterion(goal, options.hull_limits), options.max_hulls
+    sides = resting_sides(root) if any(options.hull_limits) else NO_SIDES
+    limited, most = LimitedCriterion(goal, options.hull_limits, sides=sides), options.max_hulls
     if most is not None and not decomposer.keeps(most, parts):
         parts = at_most(most, decomposer.coarser(parts, goal), decomposer.unite, root, limited, run)
     elif any(options.hull_limits):

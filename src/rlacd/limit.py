@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
@@ -18,6 +19,7 @@ from rlacd.policies import make_policy
 from rlacd.run import Run, Work
 from rlacd.search import SearchContext, eliminate_parts
 from rlacd.solid.component import Component, Part
+from rlacd.solid.hull import NO_SIDES
 
 TIMES_PARTS = 2
 """Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
@@ -35,12 +37,24 @@ NEARLY_EQUAL = 1.02
 def cut_to_limits(
     parts: list[Part], limited: LimitedCriterion, solid: Component, options: Options, run: Run
 ) -> list[Part]:
-    """Cut parts whose hulls do not meet the criterion only because of the limits, those that take few pieces first.
+    """Cut parts whose hulls do not meet the criterion only because of the limits.
+
+    First for hulls that stay in the sides on which the solid rests, then for the others: the criterion comes first.
+    """
+    most = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf))
+    for goal in (limited, replace(limited, sides=NO_SIDES)) if len(limited.sides) else (limited,):
+        parts = _cut_for(goal, parts, most - len(parts), solid, options, run)
+    return parts
+
+
+def _cut_for(
+    limited: LimitedCriterion, parts: list[Part], room: int, solid: Component, options: Options, run: Run
+) -> list[Part]:
+    """Cut parts into at most `room` more pieces, those that take few first.
 
     A part stays whole if its pieces would not meet it either, or if there would be too many parts. A body that is one
     part, such as a ball, always stays one.
     """
-    room = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf)) - len(parts)
     if room < 1 or len(parts) == 1:
         return parts
     cut = parts

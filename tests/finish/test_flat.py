@@ -11,11 +11,12 @@ from manifold3d import Manifold
 
 import rlacd
 from rlacd.criteria import Concavity
-from rlacd.finish.finish import resting_sides, take_in
+from rlacd.finish.finish import take_in
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
+from rlacd.solid.resting import resting_sides
 from tests.bounded import bounded
 from tests.shapes import box, trimesh_of
 

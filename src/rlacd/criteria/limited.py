@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, keeps, limit_hull
 from rlacd.solid.passages import Density, passage_balls
 from rlacd.solid.primitive import NO_BALLS, Balls
+from rlacd.solid.resting import within_reach
 from rlacd.solid.solid import Solid
 
 SPACING = 0.125
@@ -98,6 +99,8 @@ class LimitedCriterion(Criterion):
         What hulls may not enter.
     finest : Distance or None
         A part that is as tight as this is cut no further to avoid it.
+    sides : float64 [P, 4]
+        Half-spaces in which limited hulls stay, on whose planes the solid can rest.
     """
 
     criterion: Criterion
@@ -106,6 +109,7 @@ class LimitedCriterion(Criterion):
     kept: Balls = NO_BALLS
     avoided: Avoided | None = None
     finest: Distance | None = None
+    sides: FloatArray = field(default_factory=lambda: NO_SIDES)
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
@@ -193,4 +197,5 @@ class LimitedCriterion(Criterion):
         return replace(self, avoided=None)
 
     def _limited(self, part: Part) -> Part:
-        return limited_part(part, self.limits, self.of_facets.overhang)
+        reach = self.of_facets.overhang
+        return limited_part(part, self.limits, reach, sides=within_reach(self.sides, part.hull, reach))

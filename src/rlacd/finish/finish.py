@@ -26,15 +26,15 @@ from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray, dots, heights
-from rlacd.solid.component import DENSE, Component, Part
+from rlacd.solid.arrays import FloatArray, dots
+from rlacd.solid.component import DENSE, Part
 from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
 from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
+from rlacd.solid.resting import resting_sides, within_reach
 from rlacd.solid.solid import Solid
-from rlacd.solid.topology import Edges
 
 LARGEST = float(np.finfo(np.float64).max)
 """The largest coordinate."""
@@ -124,7 +124,7 @@ def _cleaned(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
         shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
         if shaped is not part:
             return shaped
-        share = SHARE_OF_OVERHANG if keeps(part.hull, limits) else REACH_OF_LIMITED
+        share = SHARE_OF_OVERHANG if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
         near = within_reach(sides, part.hull, share * goal.overhang)
         part = kept_within(part, near, goal)
         return limit_part(
@@ -196,12 +196,6 @@ def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
 SHARE_OF_OVERHANG = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
 
-REACH_OF_LIMITED = 2.0
-"""Limits make a hull reach farther beyond its part: sides within so many times what the criterion allows hold it."""
-
-SPARE_CORNERS = (0, 4, 8)
-"""Corners left for cutting a limited hull back to the sides on which the solid rests."""
-
 GROWTHS_TRIED = 3
 """If the criterion is no longer met, half the growth is tried, and so on."""
 
@@ -233,7 +227,7 @@ def limit_part(
     """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
 
     Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
-    For `sides` see `limit_hull`; if the limits leave no hull in them that meets the criterion, the criterion comes first.
+    For `sides` see `limit_hull`; if no hull in them meets the criterion, the criterion comes first.
     """
     enough = math.inf if criterion is None else criterion.of_facets.overhang
     limited = limited_part(part, limits, enough, sides=sides)
@@ -242,24 +236,8 @@ def limit_part(
     if (criterion if limited.exact is None else criterion.of_facets).is_met(limited):
         return limited
     if len(sides):
-        return _cut_back(part, limits, criterion, sides)
+        return limit_part(part, limits, criterion)
     return part if keeps(part.hull, limits) and criterion.is_met(part) else limited
-
-
-def _cut_back(part: Part, limits: HullLimits, criterion: Criterion, sides: FloatArray) -> Part:
-    """Get the part with a hull of fewer corners that was made without the sides, and cut back to them."""
-    free = limit_part(part, limits, criterion)
-    for spare in SPARE_CORNERS:
-        fewer = HullLimits(
-            *(limit and max(limit - each * spare, 4) for limit, each in zip(limits, (1, 2), strict=True))
-        )
-        loose = limit_part(part, fewer, criterion)
-        cut = kept_within(loose, sides, criterion.of_facets)
-        cut.exact = loose.exact
-        stays = (heights(cut.hull.vertices, sides[:, :3]) <= sides[:, 3] + TOLERANCE).all()
-        if stays and keeps(cut.hull, limits) and criterion.of_facets.is_met(cut):
-            return cut
-    return free
 
 
 def _has_room(hull: Hull, limits: HullLimits) -> bool:
@@ -270,52 +248,6 @@ def _has_room(hull: Hull, limits: HullLimits) -> bool:
 def limit_roughly(part: Part, limits: HullLimits) -> Part:
     """Get the part with a hull inside the limits, cheaply: if its hull exceeds them, a box or tetrahedron around it."""
     return part if keeps(part.hull, limits) else part.with_hull(plain_hull(part.hull.vertices, limits))
-
-
-SIDE_AREA = 0.02
-"""From at least this share of the area of the convex hull, the solid rolls onto a side: the facets of curved surfaces
-have less."""
-
-
-def resting_sides(solid: Component) -> FloatArray:
-    """Find the sides of a solid's convex hull on which it comes to rest.
-
-    On a facet that its centre of mass is not above, it rolls on over the edge that the centre is farthest beyond.
-
-    Returns
-    -------
-    FloatArray
-        Half-spaces n.x <= d around the solid: rows of unit n, and d, [P, 4]. What lies within `TOLERANCE` of a side's
-        plane is in it.
-    """
-    hull, (_, centre, _) = solid.hull, _native.mesh_mass(solid.vertices, solid.faces)
-    corners = hull.vertices[hull.faces]
-    edges = np.roll(corners, -1, axis=1) - corners
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    areas = np.sqrt(dots(normals, normals))
-    beyond = dots(np.cross(edges, normals[:, None]), centre - corners) / np.sqrt(dots(edges, edges))
-    halfedges = Edges.of(hull.faces.astype(np.int64), len(hull.vertices)).halfedges
-    face, across = np.arange(len(areas)), np.empty(beyond.shape, dtype=np.int64)
-    np.put(across, halfedges, halfedges[::-1] // 3)
-    rests_on = np.where((beyond <= 0).all(axis=1), face, across[face, beyond.argmax(axis=1)])
-    for _ in range(len(face).bit_length()):  # each time, twice as far
-        rests_on = rests_on[rests_on]
-    share = np.bincount(rests_on, areas / areas.sum(), len(face))
-    sides = []
-    for side in np.flatnonzero((share >= SIDE_AREA / 2) & (areas > 0)):  # two facets if the centre is above an edge
-        normal = normals[side] / areas[side]
-        offset = dots(corners[side], normal).max()
-        coplanar = (dots(corners, normal) > offset - TOLERANCE).all(axis=1)
-        if share[coplanar].sum() >= SIDE_AREA:
-            sides.append([*normal, offset + TOLERANCE])
-            share[coplanar] = 0
-    return np.array(sides).reshape(-1, 4)
-
-
-def within_reach(sides: FloatArray, hull: Hull, growth: float) -> FloatArray:
-    """Those of the half-spaces that a hull could leave by growing so much."""
-    reach = heights(hull.vertices, sides[:, :3]).max(axis=0)
-    return np.ascontiguousarray(sides[reach > sides[:, 3] - growth])
 
 
 def kept_within(part: Part, sides: FloatArray, criterion: Criterion) -> Part:
