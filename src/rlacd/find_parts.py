@@ -70,6 +70,7 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
         options = options.at_scale(solid.frame.scale)
         goal = LimitedCriterion.prepare(options, solid, run)
         root = Component(solid.shape, run.threads)
+        sides = resting_sides(root) if any(options.hull_limits) else NO_SIDES
     except Stopped:
         run.note_stop()
         return covered(source, options, run)
@@ -80,7 +81,6 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     solid.pieces.clear()
     decomposer = _Decomposer.of(model, goal, options, run)
     parts, goal, found = decomposer.decompose(goal)
-    sides = resting_sides(root) if any(options.hull_limits) else NO_SIDES
     limited, most = LimitedCriterion(goal, options.hull_limits, sides=sides), options.max_hulls
     if most is not None and not decomposer.keeps(most, parts):
         parts = at_most(most, decomposer.coarser(parts, goal), decomposer.unite, root, limited, run)
