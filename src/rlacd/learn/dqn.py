@@ -332,7 +332,7 @@ class DQN:
         target = self.targets(batch) if options.objective == "rewards" else -batch["cuts"].log()
         loss = bellman_loss(self.network(batch["features"]), batch["planes"], target, options.huber)
         self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         self.optimizer.step()
         self.updates += 1
         if options.tau:
