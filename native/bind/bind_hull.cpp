@@ -1,14 +1,14 @@
 // Python bindings of convex hulls: built, joined, simplified, and in contact.
 #include <cmath>
 
-#include "base/mesh_measures.hpp"
-#include "base/parallel.hpp"
 #include "bind/released.hpp"
-#include "distance/filling.hpp"
-#include "hull/convex_body.hpp"
-#include "hull/flush.hpp"
-#include "hull/hull.hpp"
-#include "hull/simplify_hull.hpp"
+#include "convex/convex_body.hpp"
+#include "convex/flush.hpp"
+#include "convex/hull.hpp"
+#include "convex/simplify_hull.hpp"
+#include "core/mesh_measures.hpp"
+#include "core/parallel.hpp"
+#include "solid/filling.hpp"
 
 namespace rlacd {
 
