@@ -39,7 +39,7 @@ ConvexCollapse::ConvexCollapse(const Mesh& hull, std::vector<Above> bounds, std:
   for (const Vec3 point : hull.vertices) add_corner(point);
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> sides;
   for (const Triangle& face : hull.faces) {
-    const std::int32_t f = add_facet(face[0], face[1], face[2]);
+    const std::int32_t f = new_facet(face[0], face[1], face[2]);
     for (int i = 0; i < 3; ++i) sides[{face[i], face[(i + 1) % 3]}] = f;
   }
   for (Facet& facet : facets_)
@@ -56,7 +56,7 @@ std::vector<Vec3> ConvexCollapse::corners() const {
   return alive;
 }
 
-std::int32_t ConvexCollapse::add_facet(std::int32_t a, std::int32_t b, std::int32_t c) {
+std::int32_t ConvexCollapse::new_facet(std::int32_t a, std::int32_t b, std::int32_t c) {
   Facet facet;
   facet.corner = {a, b, c};
   const Vec3 product = cross(points_[b] - points_[a], points_[c] - points_[a]);
@@ -65,18 +65,7 @@ std::int32_t ConvexCollapse::add_facet(std::int32_t a, std::int32_t b, std::int3
   facet.normal = length > 0 ? (1 / length) * product : Vec3{};
   facet.offset =
       std::max({dot(facet.normal, points_[a]), dot(facet.normal, points_[b]), dot(facet.normal, points_[c])});
-  facet.alive = true;
-  std::int32_t f;
-  if (free_.empty()) {
-    f = static_cast<std::int32_t>(facets_.size());
-    facets_.push_back(facet);
-    mark_.push_back(0);
-  } else {
-    f = free_.back();
-    free_.pop_back();
-    facets_[f] = facet;
-    mark_[f] = 0;
-  }
+  const std::int32_t f = add_facet(facet);
   facet_of_[a] = facet_of_[b] = facet_of_[c] = f;
   return f;
 }
@@ -87,7 +76,6 @@ std::int32_t ConvexCollapse::add_corner(Vec3 point) {
   reach_.push_back(kUnknown);
   facet_of_.push_back(-1);
   version_.push_back(0);
-  horizon_at_.push_back(-1);
   return static_cast<std::int32_t>(points_.size()) - 1;
 }
 
@@ -132,20 +120,16 @@ double ConvexCollapse::reach(std::int32_t corner) {
   return reach;
 }
 
-// The facets around two corners into region_; false when no edge joins the corners.
+// The facets around two corners, which their new corner is to see; false when no edge joins the corners.
 bool ConvexCollapse::gather(std::int32_t from, std::int32_t to) {
-  region_.clear();
-  ++gathering_;
+  begin_insertion();
   bool joined = false;
   for (const std::int32_t v : {from, to}) {
     std::int32_t f = facet_of_[v];
     do {
       const Facet& facet = facets_[f];
       const int i = facet.corner[0] == v ? 0 : facet.corner[1] == v ? 1 : 2;
-      if (mark_[f] != gathering_) {
-        mark_[f] = gathering_;
-        region_.push_back(f);
-      }
+      see(f);
       joined = joined || facet.corner[(i + 1) % 3] == to;
       f = facet.neighbour[(i + 2) % 3];
     } while (f != facet_of_[v]);
@@ -153,42 +137,8 @@ bool ConvexCollapse::gather(std::int32_t from, std::int32_t to) {
   return joined;
 }
 
-// Adds to region_ all other facets visible from the point, by adjacency. False if all facets are visible.
-bool ConvexCollapse::extend(Vec3 point) {
-  for (std::size_t next = 0; next < region_.size(); ++next)
-    for (const std::int32_t f : facets_[region_[next]].neighbour) {
-      if (mark_[f] == gathering_ || dot(facets_[f].normal, point) - facets_[f].offset < -kFlat) continue;
-      mark_[f] = gathering_;
-      region_.push_back(f);
-    }
-  return region_.size() < 2 * alive_ - 4;
-}
-
-// The border of region_ into horizon_, in order. False unless it is one simple loop around a disk.
-bool ConvexCollapse::trace_horizon() {
-  horizon_.clear();
-  bool simple = true;
-  for (const std::int32_t f : region_)
-    for (int i = 0; i < 3; ++i) {
-      const Facet& facet = facets_[f];
-      if (mark_[facet.neighbour[i]] == gathering_) continue;
-      const std::int32_t from = facet.corner[i];
-      if (horizon_at_[from] >= 0) simple = false;
-      horizon_at_[from] = static_cast<std::int32_t>(horizon_.size());
-      horizon_.push_back({from, facet.corner[(i + 1) % 3], facet.neighbour[i]});
-    }
-  std::vector<HorizonEdge> loop;
-  if (simple && horizon_.size() >= 3) {
-    std::int32_t at = horizon_[0].from;
-    do {
-      loop.push_back(horizon_[horizon_at_[at]]);
-      at = loop.back().to;
-    } while (at != horizon_[0].from && loop.size() <= horizon_.size());
-  }
-  for (const HorizonEdge& edge : horizon_) horizon_at_[edge.from] = -1;
-  simple = simple && loop.size() >= 3 && loop.size() == horizon_.size();
-  horizon_.swap(loop);
-  return simple;
+bool ConvexCollapse::find_horizon_of(Vec3 point) {
+  return find_horizon([point](const Facet& f) { return dot(f.normal, point) - f.offset >= -kFlat; });
 }
 
 std::optional<ConvexCollapse::Collapse> ConvexCollapse::plan(std::int32_t from, std::int32_t to) {
@@ -196,15 +146,15 @@ std::optional<ConvexCollapse::Collapse> ConvexCollapse::plan(std::int32_t from, 
   // The volume between the facets and a point that sees them is sum area (n . x - h) / 3, linear in x.
   Vec3 objective;
   above_ = bounds_;
-  for (const std::int32_t f : region_) {
+  for (const std::int32_t f : visible_) {
     objective = objective + facets_[f].area * facets_[f].normal;
     above_.push_back({facets_[f].normal, facets_[f].offset});
   }
   const std::optional<Vec3> point = lowest_point(normalized(objective), above_, kReach);
   if (!point || max_abs(*point) > kReach) return std::nullopt;
-  if (!extend(*point) || !trace_horizon()) return std::nullopt;
+  if (!find_horizon_of(*point)) return std::nullopt;
   Collapse collapse{0, from, to, version_[from], version_[to], *point};
-  for (const std::int32_t f : region_)
+  for (const std::int32_t f : visible_)
     collapse.cost += std::max(0.0, facets_[f].area * (dot(facets_[f].normal, *point) - facets_[f].offset)) / 3;
   return collapse;
 }
@@ -220,33 +170,20 @@ void ConvexCollapse::schedule(std::int32_t from, std::int32_t to) {
 
 void ConvexCollapse::apply(const Collapse& collapse) {
   gather(collapse.from, collapse.to);
-  if (!extend(collapse.point) || !trace_horizon()) return;
-  const std::vector<HorizonEdge> ring = horizon_;
-
+  if (!find_horizon_of(collapse.point)) return;
   std::vector<std::int32_t> touched;
-  for (const std::int32_t f : region_) {
+  for (const std::int32_t f : visible_)
     for (const std::int32_t corner : facets_[f].corner) {
       if (facet_of_[corner] >= 0) touched.push_back(corner);
       facet_of_[corner] = -1;
     }
-    facets_[f].alive = false;
-    free_.push_back(f);
-  }
   const std::int32_t apex = add_corner(collapse.point);
-  std::vector<std::int32_t> fan;
-  for (const HorizonEdge& edge : ring) fan.push_back(add_facet(edge.from, edge.to, apex));
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    Facet& facet = facets_[fan[i]];
-    facet.neighbour[0] = ring[i].beyond;
-    facet.neighbour[1] = fan[(i + 1) % ring.size()];
-    facet.neighbour[2] = fan[(i + ring.size() - 1) % ring.size()];
-    Facet& beyond = facets_[ring[i].beyond];
-    for (int k = 0; k < 3; ++k)
-      if (beyond.corner[k] == ring[i].to && beyond.corner[(k + 1) % 3] == ring[i].from) beyond.neighbour[k] = fan[i];
-  }
-  // Corners of the region that remain are those on the ring: the fan has given them a facet again.
+  build_cone([&](std::int32_t from, std::int32_t to) { return new_facet(from, to, apex); });
+  // The corners that remain are those on the horizon: the cone has given them a facet again.
   ++alive_;
   for (const std::int32_t corner : touched) alive_ -= facet_of_[corner] < 0;
+  const std::vector<HorizonEdge> ring = horizon_;
+  const std::vector<std::int32_t> fan = cone_;
   for (const HorizonEdge& edge : ring) {
     ++version_[edge.from];
     reach_[edge.from] = kUnknown;

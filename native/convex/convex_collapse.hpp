@@ -12,12 +12,18 @@
 #include <utility>
 #include <vector>
 
+#include "convex/facets.hpp"
 #include "convex/linear_program.hpp"
 #include "core/geometry.hpp"
 
 namespace rlacd {
 
-class ConvexCollapse {
+struct CollapseFacet {
+  Vec3 normal;
+  double offset, area;
+};
+
+class ConvexCollapse : Facets<CollapseFacet> {
  public:
   // New corners stay above the bounds.
   ConvexCollapse(const Mesh& hull, std::vector<Above> bounds) : ConvexCollapse(hull, std::move(bounds), {}, 0) {}
@@ -33,13 +39,6 @@ class ConvexCollapse {
   std::vector<Vec3> corners() const;
 
  private:
-  struct Facet {
-    Triangle corner;
-    std::int32_t neighbour[3];  // across the edge corner[i] -> corner[i + 1]
-    Vec3 normal;
-    double offset, area;
-    bool alive;
-  };
   struct Collapse {
     double cost;  // added volume
     std::int32_t from, to;
@@ -50,17 +49,13 @@ class ConvexCollapse {
       return from != other.from ? from > other.from : to > other.to;
     }
   };
-  struct HorizonEdge {
-    std::int32_t from, to, beyond;
-  };
 
-  std::int32_t add_facet(std::int32_t a, std::int32_t b, std::int32_t c);
+  std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
   std::int32_t add_corner(Vec3 point);
   bool is_near(std::int32_t from, std::int32_t to);
   double reach(std::int32_t corner);
   bool gather(std::int32_t from, std::int32_t to);
-  bool extend(Vec3 point);
-  bool trace_horizon();
+  bool find_horizon_of(Vec3 point);
   std::optional<Collapse> plan(std::int32_t from, std::int32_t to);
   void schedule(std::int32_t from, std::int32_t to);
   void apply(const Collapse& collapse);
@@ -69,19 +64,12 @@ class ConvexCollapse {
   const std::function<Vec3(Vec3)> placed_;
   const double tolerance_;
   std::vector<Vec3> points_, places_;
-  std::vector<double> reach_;  // of a corner; not a number where it is not known
-  std::vector<Facet> facets_;
+  std::vector<double> reach_;           // of a corner; not a number where it is not known
   std::vector<std::int32_t> facet_of_;  // one living facet of each living corner, -1 for the dead
   std::vector<std::uint32_t> version_;  // of a corner: changes with its facets
-  std::vector<std::int32_t> free_;
   std::vector<Collapse> heap_;
   std::size_t alive_ = 0;
 
-  std::vector<std::int32_t> region_;  // facets that the point of the current collapse replaces
-  std::vector<std::uint32_t> mark_;   // of a facet: the last region it was part of
-  std::uint32_t gathering_ = 0;
-  std::vector<HorizonEdge> horizon_;
-  std::vector<std::int32_t> horizon_at_;  // of a corner: the horizon edge that starts there
   std::vector<Above> above_;
   std::vector<Vec3> edges_;
 };

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
+
+#include "convex/hull.hpp"
 
 namespace rlacd {
 
@@ -15,20 +18,11 @@ constexpr double kWithin = 0.3;        // share by which places are moved from t
 constexpr double kReached = 1 - 1e-6;  // share of a depth that counts as all of it, for rounding
 constexpr double kSameNormal = 1e7;    // normals that agree to so many parts are equal
 
-// What of a convex polygon lies in the half-space normal . x <= offset; `crossings` receives the ends of the new side.
-Polygon cut(const Polygon& polygon, Vec3 normal, double offset, std::vector<Vec3>* crossings = nullptr) {
-  Polygon kept;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vec3 a = polygon[i == 0 ? polygon.size() - 1 : i - 1], b = polygon[i];
-    const double here = dot(normal, a) - offset, there = dot(normal, b) - offset;
-    if ((here > 0) != (there > 0)) {
-      const double share = here / (here - there);
-      kept.push_back((1 - share) * a + share * b);
-      if (crossings != nullptr) crossings->push_back(kept.back());
-    }
-    if (there <= 0) kept.push_back(b);
-  }
-  return kept;
+// What of a polygon lies in the half-space normal . x <= offset.
+Polygon cut(const Polygon& polygon, Vec3 normal, double offset) {
+  Polygon below, above;
+  const Lies lies = split(polygon, [&](Vec3 p) { return dot(normal, p) - offset; }, below, above);
+  return lies == Lies::kBelow ? polygon : below;
 }
 
 Vec3 middle_of(const Polygon& polygon) {
@@ -74,11 +68,11 @@ Range beyond(const Polygon& polygon, Vec3 normal, double offset) {
 
 }  // namespace
 
-FlushBody::FlushBody(const Mesh& hull) {
+FlushBody::FlushBody(Mesh hull) : hull_(std::move(hull)) {
   std::map<std::array<std::int64_t, 3>, std::size_t> known;
   std::vector<std::vector<std::int32_t>> corners;
-  for (const Triangle& face : hull.faces) {
-    const Vec3 normal = normalized(long_normal(hull, face));
+  for (const Triangle& face : hull_.faces) {
+    const Vec3 normal = normalized(long_normal(hull_, face));
     if (norm2(normal) == 0) continue;  // a sliver without a direction
     const std::array<std::int64_t, 3> key = {std::llround(kSameNormal * normal.x), std::llround(kSameNormal * normal.y),
                                              std::llround(kSameNormal * normal.z)};
@@ -93,10 +87,10 @@ FlushBody::FlushBody(const Mesh& hull) {
   for (std::size_t i = 0; i < sides_.size(); ++i) {
     Side& side = sides_[i];
     // The farthest corner: the inexact normal of a sliver then cuts nothing off.
-    side.offset = beyond(hull.vertices, side.normal, 0).most;
+    side.offset = beyond(hull_.vertices, side.normal, 0).most;
     std::sort(corners[i].begin(), corners[i].end());
     corners[i].erase(std::unique(corners[i].begin(), corners[i].end()), corners[i].end());
-    for (const std::int32_t corner : corners[i]) side.polygon.push_back(hull.vertices[corner]);
+    for (const std::int32_t corner : corners[i]) side.polygon.push_back(hull_.vertices[corner]);
     side.polygon = ordered(side.polygon, side.normal);
   }
 }
@@ -153,29 +147,15 @@ FlushBody::Contact FlushBody::contact(const FlushBody& other, double depth, doub
 
 std::vector<Vec3> FlushBody::layer(const FlushBody& other, const std::vector<std::int32_t>& sides, double depth,
                                    double touch) const {
-  std::vector<Polygon> polygons;
-  for (const Side& side : other.sides_) polygons.push_back(side.polygon);
-  std::vector<Vec3> crossings;
+  Mesh hull = other.hull_;
   for (const Side& side : sides_) {
     const bool moves = std::any_of(sides.begin(), sides.end(),
                                    [&](std::int32_t i) { return dot(side.normal, sides_[i].normal) >= kBeside; });
     const double offset = side.offset + (moves ? depth : 0);
-    double most = -std::numeric_limits<double>::infinity();
-    for (const Polygon& polygon : polygons) most = std::max(most, beyond(polygon, side.normal, offset).most);
-    if (most <= touch * kReached) continue;
-    crossings.clear();
-    std::vector<Polygon> kept;
-    for (const Polygon& polygon : polygons) {
-      Polygon rest = cut(polygon, side.normal, offset, &crossings);
-      if (rest.size() > 2) kept.push_back(std::move(rest));
-    }
-    if (kept.empty()) return {};
-    if (crossings.size() > 2) kept.push_back(ordered(crossings, side.normal));
-    polygons = std::move(kept);
+    if (beyond(hull.vertices, side.normal, offset).most > touch * kReached)
+      hull = hull_below(hull, {side.normal, offset});
   }
-  std::vector<Vec3> corners;
-  for (const Polygon& polygon : polygons) corners.insert(corners.end(), polygon.begin(), polygon.end());
-  return corners;
+  return hull.vertices;
 }
 
 }  // namespace rlacd

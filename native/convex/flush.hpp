@@ -2,22 +2,19 @@
 //
 // In:  closed convex triangle meshes, whose flat sides may be cut into many triangles.
 // Out: the sides at which one touches the other, with places spread over the contact; the corners of a layer.
-// How: triangles of equal normals, up to rounding, are one side: a plane and a polygon. Polygons are clipped by planes
-//      (Sutherland and Hodgman); a polytope is clipped as its polygons, each cut closed by the polygon of its
-//      crossings.
+// How: triangles of equal normals, up to rounding, are one side: a plane and a polygon. Polygons are clipped by planes.
 #pragma once
 
 #include <vector>
 
+#include "convex/polygon.hpp"
 #include "core/geometry.hpp"
 
 namespace rlacd {
 
-using Polygon = std::vector<Vec3>;
-
 class FlushBody {
  public:
-  explicit FlushBody(const Mesh& hull);
+  explicit FlushBody(Mesh hull);
 
   struct Contact {
     std::vector<std::int32_t> sides;  // of this body
@@ -45,6 +42,7 @@ class FlushBody {
     Polygon polygon;
   };
 
+  Mesh hull_;
   std::vector<Side> sides_;
 };
 

@@ -31,7 +31,6 @@ void HullBuilder::clear() {
   next_outside_.clear();
   extent_ = Box();
   reach_ = 0;
-  insertion_ = 0;
 }
 
 void HullBuilder::drop_inner_points() {
@@ -61,15 +60,8 @@ bool HullBuilder::sees_closely(const Facet& f, Vec3 p) const {
 }
 
 std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t c) {
-  std::int32_t slot = static_cast<std::int32_t>(facets_.size());
-  if (free_.empty()) {
-    facets_.emplace_back();
-  } else {
-    slot = free_.back();
-    free_.pop_back();
-  }
   const Vec3 origin = points_[a], ab = points_[b] - origin, ac = points_[c] - origin;
-  Facet& f = facets_[slot];
+  Facet f;
   f.corner = {a, b, c};
   f.normal = cross(ab, ac);
   f.origin = origin;
@@ -79,9 +71,7 @@ std::int32_t HullBuilder::new_facet(std::int32_t a, std::int32_t b, std::int32_t
   // dot products are off by 36 u |ab||ac| of the longest |p| each, and the normal counts twice: 40 u |ab||ac| 4 |p|.
   f.error = 40 * kRoundoff * max_abs(ab) * max_abs(ac);
   f.outside = -1;
-  f.alive = true;
-  f.mark = -1;
-  return slot;
+  return add_facet(f);
 }
 
 template <class Sees>
@@ -224,61 +214,25 @@ bool HullBuilder::is_closed() const {
 // Replaces the facets that the point sees by a cone of triangles over their horizon.
 void HullBuilder::insert(std::int32_t point, std::int32_t facet, std::vector<std::int32_t>& pending) {
   const Vec3 p = points_[point];
-  const std::int32_t seen = 2 * insertion_, hidden = seen + 1;
-  ++insertion_;
-  visible_.assign(1, facet);
-  horizon_.clear();
-  facets_[facet].mark = seen;
-  for (std::size_t i = 0; i < visible_.size(); ++i) {
-    const Facet& f = facets_[visible_[i]];
-    for (int e = 0; e < 3; ++e) {
-      Facet& g = facets_[f.neighbour[e]];
-      if (g.mark < seen) {
-        g.mark = sees(g, p) ? seen : hidden;
-        if (g.mark == seen) visible_.push_back(f.neighbour[e]);
-      }
-      if (g.mark == hidden) horizon_.push_back({f.corner[e], f.corner[(e + 1) % 3], f.neighbour[e]});
-    }
-  }
-
-  // Exact signs make the horizon one simple loop; it is walked by looking up the edge that starts at each corner.
-  first_edge_.resize(points_.size());
-  for (std::size_t i = 0; i < horizon_.size(); ++i) first_edge_[horizon_[i].from] = static_cast<std::int32_t>(i);
-
+  begin_insertion();
+  see(facet);
+  const bool is_loop = find_horizon([&](const Facet& f) { return sees(f, p); });
+  RLACD_ASSERT(is_loop);  // since signs are exact
+  static_cast<void>(is_loop);
   orphans_.clear();
   for (const std::int32_t id : visible_) {
     Facet& f = facets_[id];
     for (std::int32_t i = f.outside; i >= 0; i = next_outside_[i])
       if (i != point) orphans_.push_back(i);
-    f.alive = false;
     f.outside = -1;
   }
-  created_.clear();
-  const std::size_t length = horizon_.size();
-  std::int32_t edge = 0;
-  for (std::size_t i = 0; i < length; ++i) {
-    const HorizonEdge e = horizon_[edge];
-    const std::int32_t id = new_facet(e.from, e.to, point);
-    created_.push_back(id);
-    Facet& beyond = facets_[e.beyond];
-    for (int k = 0; k < 3; ++k)
-      if (beyond.corner[k] == e.to && beyond.corner[(k + 1) % 3] == e.from) beyond.neighbour[k] = id;
-    facets_[id].neighbour[0] = e.beyond;
-    edge = first_edge_[e.to];
-    RLACD_ASSERT(horizon_[edge].from == e.to);
-    RLACD_ASSERT((edge == 0) == (i + 1 == length));  // back at the start after exactly all edges
-  }
-  for (std::size_t i = 0; i < length; ++i) {  // edge 1 is (to, point), edge 2 is (point, from)
-    facets_[created_[i]].neighbour[1] = created_[(i + 1) % length];
-    facets_[created_[i]].neighbour[2] = created_[(i + length - 1) % length];
-  }
-  free_.insert(free_.end(), visible_.begin(), visible_.end());
+  build_cone([&](std::int32_t from, std::int32_t to) { return new_facet(from, to, point); });
 
   // A point that saw a removed facet and still lies outside sees one of the new facets, so only those are searched. It
   // may see them by less than the tolerance and another facet by more: no such point is dropped here.
   const auto strictly = [this](const Facet& f, Vec3 q) { return sees(f, q); };
-  for (const std::int32_t orphan : orphans_) assign(orphan, created_, strictly);
-  for (const std::int32_t id : created_)
+  for (const std::int32_t orphan : orphans_) assign(orphan, cone_, strictly);
+  for (const std::int32_t id : cone_)
     if (facets_[id].outside >= 0) pending.push_back(id);
 }
 
@@ -399,6 +353,23 @@ Mesh hull_mesh(const std::vector<Vec3>& points) {
   for (const std::int32_t i : hull.indices) mesh.vertices.push_back(points[i]);
   mesh.faces = hull.faces;
   return mesh;
+}
+
+Mesh hull_below(const Mesh& hull, const Plane& plane) {
+  std::vector<Vec3> points;
+  std::vector<double> heights;
+  for (const Vec3 p : hull.vertices) {
+    heights.push_back(-plane.depth(p));
+    if (heights.back() <= 0) points.push_back(p);
+  }
+  for (const Triangle& face : hull.faces)
+    for (int e = 0; e < 3; ++e) {
+      const std::int32_t a = face[e], b = face[(e + 1) % 3];
+      if (heights[a] <= 0 && heights[b] > 0)
+        points.push_back(hull.vertices[a] +
+                         heights[a] / (heights[a] - heights[b]) * (hull.vertices[b] - hull.vertices[a]));
+    }
+  return hull_mesh(points);
 }
 
 }  // namespace rlacd

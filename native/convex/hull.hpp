@@ -13,11 +13,20 @@
 #include <cstdint>
 #include <vector>
 
+#include "convex/facets.hpp"
 #include "core/geometry.hpp"
 
 namespace rlacd {
 
-class HullBuilder {
+struct HullFacet {
+  Vec3 normal;           // (b - a) x (c - a), not normalised
+  Vec3 origin;           // corner a
+  double offset;         // of the plane, normal . a
+  double error;          // |computed height - exact height| <= error * max_abs(p - a)
+  std::int32_t outside;  // first point of the list that this facet is responsible for, -1 when none
+};
+
+class HullBuilder : Facets<HullFacet> {
  public:
   // Points up to about `tolerance` outside the current hull may be dropped, unless the hull is flat; 0 gives the exact
   // hull. Decisions about the points that are added stay exact.
@@ -43,18 +52,6 @@ class HullBuilder {
   std::vector<std::int32_t> extreme_corners() const;  // those not inside a facet or an edge of the polytope (rank 3)
 
  private:
-  struct Facet {
-    Triangle corner;
-    std::int32_t neighbour[3];  // across the edge corner[i] -> corner[i + 1]
-    Vec3 normal;                // (b - a) x (c - a), not normalised
-    Vec3 origin;                // corner a
-    double offset;              // of the plane, normal . a
-    double error;               // |computed height - exact height| <= error * max_abs(p - a)
-    std::int32_t outside;       // first point of the list that this facet is responsible for, -1 when none
-    bool alive;
-    std::int32_t mark;  // number of the last insertion that looked at this facet
-  };
-
   double height(const Facet& f, Vec3 p) const { return dot(f.normal, p - f.origin); }
   bool sees(const Facet& f, Vec3 p) const;
   bool sees_closely(const Facet& f, Vec3 p) const;
@@ -69,18 +66,10 @@ class HullBuilder {
   double tolerance_;
   int rank_ = -1;
   std::vector<Vec3> points_;
-  std::vector<Facet> facets_;
-  std::vector<std::int32_t> free_;
   std::vector<std::int32_t> next_outside_;  // linked lists of outside points, by point
   Box extent_;
   double reach_ = 0;  // four times the largest coordinate
-  std::int32_t insertion_ = 0;
-
-  struct HorizonEdge {
-    std::int32_t from, to, beyond;
-  };
-  std::vector<HorizonEdge> horizon_;
-  std::vector<std::int32_t> visible_, created_, orphans_, first_edge_;
+  std::vector<std::int32_t> orphans_;
 };
 
 struct Hull {
@@ -94,5 +83,8 @@ Hull convex_hull(const std::vector<Vec3>& points);
 
 // The same as a mesh; empty if the points are coplanar.
 Mesh hull_mesh(const std::vector<Vec3>& points);
+
+// What of a convex hull lies below a plane; empty if that is flat.
+Mesh hull_below(const Mesh& hull, const Plane& plane);
 
 }  // namespace rlacd

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "convex/polygon.hpp"
 #include "core/stop.hpp"
 #include "surface/curve.hpp"
 #include "surface/surface_field.hpp"
@@ -23,8 +24,6 @@ constexpr std::size_t kMostPieces = 4096;
 
 // Two facets face the same way when the angle between them is below 60 degrees.
 constexpr double kSameWay = 0.5;
-
-using Polygon = std::vector<Vec3>;  // convex and flat
 
 // Corners this close to a plane count as on it: no clipped polygon is thinner than rounding.
 constexpr double kOnPlane = 1e-12;
@@ -48,7 +47,6 @@ class Clipper {
   // Whether a single half-space shows that a polygon does not reach into the intersection; if not, the planes that the
   // polygon crosses are stored in `crossed_`.
   bool is_separated(const Polygon& polygon, const HalfSpaces& convex);
-  void split(const Polygon& polygon, Vec3 normal, double offset);
 
   std::vector<std::int32_t> crossed_;
   std::vector<Polygon> left_, cut_off_;
@@ -64,13 +62,19 @@ void Clipper::subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex)
     }
     cut_off_.clear();
     rest_ = polygon;
-    for (const std::int32_t i : crossed_) {
-      split(rest_, convex.planes->normal(i), convex.offset[i]);
+    auto lies = Lies::kBelow;
+    for (std::size_t k = 0; k < crossed_.size() && lies != Lies::kAbove; ++k) {
+      const Vec3 normal = convex.planes->normal(crossed_[k]);
+      const auto height = [normal, offset = convex.offset[crossed_[k]]](Vec3 p) {
+        const double h = dot(normal, p) - offset;
+        return std::fabs(h) <= kOnPlane ? 0.0 : h;
+      };
+      lies = split(rest_, height, inside_, outside_);
+      if (lies != Lies::kAcross) continue;
       rest_.swap(inside_);
-      if (rest_.empty()) break;
-      if (!outside_.empty()) cut_off_.push_back(outside_);
+      cut_off_.push_back(outside_);
     }
-    if (rest_.empty())
+    if (lies == Lies::kAbove)
       left_.push_back(std::move(polygon));
     else
       std::move(cut_off_.begin(), cut_off_.end(), std::back_inserter(left_));
@@ -99,42 +103,6 @@ RLACD_WIDE bool Clipper::is_separated(const Polygon& polygon, const HalfSpaces& 
     }
   }
   return false;
-}
-
-// The parts of a polygon inside and outside a half-space. A polygon that only touches the plane stays whole: outside,
-// or inside if it lies in the plane.
-void Clipper::split(const Polygon& polygon, Vec3 normal, double offset) {
-  inside_.clear();
-  outside_.clear();
-  const auto height = [&](Vec3 p) {
-    const double h = dot(normal, p) - offset;
-    return std::fabs(h) <= kOnPlane ? 0.0 : h;
-  };
-  double least = 0, most = 0;
-  for (const Vec3 p : polygon) {
-    const double h = height(p);
-    least = std::min(least, h);
-    most = std::max(most, h);
-  }
-  if (most <= 0) {
-    inside_ = polygon;
-    return;
-  }
-  if (least >= 0) {
-    outside_ = polygon;
-    return;
-  }
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vec3 p = polygon[i], q = polygon[i + 1 == polygon.size() ? 0 : i + 1];
-    const double hp = height(p), hq = height(q);
-    if (hp <= 0) inside_.push_back(p);
-    if (hp >= 0) outside_.push_back(p);
-    if ((hp < 0 && hq > 0) || (hp > 0 && hq < 0)) {
-      const Vec3 crossing = p + (hp / (hp - hq)) * (q - p);
-      inside_.push_back(crossing);
-      outside_.push_back(crossing);
-    }
-  }
 }
 
 // Polygons merged into one mesh, in which equal corners are one vertex: its distance is computed once.

@@ -4,6 +4,7 @@
 #include <queue>
 
 #include "convex/hull.hpp"
+#include "convex/polygon.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
 #include "solid/caps.hpp"
@@ -60,23 +61,13 @@ class Depths {
     polygon_.assign({a, b, c});
     for (std::size_t i = 0; i < planes_.size(); ++i) {
       const auto plane = static_cast<std::int32_t>(i);
-      depth_.clear();
-      for (const Vec3 corner : polygon_) depth_.push_back(planes_.depth(plane, corner) - t_);
-      if (std::all_of(depth_.begin(), depth_.end(), [](double depth) { return depth > 0; })) continue;
-      clipped_.clear();
-      for (std::size_t k = 0; k < polygon_.size(); ++k) {
-        const std::size_t next = k + 1 < polygon_.size() ? k + 1 : 0;
-        if (depth_[k] > 0) clipped_.push_back(polygon_[k]);
-        if ((depth_[k] > 0) != (depth_[next] > 0)) {
-          const double share = depth_[k] / (depth_[k] - depth_[next]);
-          clipped_.push_back(polygon_[k] + share * (polygon_[next] - polygon_[k]));
-        }
-      }
-      if (clipped_.empty()) {
+      const auto height = [&](Vec3 p) { return t_ - planes_.depth(plane, p); };
+      const Lies lies = split(polygon_, height, deeper_, rest_);
+      if (lies == Lies::kAbove) {
         last_ = plane;
         return false;
       }
-      polygon_.swap(clipped_);
+      if (lies == Lies::kAcross) polygon_.swap(deeper_);
     }
     Vec3 middle{0, 0, 0};
     for (const Vec3 corner : polygon_) middle = middle + (1.0 / static_cast<double>(polygon_.size())) * corner;
@@ -87,8 +78,7 @@ class Depths {
   const ConvexPlanes& planes_;
   const double t_;
   std::int32_t last_ = 0;  // the plane that excluded the last object
-  std::vector<Vec3> polygon_, clipped_;
-  std::vector<double> depth_;
+  Polygon polygon_, deeper_, rest_;
 };
 
 struct Cell {

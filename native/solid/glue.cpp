@@ -2,22 +2,23 @@
 
 #include <algorithm>
 
+#include "convex/polygon.hpp"
 #include "core/stop.hpp"
 
 namespace rlacd {
 
 namespace {
 
-using Polygon = std::vector<PlanePoint>;
+using Outline = std::vector<PlanePoint>;
 
-double doubled_area_of(const Polygon& p) {
+double doubled_area_of(const Outline& p) {
   double sum = 0;
   for (std::size_t i = 1; i + 1 < p.size(); ++i) sum += doubled_area(p[0], p[i], p[i + 1]);
   return sum;
 }
 
 // Thinner than kCoincident: left by rounding between two outlines that were meant to be equal.
-bool is_film(const Polygon& p) {
+bool is_film(const Outline& p) {
   double longest2 = 0;
   for (std::size_t i = 0; i < p.size(); ++i)
     for (std::size_t j = i + 1; j < p.size(); ++j)
@@ -27,7 +28,7 @@ bool is_film(const Polygon& p) {
 }
 
 // Whether an edge of the triangle has all of a polygon on its right: they share no area.
-bool is_beside(const Polygon& p, const std::array<PlanePoint, 3>& triangle) {
+bool is_beside(const Outline& p, const std::array<PlanePoint, 3>& triangle) {
   for (int e = 0; e < 3; ++e)
     if (std::all_of(p.begin(), p.end(),
                     [&](PlanePoint q) { return doubled_area(triangle[e], triangle[(e + 1) % 3], q) <= 0; }))
@@ -35,44 +36,34 @@ bool is_beside(const Polygon& p, const std::array<PlanePoint, 3>& triangle) {
   return false;
 }
 
-// Splits a convex polygon by the line through a and b into the part left of it (inside) and right of it (outside).
-void split(const Polygon& p, PlanePoint a, PlanePoint b, Polygon& inside, Polygon& outside) {
-  inside.clear();
-  outside.clear();
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    const PlanePoint q = p[i], r = p[(i + 1) % p.size()];
-    const double sq = doubled_area(a, b, q), sr = doubled_area(a, b, r);
-    if (sq >= 0) inside.push_back(q);
-    if (sq <= 0) outside.push_back(q);
-    if ((sq > 0 && sr < 0) || (sq < 0 && sr > 0)) {
-      const double t = sq / (sq - sr);
-      const PlanePoint x{q[0] + t * (r[0] - q[0]), q[1] + t * (r[1] - q[1])};
-      inside.push_back(x);
-      outside.push_back(x);
-    }
-  }
+// Keeps what of a polygon lies left of the line through a and b; the rest goes to `right`. False if hardly anything
+// does.
+bool keep_left(Outline& polygon, PlanePoint a, PlanePoint b, Outline& right) {
+  Outline left;
+  const Lies lies = split(polygon, [a, b](PlanePoint p) { return -doubled_area(a, b, p); }, left, right);
+  if (lies == Lies::kAcross)
+    polygon.swap(left);
+  else
+    right.clear();
+  return lies != Lies::kAbove && !is_film(polygon);
 }
 
 // Removes a triangle (counter-clockwise) from convex polygons.
-void subtract(std::vector<Polygon>& polygons, const std::array<PlanePoint, 3>& triangle) {
-  std::vector<Polygon> left;
-  Polygon inside, outside;
-  for (Polygon& p : polygons) {
-    if (is_beside(p, triangle)) {
-      left.push_back(std::move(p));
-      continue;
+void subtract(std::vector<Outline>& polygons, const std::array<PlanePoint, 3>& triangle) {
+  std::vector<Outline> left;
+  Outline right;
+  for (Outline& p : polygons) {
+    Outline rest = p;
+    std::vector<Outline> pieces;
+    bool overlaps = !is_beside(p, triangle);
+    for (int e = 0; e < 3 && overlaps; ++e) {
+      overlaps = keep_left(rest, triangle[e], triangle[(e + 1) % 3], right);
+      if (!right.empty() && !is_film(right)) pieces.push_back(right);
     }
-    Polygon rest = p;
-    std::vector<Polygon> pieces;
-    for (int e = 0; e < 3 && !rest.empty(); ++e) {
-      split(rest, triangle[e], triangle[(e + 1) % 3], inside, outside);
-      if (outside.size() >= 3 && !is_film(outside)) pieces.push_back(outside);
-      rest = inside.size() >= 3 && !is_film(inside) ? inside : Polygon();
-    }
-    if (rest.empty())
-      left.push_back(std::move(p));  // the triangle only touches it: keep it whole
-    else
+    if (overlaps)
       left.insert(left.end(), pieces.begin(), pieces.end());
+    else
+      left.push_back(std::move(p));  // what the triangle only touches stays whole
   }
   polygons = std::move(left);
 }
@@ -133,7 +124,7 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
   const std::vector<Facet> others = facets_within(b, common);
   // Unions are glued again and again, so vertices that no triangle needs any more are left behind.
   Renumbered taken_over(a.vertices, out.vertices);
-  std::vector<Polygon> polygons;
+  std::vector<Outline> polygons;
   for (const Triangle& face : a.faces) {
     poll_stop();
     const Facet facet(a, face);
@@ -156,7 +147,7 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
       out.faces.push_back(taken_over(face));
       continue;
     }
-    for (const Polygon& p : polygons) {
+    for (const Outline& p : polygons) {
       const auto first = static_cast<std::int32_t>(out.vertices.size());
       for (const PlanePoint q : p) out.vertices.push_back(facet.lift(q));
       for (std::int32_t i = 1; i + 1 < static_cast<std::int32_t>(p.size()); ++i)
@@ -168,15 +159,12 @@ void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common
 // Whether a triangle of one solid and an opposite one of the other share more than an edge.
 bool share_area(const Facet& facet, const Facet& other) {
   if (!facet.box.meets(other.box, kCoincident) || !facet.touches(other)) return false;
-  Polygon common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
+  Outline common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
   const PlanePoint outline[3] = {facet.project(other.corner[0]), facet.project(other.corner[2]),
                                  facet.project(other.corner[1])};
-  Polygon inside, outside;
-  for (int e = 0; e < 3; ++e) {
-    split(common, outline[e], outline[(e + 1) % 3], inside, outside);
-    if (inside.size() < 3 || is_film(inside)) return false;
-    common = inside;
-  }
+  Outline right;
+  for (int e = 0; e < 3; ++e)
+    if (!keep_left(common, outline[e], outline[(e + 1) % 3], right)) return false;
   return true;
 }
 

@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "convex/convex_planes.hpp"
+#include "convex/polygon.hpp"
 #include "core/stop.hpp"
 #include "solid/filling.hpp"
 
@@ -20,20 +21,6 @@ namespace rlacd {
 namespace {
 
 constexpr double kTouching = 1e-6;  // a face no farther than this from the hull is at no distance
-
-using Polygon = std::vector<Vec3>;
-
-// The points of a polygon under a plane.
-void clip(Polygon& polygon, Polygon& spare, Vec3 normal, double offset) {
-  spare.clear();
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vec3 p = polygon[i], q = polygon[i + 1 < polygon.size() ? i + 1 : 0];
-    const double above = dot(normal, p) - offset, next = dot(normal, q) - offset;
-    if (above < 0) spare.push_back(p);
-    if ((above < 0) != (next < 0)) spare.push_back(p + (above / (above - next)) * (q - p));
-  }
-  polygon.swap(spare);
-}
 
 class Growth {
  public:
@@ -127,8 +114,10 @@ class Growth {
     const auto [a, b, c] = corners_of(solid_, solid_.faces[item.face]);
     Polygon polygon = {a, b, c};
     for (const HalfSpace& space : found_) {
-      clip(polygon, spare_, space.normal, space.offset - depth_);
-      if (polygon.empty()) return;
+      const auto height = [&, offset = space.offset - depth_](Vec3 p) { return dot(space.normal, p) - offset; };
+      const Lies lies = split(polygon, height, deeper_, rest_);
+      if (lies == Lies::kAbove) return;
+      if (lies == Lies::kAcross) polygon.swap(deeper_);
     }
     if (item.is_natural) {
       found_.push_back({item.normal, dot(item.normal, a) + item.beyond});
@@ -154,7 +143,7 @@ class Growth {
   const double depth_;
   std::priority_queue<Item> open_;
   std::vector<HalfSpace> found_;
-  Polygon spare_;
+  Polygon deeper_, rest_;
 };
 
 }  // namespace

@@ -8,8 +8,9 @@
 
 #include <algorithm>
 #include <array>
+#include <deque>
 
-#include "convex/convex_planes.hpp"
+#include "convex/convex_body.hpp"
 #include "core/parallel.hpp"
 #include "core/stop.hpp"
 #include "solid/filling.hpp"
@@ -25,13 +26,6 @@ std::array<Corners, 2> halves(const Corners& corner) {
   return {{{p, middle, tip}, {middle, q, tip}}};
 }
 
-struct Body {
-  explicit Body(const Mesh& hull) : planes(hull), box(Box::of(hull.vertices)) {}
-
-  ConvexPlanes planes;
-  Box box;
-};
-
 constexpr int kLevels = 5;
 
 // One child of a node of the tree.
@@ -42,11 +36,11 @@ struct Branch {
 
 class Cover {
  public:
-  Cover(const Mesh& solid, const Bvh& bvh, const std::vector<Body>& bodies, double reach, double grain)
+  Cover(const Mesh& solid, const Bvh& bvh, const std::deque<ConvexBody>& bodies, double reach, double grain)
       : solid_(solid), bvh_(bvh), bodies_(bodies), reach_(reach), grain_(grain), taken_(bodies.size()) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const std::size_t first = planes_.size();
-      for (std::size_t k = 0; k < bodies[i].planes.size(); ++k) planes_.push_back(static_cast<std::int32_t>(k));
+      for (std::size_t k = 0; k < bodies[i].planes().size(); ++k) planes_.push_back(static_cast<std::int32_t>(k));
       near_.push_back({static_cast<std::int32_t>(i), first, planes_.size()});
     }
   }
@@ -92,12 +86,13 @@ class Cover {
     const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
     for (std::size_t i = above.first; i < above.last; ++i) {
       const Near candidate = near_[i];
-      const Body& body = bodies_[candidate.body];
-      if (!body.box.meets(box, reach_)) continue;
+      const ConvexBody& body = bodies_[candidate.body];
+      if (!body.box().meets(box, reach_)) continue;
       const std::size_t first = planes_.size();
       for (std::size_t k = candidate.first; k < candidate.last; ++k) {
         const std::int32_t plane = planes_[k];
-        if (body.planes.depth(plane, middle) < reach_along(body.planes.normal(plane), half)) planes_.push_back(plane);
+        if (body.planes().depth(plane, middle) < reach_along(body.planes().normal(plane), half))
+          planes_.push_back(plane);
       }
       if (planes_.size() == first) return true;
       near_.push_back({candidate.body, first, planes_.size()});
@@ -107,7 +102,7 @@ class Cover {
 
   // How far a body's planes would have to move out to take in a point; 0 inside.
   double beyond(const Near& near, Vec3 p) const {
-    const ConvexPlanes& planes = bodies_[near.body].planes;
+    const ConvexPlanes& planes = bodies_[near.body].planes();
     double most = 0;
     for (std::size_t k = near.first; k < near.last; ++k) most = std::max(most, -planes.depth(planes_[k], p));
     return most;
@@ -144,7 +139,7 @@ class Cover {
 
   const Mesh& solid_;
   const Bvh& bvh_;
-  const std::vector<Body>& bodies_;
+  const std::deque<ConvexBody>& bodies_;
   const double reach_, grain_;
   // First all bodies with all their planes, then those near each node, and each half of a triangle, on the way to what
   // is looked at.
@@ -175,7 +170,7 @@ std::vector<Branch> branches(const Bvh& bvh) {
 
 std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
                                          double grain, int threads) {
-  std::vector<Body> bodies;
+  std::deque<ConvexBody> bodies;
   for (const Mesh& hull : hulls) bodies.emplace_back(hull);
   const std::vector<Branch> work = branches(bvh);
   std::vector<std::vector<std::vector<Vec3>>> taken(work.size());
