@@ -1,14 +1,14 @@
 // Python bindings of distances: of points, of a part from its hull, of hulls from a solid and of their union.
-#include "base/parallel.hpp"
 #include "bind/released.hpp"
-#include "distance/apart.hpp"
-#include "distance/concavity.hpp"
-#include "distance/crossings.hpp"
-#include "distance/filling.hpp"
-#include "distance/glue.hpp"
-#include "distance/surface.hpp"
-#include "distance/surface_field.hpp"
-#include "distance/union_distance.hpp"
+#include "convex/union_distance.hpp"
+#include "core/parallel.hpp"
+#include "solid/apart.hpp"
+#include "solid/concavity.hpp"
+#include "solid/filling.hpp"
+#include "solid/glue.hpp"
+#include "surface/crossings.hpp"
+#include "surface/surface.hpp"
+#include "surface/surface_field.hpp"
 
 namespace rlacd {
 

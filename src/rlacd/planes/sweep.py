@@ -72,7 +72,7 @@ class Sweep:
 
 
 def sweep(component: Component, candidates: Candidates, threads: int = 1) -> Sweep:
-    """Score all candidates of a component: exact volumes of both sides' solids and hulls (see native/cut/sweep.hpp)."""
+    """Score all candidates of a component: volumes of both sides' solids and hulls (native/decompose/sweep.hpp)."""
     scores = _native.sweep(component.vertices, component.faces, candidates.directions, candidates.offsets, threads)
     return Sweep(candidates, *np.ascontiguousarray(scores.T))
 
@@ -139,7 +139,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
     """Get the valid plane of least cost; None if every plane misses the solid or shaves off a film.
 
     The cost is the `exponent`-norm of the two sides' |CH(m_i)| - |m_i|. It is computed only for planes that bounds do
-    not rule out (see native/cut/least_excess.hpp). Of planes whose costs are equal up to rounding, as in symmetric
+    not rule out (native/decompose/least_excess.hpp). Of planes whose costs are equal up to rounding, as in symmetric
     shapes, the first is taken, so that the cuts do not depend on the unit and position of the input.
 
     Parameters

@@ -310,7 +310,7 @@ def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArra
 
 
 TOUCHING_FACES = 1e-8
-"""Distance at which faces count as touching (see native/distance/glue.hpp)."""
+"""Distance at which faces count as touching (see native/solid/glue.hpp)."""
 
 
 def reunite(components: Sequence[Component]) -> Component | None:

@@ -1,0 +1,31 @@
+// A convex polytope in general position, with its corners and edges by the facets that make them.
+//
+// In:  a convex hull whose facets may be coplanar, or meet in a corner by more than three.
+// Out: the polytope of its facet planes, each moved out by one to two times a tiny distance, all by different amounts:
+//      three facets meet in every corner, and no plane passes through a point that lay on the hull.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/geometry.hpp"
+
+namespace rlacd {
+
+struct Polytope {
+  struct Edge {
+    std::int32_t left, right;  // facets, left < right
+    std::int32_t from, to;     // corners, counter-clockwise around the left facet
+  };
+  std::vector<HalfSpace> facets;
+  std::vector<Vec3> corners;
+  std::vector<Edge> edges;
+  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> edge_between;
+};
+
+// Nothing if rounding leaves no such polytope.
+std::optional<Polytope> in_general_position(const Mesh& hull, double nudge);
+
+}  // namespace rlacd
