@@ -213,7 +213,7 @@ class DQN:
         target = self.targets(batch)
         loss = bellman_loss(self.network(batch["features"]), batch["planes"], target)
         self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         self.optimizer.step()
         self.updates += 1
         if self.returns:
