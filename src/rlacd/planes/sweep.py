@@ -191,3 +191,11 @@ def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
         if valid.any():
             break
     return valid
+
+
+def distinct_planes(component: Component, candidates: Candidates) -> BoolArray:
+    """`valid_planes`, each once: principal axes that are coordinate axes repeat the planes of those."""
+    directions = candidates.directions
+    first = (directions[:, None] == directions).all(axis=2).argmax(axis=1) == np.arange(len(directions))
+    distinct: BoolArray = valid_planes(component, candidates) & np.repeat(first, candidates.offsets.shape[1])
+    return distinct

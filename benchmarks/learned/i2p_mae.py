@@ -20,22 +20,20 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from benchmarks.learned.point_groups import farthest_points, gather, nearest_points
+from rlacd import _native
 from rlacd.errors import OptionError, WeightsError
-from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
+from rlacd.policies.plane_features import PLANES
+from rlacd.solid.arrays import Float32Array
+from rlacd.solid.component import Component
 
 
 @dataclass(frozen=True)
 class Sizes:
     """The sizes of the pyramid, finest scale first; the defaults are those of the published checkpoint.
 
-    Attributes
-    ----------
-    groups, neighbors, widths : tuple of int
-        Per scale: number of point groups, members of each, and channels of its token.
-    depth, heads : int
-        Transformer blocks per scale, and attention heads of each.
-    embedding : int
-        Channels of a point within its group, before the group is pooled into a token.
+    Per scale: number of point groups, members of each, and channels of its token; transformer blocks per scale and
+    their attention heads; `embedding` is the channels of a point before its group is pooled into a token.
     """
 
     groups: tuple[int, ...] = (512, 256, 64)
@@ -136,13 +134,8 @@ class GroupEmbedding(nn.Module):
 class Scale:
     """The point groups of one scale.
 
-    Attributes
-    ----------
-    centers : float32 [B, G, 3]
-    members : int64 [B, G, K]
-        Indices of the nearest centres of the previous scale (of points, for the first).
-    offsets : float32 [B, G, K, 3]
-        Positions relative to the centre.
+    `centers` float32 [B, G, 3]; `members` int64 [B, G, K], the nearest centres of the previous scale (points, for the
+    first), and their `offsets` from the centre float32 [B, G, K, 3].
     """
 
     centers: Tensor
@@ -153,9 +146,8 @@ class Scale:
 def seen_below(scales: list[Scale], top: Tensor) -> list[Tensor]:
     """Tell for every scale which groups are seen, 1 or 0 [B, G], given those of the last scale.
 
-    A group is seen if it is a member of a seen group of the next scale; the others are masked in attention. All groups
-    of the last scale are seen, but occasionally a group of a finer scale belongs to no group: the published weights
-    were never trained on it.
+    A group is seen if it is a member of a seen group of the next scale; the others are masked in attention: the
+    published weights were never trained on a group that belongs to no other.
     """
     seen = [top]
     for below, above in pairwise(reversed(scales)):
@@ -206,13 +198,7 @@ class HierarchicalEncoder(nn.Module):
 
 
 class I2PMAEEncoder(nn.Module):
-    """The frozen encoder: 384 features of a component and 384 of its hull.
-
-    Parameters
-    ----------
-    sizes : Sizes, optional
-        As published by default.
-    """
+    """The frozen encoder: 384 features of a component and 384 of its hull, with the published sizes."""
 
     def __init__(self, sizes: Sizes | None = None) -> None:
         super().__init__()
@@ -223,15 +209,7 @@ class I2PMAEEncoder(nn.Module):
 
     @classmethod
     def from_checkpoint(cls, path: str | Path) -> I2PMAEEncoder:
-        """Read the published checkpoint.
-
-        Only tensors are read, never arbitrary pickle; anything else in the file is ignored.
-
-        Raises
-        ------
-        WeightsError
-            The file is missing, damaged, or for another encoder; the message names the first missing parameter.
-        """
+        """Read the published checkpoint (see `load_weights`): tensors only, never arbitrary pickle."""
         encoder = cls()
         encoder.load_state_dict(load_weights(Path(path), encoder.state_dict()))
         return encoder
@@ -243,28 +221,17 @@ class I2PMAEEncoder(nn.Module):
         return tokens.amax(dim=1)
 
     def require_points(self, count: int) -> None:
-        """Check that clouds of `count` points can be grouped.
-
-        Raises
-        ------
-        OptionError
-            `count` is too small.
-        """
+        """Raise OptionError if clouds of `count` points cannot be grouped."""
         if count < self.sizes.groups[0]:
-            raise OptionError(f"{count} points; this encoder needs at least {self.sizes.groups[0]} (--points).")
+            raise OptionError(f"{count} points; this encoder needs at least {self.sizes.groups[0]}.")
 
     def encode(self, points: Tensor) -> Tensor:
-        """Features [B, 768] of components by points [B, 2, N, 3] of their surface and their hull's, on the CPU.
+        """Features [768], on the CPU, of a component by points [2, N, 3] of its surface and its hull's.
 
-        Component and hull are scaled together into the unit ball, as the published pretraining does. Each component is
-        encoded alone, so that the others of a call do not affect its bits.
+        Both are scaled together into the unit ball, as the published pretraining does.
         """
-        device = next(self.parameters()).device
-        found = []
-        for pair in points:
-            radius = pair.square().sum(-1).amax().sqrt().clamp_min(1e-12)
-            found.append(self.features((pair / radius).to(device)).reshape(self.dim).cpu())
-        return torch.stack(found)
+        radius = points.square().sum(-1).amax().sqrt().clamp_min(1e-12)
+        return self.features((points / radius).to(next(self.parameters()).device)).reshape(self.dim).cpu()
 
     def digest(self) -> str:
         """Identify sizes and weights, independent of the device and the file they came from."""
@@ -272,6 +239,35 @@ class I2PMAEEncoder(nn.Module):
         for name, value in sorted(self.state_dict().items()):
             found.update(name.encode() + value.cpu().contiguous().numpy().tobytes())
         return found.hexdigest()
+
+
+class PublishedEncoder:
+    """What the paper's network sees (3.3): I2P-MAE of the component's surface and of its hull's; an `Encoder`."""
+
+    def __init__(self, network: I2PMAEEncoder, points: int = 2048) -> None:
+        network.require_points(points)
+        self.dim, self.outputs, self.digest = network.dim, PLANES, network.digest()
+        self._network, self._points = network, points
+
+    def describe(self, component: Component) -> Float32Array:
+        """Features [768]."""
+        points = torch.from_numpy(surface_points(component, self._points))
+        network = self._network.to("cuda" if torch.cuda.is_available() else "cpu")
+        with torch.inference_mode():
+            features: Float32Array = network.encode(points).numpy()
+        return features
+
+
+def surface_points(component: Component, count: int) -> Float32Array:
+    """Points on the surfaces of a component and of its hull [2, count, 3]; box centred, longest side 2.
+
+    The same component gives the same points.
+    """
+    lower, upper = component.box
+    shapes = (component, component.hull)
+    points = np.stack([_native.sample_surface(shape.vertices, shape.faces, count, 0)[0] for shape in shapes])
+    seen: Float32Array = ((points - (lower + upper) / 2) / (float((upper - lower).max()) / 2)).astype(np.float32)
+    return seen
 
 
 def _shared_mlp(inputs: int, inner: int, outputs: int) -> nn.Sequential:
@@ -288,6 +284,8 @@ def _rest(mlp: nn.Sequential, hidden: Tensor) -> Tensor:
     """Apply the layers of a shared MLP after the first."""
     return F.linear(F.relu(mlp[1](hidden), inplace=True), *_matrix(mlp[3]))
 
+
+PUBLISHED = "https://github.com/ZrrSkywalker/I2P-MAE"
 
 WRAPPERS = ("base_model", "model", "state_dict")
 """Keys under which checkpoints keep the state; the published one uses the first."""
@@ -309,7 +307,7 @@ def load_weights(path: Path, expected: Mapping[str, Tensor]) -> dict[str, Tensor
         another shape, or is not finite.
     """
     if not path.is_file():
-        raise WeightsError(f"there is no file {path}; give the file of weights as --encoder-weights.")
+        raise WeightsError(f"there is no file {path}; give the pre-trained checkpoint that {PUBLISHED} links to.")
     try:
         state = {name.removeprefix("module."): value for name, value in _read(path).items()}
     except (pickle.UnpicklingError, RuntimeError, ValueError, EOFError, KeyError, OSError) as error:

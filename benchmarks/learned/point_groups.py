@@ -12,18 +12,9 @@ from torch import Tensor
 
 
 def farthest_points(points: Tensor, count: int) -> Tensor:
-    """Farthest-point sampling: take the first point, then repeatedly the one farthest from those chosen.
+    """Farthest-point sampling of points [B, N, 3]: the first, then repeatedly the one farthest from those chosen.
 
-    Parameters
-    ----------
-    points : float32 [B, N, 3]
-    count : int
-        Between 1 and N.
-
-    Returns
-    -------
-    int64 [B, count]
-        Indices; ties go to the first point.
+    Returns their indices, int64 [B, count]; ties go to the first point.
     """
     axes = points.permute(2, 0, 1).contiguous()  # [3, B, N]
     last = torch.zeros(1, points.shape[0], 1, dtype=torch.long, device=points.device)
