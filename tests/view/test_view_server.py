@@ -233,7 +233,7 @@ def test_the_input_is_there_before_any_hull(mesh: Path) -> None:
         scene = ask(viewer, "GET", "/scene").json
         go.set()
         assert (scene["report"], scene["parts"], scene["name"]) == (None, [], NAME)
-        assert scene["input"]["faces"]
+        assert scene["input"][0]["faces"]
         assert scene["scale"] == pytest.approx(1.0)
         settled(viewer, run=1)
 

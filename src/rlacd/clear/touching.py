@@ -5,8 +5,8 @@ The hulls of a body hold its surface, so bodies whose hulls are apart need no te
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -72,7 +72,7 @@ def check(
     bodies: Sequence[Body],
     motion: Motion,
     pairs: Collection[tuple[int, int]] | None = None,
-    known: dict[tuple[int, int, bytes], bool] | None = None,
+    known: Known | None = None,
 ) -> dict[tuple[int, int], Touching]:
     """Find the pairs of bodies whose hulls touch at some sample, by the numbers of the two, the lower first.
 
@@ -83,8 +83,8 @@ def check(
     motion : Motion
     pairs : collection of (int, int), optional
         Look at no others.
-    known : dict, optional
-        Keeps which bodies touch, for other hulls of the same bodies.
+    known : Known, optional
+        Keeps what another check of these bodies, with the same hulls or others, needs again.
 
     Raises
     ------
@@ -98,6 +98,7 @@ def check(
     boxes = np.stack([bodies[i].box for i in filled])
     placed = placed_boxes(boxes, motion.poses[:, filled])
     size = size_of(bodies, motion)
+    known = known or Known()
     shapes = {i: Shapes(bodies[i], known) for i in filled}
     near, numbers = overlapping(placed), np.array(filled)
     near[:, 1:] = numbers[near[:, 1:]]
@@ -178,29 +179,52 @@ def _depth(first: Any, second: Any, pose: FloatArray) -> float:
     return max(0.0, -float(result.getContact(0).penetration_depth))
 
 
-class Shapes:
-    """A body as coal's shapes, made when first needed; `known` keeps which bodies touch."""
+@dataclass(frozen=True)
+class Known:
+    """What checks of the same bodies share.
 
-    def __init__(self, body: Body, known: dict[tuple[int, int, bytes], bool] | None = None) -> None:
-        self.body, self._known = body, {} if known is None else known
+    Attributes
+    ----------
+    meets : dict
+        Whether two bodies touch, by their surfaces' numbers and the pose of the second.
+    shapes : dict
+        coal's shapes, by their surfaces' numbers; with the surfaces, so that these numbers stay theirs.
+    """
+
+    meets: dict[tuple[int, int, bytes], bool] = field(default_factory=dict)
+    shapes: dict[int, tuple[Surface, Any]] = field(default_factory=dict)
+
+    def shape(self, surface: Surface, make: Callable[[Surface], Any]) -> Any:
+        """A surface as a shape."""
+        key = id(surface[0])
+        if key not in self.shapes:
+            self.shapes[key] = surface, make(surface)
+        return self.shapes[key][1]
+
+
+class Shapes:
+    """A body as coal's shapes, made when first needed."""
+
+    def __init__(self, body: Body, known: Known) -> None:
+        self.body, self._known = body, known
         self.boxes = np.stack([np.stack([v.min(axis=0), v.max(axis=0)]) for v, _ in body.hulls])
 
     @cached_property
     def mesh(self) -> Any:
         """The surface as it was read."""
-        return _mesh(self.body.mesh)
+        return self._known.shape(self.body.mesh, _mesh)
 
     @cached_property
     def hulls(self) -> list[Any]:
         """The hulls as convex polytopes."""
-        return [_convex(hull) for hull in self.body.hulls]
+        return [self._known.shape(hull, _convex) for hull in self.body.hulls]
 
     def meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
         """Whether the bodies are within reach of each other, the other seen at a pose, or one holds the other."""
         key = id(self.body.mesh[0]), id(other.body.mesh[0]), pose.tobytes()
-        if key not in self._known:
-            self._known[key] = self._meets(other, pose, reach)
-        return self._known[key]
+        if key not in self._known.meets:
+            self._known.meets[key] = self._meets(other, pose, reach)
+        return self._known.meets[key]
 
     def _meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
         coal = import_extra("coal", "", "clear")

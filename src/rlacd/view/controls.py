@@ -75,6 +75,8 @@ class Subject:
         The mesh as first read.
     up_is_guess : bool
         Whether the file does not say which axis points up.
+    is_robot : bool
+        Whether it is a robot, which becomes a robot.
     """
 
     path: Path
@@ -83,6 +85,7 @@ class Subject:
     unit: str
     mesh: InputMesh
     up_is_guess: bool = False
+    is_robot: bool = False
 
 
 def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject:
@@ -114,14 +117,15 @@ def guessed_up(mesh: InputMesh) -> Axis:
     return "y" if stands[1] and not stands[2] else "z"
 
 
-def as_command(mesh: str | os.PathLike[str], controls: dict[str, Any]) -> str:
+def as_command(subject: Subject, mesh: str | os.PathLike[str], controls: dict[str, Any]) -> str:
     """Write ``rlacd decompose`` with the options set on the page: one line, quoted for a POSIX shell."""
     others = _NUMBERS - {*CRITERIA[controls["criterion"]]}
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for name, value in controls.items():
         if name not in others and value not in (None, CONTROLS[name]):
             words += [f"--{name.removeprefix('volume_').replace('_', '-')}", _word(value)]
-    return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls.glb"])
+    ending = Path(mesh).suffix if subject.is_robot else ".glb"
+    return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls{ending}"])
 
 
 def _word(value: Any) -> str:

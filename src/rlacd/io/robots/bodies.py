@@ -157,7 +157,13 @@ class Body:
     def hulls(self, results: Mapping[Collider, Decomposition]) -> list[trimesh.Trimesh]:
         """The hulls in their place, in the body's frame; `results` are in those of the colliders."""
         each = [(collider.meshes[0].to_body, hull) for collider in self.colliders for hull in results[collider].hulls]
-        return [trimesh.Trimesh(*_turned(pose, hull.vertices, hull.faces), process=False) for pose, hull in each]
+        return [trimesh.Trimesh(*turned(pose, hull.vertices, hull.faces), process=False) for pose, hull in each]
+
+
+def placed(bodies: Sequence[Body], poses: Sequence[FloatArray]) -> list[trimesh.Trimesh]:
+    """The meshes of bodies where poses put them."""
+    meshes = [(pose, body.mesh()) for body, pose in zip(bodies, poses, strict=True)]
+    return [trimesh.Trimesh(*turned(pose, mesh.vertices, mesh.faces), process=False) for pose, mesh in meshes]
 
 
 def size_of(bodies: Sequence[Body]) -> float:
@@ -175,12 +181,12 @@ def _used(mesh: trimesh.Trimesh) -> FloatArray:
 
 
 def _joined(meshes: Sequence[PlacedMesh], poses: Sequence[FloatArray]) -> trimesh.Trimesh:
-    parts = [_turned(pose, mesh.points, mesh.faces) for mesh, pose in zip(meshes, poses, strict=True)]
+    parts = [turned(pose, mesh.points, mesh.faces) for mesh, pose in zip(meshes, poses, strict=True)]
     begins = np.cumsum([0, *(len(points) for points, _ in parts)])
     faces = [faces + begin for (_, faces), begin in zip(parts, begins, strict=False)]
     return trimesh.Trimesh(np.concatenate([points for points, _ in parts]), np.concatenate(faces), process=False)
 
 
-def _turned(pose: FloatArray, points: FloatArray, faces: Int64Array) -> tuple[FloatArray, Int64Array]:
+def turned(pose: FloatArray, points: FloatArray, faces: Int64Array) -> tuple[FloatArray, Int64Array]:
     """Points and faces where a pose puts them; those of a USD stage may mirror."""
     return moved(pose, points), faces if np.linalg.det(pose[:3, :3]) > 0 else faces[:, ::-1]

@@ -87,7 +87,7 @@ def relative_to_robot(options: Mapping[str, Any], bodies: Sequence[Body]) -> dic
     if given.setdefault("criterion", "distance") in ("distance", "concavity") and "threshold_abs" not in given:
         share = given.pop("threshold") / LONGEST_SIDE["threshold"] if "threshold" in given else None
         given["threshold_abs"] = float(f"{SHARE * size:.3g}") if share is None else share * size
-    if "overlap" in given and "overlap_abs" not in given:
+    if given.get("overlap") and "overlap_abs" not in given:
         given["overlap_abs"] = given.pop("overlap") * size
     return given
 

@@ -223,6 +223,7 @@ export class Controls {
     this.radius.tell(scene, 2);
     this.tolerance.tell(scene, 2);
     this.overlap.tell(scene, 2);
+    this.criterion.querySelector("input[value=navigable]").disabled = Boolean(scene.robot); // a ball has one size for all
     this.open.hidden = this.options.open === "auto" && !hasOpenBodies(scene);
   }
 
