@@ -82,8 +82,6 @@ class SweepCache:
 
     Parameters
     ----------
-    per_axis : int
-        Planes along each of the six axes.
     concave_edges : int
         Number of concave edges whose planes are added.
     seed : sequence of int, optional
@@ -92,11 +90,9 @@ class SweepCache:
 
     def __init__(
         self,
-        per_axis: int = OFFSETS_PER_AXIS,
         concave_edges: int = EDGES_PER_COMPONENT,
         seed: Sequence[int] | None = None,
     ) -> None:
-        self._per_axis = per_axis
         self._concave_edges = concave_edges
         self._seed = seed
         self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
@@ -108,7 +104,7 @@ class SweepCache:
         return self._once(self._candidates, component, self._planes)
 
     def _planes(self, component: Component) -> Candidates:
-        planes = all_planes(component, self._per_axis, self._concave_edges)
+        planes = all_planes(component, OFFSETS_PER_AXIS, self._concave_edges)
         if self._seed is None:
             return planes
         random = np.random.default_rng([*self._seed, zlib.crc32(component.vertices.tobytes())])
