@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "core/stop.hpp"
+#include "surface/edges.hpp"
 
 namespace rlacd {
 namespace {
@@ -37,16 +37,17 @@ ConvexCollapse::ConvexCollapse(const Mesh& hull, std::vector<Above> bounds, std:
                                double tolerance)
     : bounds_(std::move(bounds)), placed_(std::move(placed)), tolerance_(tolerance) {
   for (const Vec3 point : hull.vertices) add_corner(point);
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> sides;
-  for (const Triangle& face : hull.faces) {
-    const std::int32_t f = new_facet(face[0], face[1], face[2]);
-    for (int i = 0; i < 3; ++i) sides[{face[i], face[(i + 1) % 3]}] = f;
+  for (const Triangle& face : hull.faces) new_facet(face[0], face[1], face[2]);
+  const std::vector<std::uint32_t> mate = mates_of(hull.faces, hull.vertices.size());
+  std::vector<std::pair<std::int32_t, std::int32_t>> edges;
+  for (std::size_t h = 0; h < mate.size(); ++h) {
+    const std::int32_t from = hull.faces[h / 3][h % 3], to = hull.faces[h / 3][(h % 3 + 1) % 3];
+    facets_[h / 3].neighbour[h % 3] = static_cast<std::int32_t>(mate[h] / 3);
+    if (from < to) edges.emplace_back(from, to);
   }
-  for (Facet& facet : facets_)
-    for (int i = 0; i < 3; ++i) facet.neighbour[i] = sides.at({facet.corner[(i + 1) % 3], facet.corner[i]});
+  std::sort(edges.begin(), edges.end());
   for (const std::int32_t f : facet_of_) alive_ += f >= 0;
-  for (const auto& side : sides)
-    if (side.first.first < side.first.second) schedule(side.first.first, side.first.second);
+  for (const auto& [from, to] : edges) schedule(from, to);
 }
 
 std::vector<Vec3> ConvexCollapse::corners() const {

@@ -162,6 +162,7 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   // inradius r: nothing, unless the hull is flat. The inradius is at least volume / area.
   const bool fat = tolerance_ > 0 && volume() > kFat * area() * max_abs(extent_.upper - extent_.lower);
   const auto clearly = [this, fat](const Facet& f, Vec3 p) {
+    if (dot(f.normal, p) - f.offset < -f.error * reach_) return false;  // most facets are clearly not seen
     return (!fat || height(f, p) >= tolerance_ * norm(f.normal)) && sees(f, p);
   };
   for (auto i = first; i < static_cast<std::int32_t>(points_.size()); ++i) {

@@ -15,10 +15,7 @@
 
 namespace rlacd {
 
-struct Above {
-  Vec3 normal;
-  double offset;
-};
+using Above = Plane;  // what lies above it: normal . x >= offset
 
 namespace linear_program {
 

@@ -1,9 +1,13 @@
 #include "convex/polytope.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "convex/convex_planes.hpp"
 #include "convex/hull.hpp"
+#include "surface/edges.hpp"
 
 namespace rlacd {
 
@@ -27,7 +31,6 @@ std::optional<Polytope> in_general_position(const Mesh& hull, double nudge) {
 
   Polytope result;
   for (const std::int32_t i : dual.indices) result.facets.push_back(all[i]);
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> corner_left_of;
   for (std::size_t t = 0; t < dual.faces.size(); ++t) {
     const Triangle& face = dual.faces[t];
     const Vec3 a = duals[dual.indices[face[0]]], b = duals[dual.indices[face[1]]], c = duals[dual.indices[face[2]]];
@@ -35,19 +38,28 @@ std::optional<Polytope> in_general_position(const Mesh& hull, double nudge) {
     const double height = dot(normal, a);
     if (!(height > 0)) return std::nullopt;
     result.corners.push_back(middle + (1 / height) * normal);
-    for (int k = 0; k < 3; ++k) corner_left_of[{face[k], face[(k + 1) % 3]}] = static_cast<std::int32_t>(t);
   }
   // Around facet i (seen from outside) the corners follow each other as the dual's faces do around point i: the corner
   // left of the dual edge i -> j comes after the one right of it.
-  for (const auto& [pair, left] : corner_left_of) {
-    const auto [i, j] = pair;
-    if (i > j) continue;
-    const auto right = corner_left_of.find({j, i});
-    if (right == corner_left_of.end()) return std::nullopt;
-    result.edge_between[pair] = static_cast<std::int32_t>(result.edges.size());
-    result.edges.push_back({i, j, right->second, left});
+  const std::vector<std::uint32_t> mate = mates_of(dual.faces, dual.indices.size());
+  if (mate.empty()) return std::nullopt;
+  for (std::size_t h = 0; h < mate.size(); ++h) {
+    const Triangle& face = dual.faces[h / 3];
+    const std::int32_t i = face[h % 3], j = face[(h % 3 + 1) % 3];
+    if (i < j) result.edges.push_back({i, j, static_cast<std::int32_t>(mate[h] / 3), static_cast<std::int32_t>(h / 3)});
   }
+  std::sort(result.edges.begin(), result.edges.end(), [](const Polytope::Edge& a, const Polytope::Edge& b) {
+    return std::tie(a.left, a.right) < std::tie(b.left, b.right);
+  });
   return result;
+}
+
+std::int32_t Polytope::edge_between(std::int32_t left, std::int32_t right) const {
+  if (left > right) std::swap(left, right);
+  const auto found = std::lower_bound(edges.begin(), edges.end(), std::pair(left, right),
+                                      [](const Edge& e, auto pair) { return std::pair(e.left, e.right) < pair; });
+  const bool is_there = found != edges.end() && found->left == left && found->right == right;
+  return is_there ? static_cast<std::int32_t>(found - edges.begin()) : -1;
 }
 
 }  // namespace rlacd

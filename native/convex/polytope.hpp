@@ -5,9 +5,7 @@
 //      three facets meet in every corner, and no plane passes through a point that lay on the hull.
 #pragma once
 
-#include <map>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "core/geometry.hpp"
@@ -21,8 +19,9 @@ struct Polytope {
   };
   std::vector<HalfSpace> facets;
   std::vector<Vec3> corners;
-  std::vector<Edge> edges;
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> edge_between;
+  std::vector<Edge> edges;  // by their facets, ascending
+
+  std::int32_t edge_between(std::int32_t left, std::int32_t right) const;  // its number, or -1
 };
 
 // Nothing if rounding leaves no such polytope.

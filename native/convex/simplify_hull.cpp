@@ -1,7 +1,6 @@
 #include "convex/simplify_hull.hpp"
 
 #include <array>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -11,6 +10,7 @@
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
 #include "surface/bvh.hpp"
+#include "surface/edges.hpp"
 
 namespace rlacd {
 namespace {
@@ -180,14 +180,13 @@ struct RingEdge {
 
 // The edges opposite to each corner in its facets, with what lies across them.
 std::vector<std::vector<RingEdge>> rings(const Mesh& mesh) {
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> opposite;
-  for (const Triangle& face : mesh.faces)
-    for (int i = 0; i < 3; ++i) opposite[{face[i], face[(i + 1) % 3]}] = face[(i + 2) % 3];
+  const std::vector<std::uint32_t> mate = mates_of(mesh.faces, mesh.vertices.size());
   std::vector<std::vector<RingEdge>> around(mesh.vertices.size());
-  for (const Triangle& face : mesh.faces)
-    for (int i = 0; i < 3; ++i) {
-      const std::int32_t from = face[(i + 1) % 3], to = face[(i + 2) % 3];
-      around[face[i]].push_back({from, to, opposite.at({to, from})});
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Triangle& face = mesh.faces[f];
+      const std::uint32_t across = mate[3 * f + (i + 1) % 3];
+      around[face[i]].push_back({face[(i + 1) % 3], face[(i + 2) % 3], mesh.faces[across / 3][(across + 2) % 3]});
     }
   return around;
 }

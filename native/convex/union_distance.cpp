@@ -28,35 +28,29 @@ constexpr double kSameWay = 0.5;
 // Corners this close to a plane count as on it: no clipped polygon is thinner than rounding.
 constexpr double kOnPlane = 1e-12;
 
-// The facet planes of a convex polytope, each offset along its normal: the points with n_i . x <= offset_i for all i.
-struct HalfSpaces {
-  explicit HalfSpaces(const ConvexPlanes& facets) : planes(&facets), offset(facets.offsets()) {}
-
-  const ConvexPlanes* planes;
-  std::vector<double> offset;  // padded like the planes
-};
+using Offsets = std::vector<double>;  // of facet planes, instead of their own, and padded like those
 
 // Keeps only its buffers between calls: many small polygons would otherwise allocate them again and again.
 class Clipper {
  public:
-  // Replaces every polygon by its part outside the intersection of half-spaces. A polygon that does not meet the
-  // intersection stays whole.
-  void subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex);
+  // Replaces every polygon by its part outside the convex polytope of the planes with these offsets. A polygon that
+  // does not meet it stays whole.
+  void subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets);
 
  private:
   // Whether a single half-space shows that a polygon does not reach into the intersection; if not, the planes that the
   // polygon crosses are stored in `crossed_`.
-  bool is_separated(const Polygon& polygon, const HalfSpaces& convex);
+  bool is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets);
 
   std::vector<std::int32_t> crossed_;
   std::vector<Polygon> left_, cut_off_;
   Polygon rest_, inside_, outside_;
 };
 
-void Clipper::subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex) {
+void Clipper::subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets) {
   left_.clear();
   for (Polygon& polygon : polygons) {
-    if (is_separated(polygon, convex)) {
+    if (is_separated(polygon, planes, offsets)) {
       left_.push_back(std::move(polygon));
       continue;
     }
@@ -64,8 +58,8 @@ void Clipper::subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex)
     rest_ = polygon;
     auto lies = Lies::kBelow;
     for (std::size_t k = 0; k < crossed_.size() && lies != Lies::kAbove; ++k) {
-      const Vec3 normal = convex.planes->normal(crossed_[k]);
-      const auto height = [normal, offset = convex.offset[crossed_[k]]](Vec3 p) {
+      const Vec3 normal = planes.normal(crossed_[k]);
+      const auto height = [normal, offset = offsets[crossed_[k]]](Vec3 p) {
         const double h = dot(normal, p) - offset;
         return std::fabs(h) <= kOnPlane ? 0.0 : h;
       };
@@ -82,18 +76,18 @@ void Clipper::subtract(std::vector<Polygon>& polygons, const HalfSpaces& convex)
   polygons.swap(left_);
 }
 
-RLACD_WIDE bool Clipper::is_separated(const Polygon& polygon, const HalfSpaces& convex) {
+RLACD_WIDE bool Clipper::is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets) {
   constexpr std::size_t kBlock = ConvexPlanes::kBlock;
-  const double *x = convex.planes->x(), *y = convex.planes->y(), *z = convex.planes->z();
+  const double *x = planes.x(), *y = planes.y(), *z = planes.z();
   crossed_.clear();
-  for (std::size_t start = 0; start < convex.planes->size(); start += kBlock) {
+  for (std::size_t start = 0; start < planes.size(); start += kBlock) {
     double least[kBlock], most[kBlock];  // heights of the corners above each plane
     std::fill(least, least + kBlock, std::numeric_limits<double>::infinity());
     std::fill(most, most + kBlock, -std::numeric_limits<double>::infinity());
     for (const Vec3 p : polygon)
       for (std::size_t i = 0; i < kBlock; ++i) {
         const std::size_t k = start + i;
-        const double height = x[k] * p.x + y[k] * p.y + z[k] * p.z - convex.offset[k];
+        const double height = x[k] * p.x + y[k] * p.y + z[k] * p.z - offsets[k];
         least[i] = least[i] < height ? least[i] : height;
         most[i] = most[i] > height ? most[i] : height;
       }
@@ -191,12 +185,12 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
         // covered. If it faces the same way, the hull is shrunk by less than that: of two facets in one plane neither
         // covers the other, and of two hulls on both sides of a plane across this facet one always covers it.
         const ConvexPlanes& planes = members_[m]->planes();
-        HalfSpaces halves(planes);
-        for (std::size_t i = 0; i < halves.offset.size(); ++i) {
+        Offsets offsets = planes.offsets();
+        for (std::size_t i = 0; i < offsets.size(); ++i) {
           const double same_way = planes.x()[i] * normal.x + planes.y()[i] * normal.y + planes.z()[i] * normal.z;
-          halves.offset[i] += same_way >= kSameWay ? -0.25 * gap : gap;
+          offsets[i] += same_way >= kSameWay ? -0.25 * gap : gap;
         }
-        clipper.subtract(facet.pieces, halves);
+        clipper.subtract(facet.pieces, planes, offsets);
         if (facet.pieces.size() > kMostPieces) {
           facet.resolved = false;
           break;
@@ -254,10 +248,9 @@ std::vector<char> HullUnion::held_faces(const Mesh& surface, int threads) const 
 
 Greatest HullUnion::under(const Mesh& surface, double tolerance, int threads) const {
   if (members_.empty()) return {{kInfinity, kInfinity}, {}};
-  std::vector<HalfSpaces> grown;
-  for (const auto& member : members_) {
-    for (double& offset : grown.emplace_back(member->planes()).offset) offset += kInsideSlack;
-  }
+  std::vector<Offsets> grown;
+  for (const auto& member : members_)
+    for (double& offset : grown.emplace_back(member->planes().offsets())) offset += kInsideSlack;
 
   constexpr std::size_t kChunk = 64;
   const auto for_each = [threads](std::size_t count, const auto& task) {
@@ -277,7 +270,7 @@ Greatest HullUnion::under(const Mesh& surface, double tolerance, int threads) co
     for (std::size_t m = 0; m < members_.size(); ++m) {
       if (!box.meets(members_[m]->box(), kInsideSlack)) continue;
       if (outside[f].size() > kMostPieces) break;  // uncut pieces are not wrong here, only more work
-      clipper.subtract(outside[f], grown[m]);
+      clipper.subtract(outside[f], members_[m]->planes(), grown[m]);
     }
   });
 

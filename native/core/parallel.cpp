@@ -28,11 +28,7 @@ class Loop {
   double work() {
     const ThisStop same(stop_);
     const double begun = thread_seconds();
-    for (std::size_t i; (i = next_.fetch_add(1)) < count_;)
-      attempt([&] {
-        poll_stop();
-        task_(i);
-      });
+    for (std::size_t i; (i = next_.fetch_add(1)) < count_;) attempt([&] { task_(i); });
     return thread_seconds() - begun;
   }
 

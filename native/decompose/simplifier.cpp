@@ -131,17 +131,15 @@ void Simplifier::sweep(std::size_t count, int threads) {
 // The cheapest edges, about one in `kOneIn`, as the corner 3 f + k they start from.
 std::vector<std::int32_t> Simplifier::cheap_edges(int threads) const {
   std::vector<std::uint16_t> ranks(3 * faces_.size(), kRanks);  // of the edges, by corner
-  const std::size_t chunks = (faces_.size() + kChunk - 1) / kChunk;
-  parallel_for(chunks, threads, [&](std::size_t chunk) {
-    for (std::size_t f = chunk * kChunk; f < std::min(faces_.size(), (chunk + 1) * kChunk); ++f) {
-      if (place_[f] < 0) continue;
-      const Triangle& face = faces_[f];
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::int32_t from = face[k], to = face[(k + 1) % 3];
-        if (from < to) ranks[3 * f + k] = rank_of(priced(from, to).cost);
-      }
+  const auto set_ranks = [&](std::size_t f) {
+    if (place_[f] < 0) return;
+    const Triangle& face = faces_[f];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::int32_t from = face[k], to = face[(k + 1) % 3];
+      if (from < to) ranks[3 * f + k] = rank_of(priced(from, to).cost);
     }
-  });
+  };
+  parallel_for(faces_.size(), threads, set_ranks, kChunk);
   std::vector<std::size_t> of_rank(kRanks + 1, 0);
   for (const std::uint16_t rank : ranks) ++of_rank[rank];
   std::size_t wanted = (ranks.size() - of_rank[kRanks]) / kOneIn, dearest = 0;

@@ -186,18 +186,17 @@ class Spreading {
     for (std::size_t i = 0; i < count; ++i) wanted[i] = !is_inside(grid_.boundary[i].cell, reach);
     const Meeting meeting(grid_);
     std::vector<Candidate> all(2 * count);
-    parallel_for((count + kChunk - 1) / kChunk, threads_, [&](std::size_t chunk) {
-      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
-        if (!wanted[i]) continue;
-        const ClearanceGrid::Crossed& crossed = grid_.boundary[i];
-        const ClearanceGrid::Crossed* other = meeting.at(crossed);
-        if (crossed.room.value >= field_.level())
-          all[2 * i] = down_from(crossed);
-        else if (other != nullptr)  // otherwise a cell above the level gives the same position
-          all[2 * i] = up_from(crossed, *other, false);
-        if (other != nullptr) all[2 * i + 1] = up_from(crossed, *other, true);
-      }
-    });
+    const auto find = [&](std::size_t i) {
+      if (!wanted[i]) return;
+      const ClearanceGrid::Crossed& crossed = grid_.boundary[i];
+      const ClearanceGrid::Crossed* other = meeting.at(crossed);
+      if (crossed.room.value >= field_.level())
+        all[2 * i] = down_from(crossed);
+      else if (other != nullptr)  // otherwise a cell above the level gives the same position
+        all[2 * i] = up_from(crossed, *other, false);
+      if (other != nullptr) all[2 * i + 1] = up_from(crossed, *other, true);
+    };
+    parallel_for(count, threads_, find, kChunk);
     all.erase(std::remove_if(all.begin(), all.end(), [](const Candidate& c) { return !(c.radius > 0); }), all.end());
     return all;
   }

@@ -30,7 +30,7 @@ namespace {
 
 struct RimRegion {
   int winding;                                    // never 0
-  std::vector<std::vector<std::int32_t>> rims;    // loops of vertices
+  Loops rims;                                     // loops of vertices
   std::vector<std::vector<PlanePoint>> outlines;  // the same as points
 };
 
@@ -76,9 +76,12 @@ class Tangle {
     if (!find_crossings()) return std::nullopt;
     insert_crossings();
     split_faces();
+    std::vector<PlanePoint> ends;
+    for (std::size_t node = 0; node < point_.size(); ++node)
+      ends.insert(ends.end(), {point_[node], point_[follower_[node]]});
     std::map<int, RimRegion> regions;
     for (std::vector<std::size_t>& loop : loops()) {
-      const int left = winding_left_of(loop);
+      const int left = left_of(loop, ends);
       add(loop, left, regions);
       std::reverse(loop.begin(), loop.end());
       add(loop, left - 1, regions);
@@ -219,22 +222,12 @@ class Tangle {
     return found;
   }
 
-  // How often the rims run around the points to the left of a loop, by a ray to +x from its steepest edge.
-  int winding_left_of(const std::vector<std::size_t>& loop) const {
+  // How often the rims run around the points to the left of a loop.
+  int left_of(const std::vector<std::size_t>& loop, const std::vector<PlanePoint>& ends) const {
     poll_stop();
-    const auto rise = [&](std::size_t node) { return point_[follower_[node]][1] - point_[node][1]; };
-    const std::size_t own = *std::max_element(loop.begin(), loop.end(), [&](std::size_t a, std::size_t b) {
-      return std::fabs(rise(a)) < std::fabs(rise(b));
-    });
-    const PlanePoint a = point_[own], b = point_[follower_[own]];
-    const double x = 0.5 * (a[0] + b[0]), y = 0.5 * (a[1] + b[1]);
-    int winding = rise(own) > 0 ? 1 : 0;  // the ray from a point to the left crosses the edge itself
-    for (std::size_t node = 0; node < point_.size(); ++node) {
-      const PlanePoint p = point_[node], q = point_[follower_[node]];
-      if (node == own || (p[1] > y) == (q[1] > y)) continue;
-      if (p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0]) > x) winding += q[1] > p[1] ? 1 : -1;
-    }
-    return winding;
+    const auto rise = [&](std::size_t node) { return std::fabs(ends[2 * node + 1][1] - ends[2 * node][1]); };
+    const auto flatter = [&](std::size_t a, std::size_t b) { return rise(a) < rise(b); };
+    return winding_left_of(ends, *std::max_element(loop.begin(), loop.end(), flatter));
   }
 
   struct Crossing {
@@ -258,10 +251,9 @@ std::optional<UncrossedSide> uncross(OpenSide side, const std::vector<std::vecto
   return Tangle(std::move(side), outlines).uncrossed();
 }
 
-using Rims = std::vector<std::vector<std::int32_t>>;
 using Outlines = std::vector<std::vector<PlanePoint>>;
 
-Outlines outlines_of(const std::vector<Vec3>& vertices, const Rims& rims, Vec3 outward) {
+Outlines outlines_of(const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward) {
   Outlines outlines;
   for (const std::vector<std::int32_t>& rim : rims) {
     std::vector<Vec3> points;
@@ -280,7 +272,7 @@ std::vector<Item> joined(const std::vector<std::vector<Item>>& loops) {
   return all;
 }
 
-void append(std::vector<Triangle>& faces, const Rims& rims, const Outlines& outlines, int times, CapArea* area) {
+void append(std::vector<Triangle>& faces, const Loops& rims, const Outlines& outlines, int times, CapArea* area) {
   const std::vector<std::int32_t> vertex = joined(rims);
   const std::vector<PlanePoint> point = joined(outlines);
   for (const Triangle& t : triangulate(outlines, vertex)) {
@@ -297,7 +289,7 @@ void append(std::vector<Triangle>& faces, const Rims& rims, const Outlines& outl
 
 }  // namespace
 
-void add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices, const Rims& rims, Vec3 outward,
+void add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward,
               CapArea& area) {
   append(faces, rims, outlines_of(vertices, rims, outward), 1, &area);
 }

@@ -19,8 +19,8 @@ constexpr double kFolded = 1e-2;
 struct CapArea {
   double all = 0, folded = 0;
 };
-void add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices,
-              const std::vector<std::vector<std::int32_t>>& rims, Vec3 outward, CapArea& area);
+void add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward,
+              CapArea& area);
 
 // New vertices, one for each crossing of rims that were taken apart, follow the others.
 Mesh capped(OpenSide side, Vec3 outward);

@@ -162,18 +162,18 @@ class Clip {
       const std::size_t before = (k + polygon_.size() - 1) % polygon_.size(), next = (k + 1) % polygon_.size();
       const std::int32_t facet = polygon_[k].side, last = polygon_[before].side;
       if (facet < 0) continue;
-      paths_[facet].emplace_back(numbers_[next], numbers_[k]);  // the cap lies on the other side
+      paths_[facet].push_back({numbers_[next], numbers_[k]});  // the cap lies on the other side
       if (last < 0) continue;
       // The face leaves the facet `last` here. Its cap's rim comes along the edge between the two to this corner, where
       // it enters the face's path: what is inside the solid ends here for who goes around `last`.
-      const auto found = polytope_.edge_between.find(std::minmax(last, facet));
-      if (found == polytope_.edge_between.end()) {
+      const std::int32_t between = polytope_.edge_between(last, facet);
+      if (between < 0) {
         is_contradictory_ = true;
         continue;
       }
-      const Polytope::Edge& edge = polytope_.edges[found->second];
+      const Polytope::Edge& edge = polytope_.edges[between];
       const Vec3 from = polytope_.corners[edge.from], to = polytope_.corners[edge.to];
-      Crossings& own = crossings_[found->second];
+      Crossings& own = crossings_[between];
       (last == edge.left ? own.exits : own.entries).push_back({dot(polygon_[k].point - from, to - from), numbers_[k]});
     }
   }
@@ -279,8 +279,8 @@ class Clip {
       std::sort(own.entries.begin(), own.entries.end(), before);
       std::sort(own.exits.begin(), own.exits.end(), before);
       for (std::size_t k = 0; k < own.entries.size(); ++k) {
-        paths_[edge.left].emplace_back(own.entries[k].vertex, own.exits[k].vertex);
-        paths_[edge.right].emplace_back(own.exits[k].vertex, own.entries[k].vertex);
+        paths_[edge.left].push_back({own.entries[k].vertex, own.exits[k].vertex});
+        paths_[edge.right].push_back({own.exits[k].vertex, own.entries[k].vertex});
       }
     }
     return true;
@@ -290,33 +290,13 @@ class Clip {
   bool link() {
     for (std::size_t i = 0; i < paths_.size(); ++i) {
       auto& paths = paths_[i];
-      paths.erase(
-          std::remove_if(paths.begin(), paths.end(), [](const auto& path) { return path.first == path.second; }),
-          paths.end());
+      paths.erase(std::remove_if(paths.begin(), paths.end(), [](const Edge& path) { return path[0] == path[1]; }),
+                  paths.end());
       if (paths.empty()) continue;
       poll_stop();
-      std::sort(paths.begin(), paths.end());
-      ConvexClip::Section section{polytope_.facets[i].normal, {}};
-      std::vector<char> is_used(paths.size(), 0);
-      const auto leave = [&](std::int32_t vertex) {  // an unused path from a vertex
-        auto at = std::lower_bound(paths.begin(), paths.end(), std::pair(vertex, kOwn));
-        while (at != paths.end() && at->first == vertex && is_used[static_cast<std::size_t>(at - paths.begin())]) ++at;
-        return at != paths.end() && at->first == vertex ? at - paths.begin() : -1;
-      };
-      for (std::size_t start = 0; start < paths.size(); ++start) {
-        if (is_used[start]) continue;
-        std::vector<std::int32_t> loop;
-        auto at = static_cast<std::ptrdiff_t>(start);
-        do {
-          is_used[static_cast<std::size_t>(at)] = 1;
-          loop.push_back(paths[static_cast<std::size_t>(at)].first);
-          const std::int32_t end = paths[static_cast<std::size_t>(at)].second;
-          if (end == loop.front()) break;
-          at = leave(end);
-        } while (at >= 0);
-        if (at < 0) return false;
-        if (loop.size() > 2) section.rims.push_back(std::move(loop));
-      }
+      std::optional<Loops> loops = loops_of(std::move(paths));
+      if (!loops) return false;
+      ConvexClip::Section section{polytope_.facets[i].normal, std::move(*loops)};
       if (section.rims.empty() || fill(section)) continue;
       result_.sections.push_back(std::move(section));
     }
@@ -343,9 +323,9 @@ class Clip {
   const Mesh& solid_;
   const Surface& surface_;
   const Polytope polytope_;
-  std::vector<Crossings> crossings_;                                       // of the polytope's edges
-  std::vector<std::vector<std::pair<std::int32_t, std::int32_t>>> paths_;  // on its facets
-  std::vector<std::int32_t> states_;                                       // how often the solid holds its corners
+  std::vector<Crossings> crossings_;      // of the polytope's edges
+  std::vector<std::vector<Edge>> paths_;  // on its facets
+  std::vector<std::int32_t> states_;      // how often the solid holds its corners
   bool is_contradictory_ = false;
   Group crossing_;  // the facets that cross the nodes on the way from the root, one group after the other
   std::vector<Corner> polygon_, kept_;

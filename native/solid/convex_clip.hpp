@@ -15,14 +15,15 @@
 #include <optional>
 #include <vector>
 
+#include "solid/plane_cut.hpp"
 #include "surface/surface.hpp"
 
 namespace rlacd {
 
 struct ConvexClip {
   struct Section {
-    Vec3 normal;                                  // of the facet, outwards
-    std::vector<std::vector<std::int32_t>> rims;  // loops of vertices, counter-clockwise around what is inside
+    Vec3 normal;  // of the facet, outwards
+    Loops rims;   // counter-clockwise around what is inside
   };
   Mesh mesh;  // without the caps
   std::vector<Section> sections;

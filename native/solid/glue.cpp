@@ -27,15 +27,6 @@ bool is_film(const Outline& p) {
   return doubled_area_of(p) <= kCoincident * std::sqrt(longest2);
 }
 
-// Whether an edge of the triangle has all of a polygon on its right: they share no area.
-bool is_beside(const Outline& p, const std::array<PlanePoint, 3>& triangle) {
-  for (int e = 0; e < 3; ++e)
-    if (std::all_of(p.begin(), p.end(),
-                    [&](PlanePoint q) { return doubled_area(triangle[e], triangle[(e + 1) % 3], q) <= 0; }))
-      return true;
-  return false;
-}
-
 // Keeps what of a polygon lies left of the line through a and b; the rest goes to `right`. False if hardly anything
 // does.
 bool keep_left(Outline& polygon, PlanePoint a, PlanePoint b, Outline& right) {
@@ -55,7 +46,7 @@ void subtract(std::vector<Outline>& polygons, const std::array<PlanePoint, 3>& t
   for (Outline& p : polygons) {
     Outline rest = p;
     std::vector<Outline> pieces;
-    bool overlaps = !is_beside(p, triangle);
+    bool overlaps = true;
     for (int e = 0; e < 3 && overlaps; ++e) {
       overlaps = keep_left(rest, triangle[e], triangle[(e + 1) % 3], right);
       if (!right.empty() && !is_film(right)) pieces.push_back(right);

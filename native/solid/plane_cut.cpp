@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
+#include <utility>
 
 #include "core/elementary.hpp"
 #include "core/invariant.hpp"
@@ -57,7 +58,7 @@ class Cutter {
         faces.push_back({polygon[k], polygon[k + 2], polygon[(k + 3) % 4]});
       }
     }
-    std::vector<std::vector<std::int32_t>> loops = rims(net(std::move(in_plane)), -which);
+    Loops loops = rims(net(std::move(in_plane)), -which);
     straighten(faces, loops);
     return compacted(faces, loops);
   }
@@ -90,39 +91,12 @@ class Cutter {
   }
 
   // Loops against the boundary's edges; outside is where the normal times `up` points.
-  std::vector<std::vector<std::int32_t>> rims(const std::vector<Edge>& boundary, int up) const {
-    std::vector<Edge> edges;  // by their first point
-    edges.reserve(boundary.size());
-    for (const Edge& e : boundary) edges.push_back({e[1], e[0]});
-    std::sort(edges.begin(), edges.end());
-    std::vector<char> is_used(edges.size(), 0);
-    std::vector<std::vector<std::int32_t>> loops;
-    for (std::size_t first = 0; first < edges.size(); ++first) {
-      if (is_used[first]) continue;
-      std::vector<std::int32_t> loop;
-      for (std::size_t edge = first;;) {
-        is_used[edge] = 1;
-        loop.push_back(edges[edge][0]);
-        if (edges[edge][1] == edges[first][0]) break;
-        edge = next(edges, is_used, edges[edge], up);
-      }
-      if (loop.size() > 2) loops.push_back(std::move(loop));
-    }
-    return loops;
-  }
-
-  // Of the edges that continue from the end of an edge, the first one to the left of the way back.
-  std::size_t next(const std::vector<Edge>& edges, const std::vector<char>& is_used, const Edge& edge, int up) const {
-    const auto begin = std::lower_bound(edges.begin(), edges.end(), Edge{edge[1], -1});
-    std::size_t best = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (auto e = begin; e != edges.end() && (*e)[0] == edge[1]; ++e) {
-      const auto i = static_cast<std::size_t>(e - edges.begin());
-      if (is_used[i]) continue;
-      if (const double angle = angle_inside(edge, *e, up); angle < least) least = angle, best = i;
-    }
-    RLACD_ASSERT(std::isfinite(least));  // the boundary of a closed surface's side: as many edges leave as arrive
-    return best;
+  Loops rims(std::vector<Edge> boundary, int up) const {
+    for (Edge& e : boundary) std::swap(e[0], e[1]);
+    std::optional<Loops> loops =
+        loops_of(std::move(boundary), [&](const Edge& before, const Edge& e) { return angle_inside(before, e, up); });
+    RLACD_ASSERT(loops);  // the boundary of a closed surface's side: as many edges leave as arrive
+    return std::move(*loops);
   }
 
   // Angle between an edge and the one before it, on the inside of the loop; in (0, 2 pi].
@@ -135,7 +109,7 @@ class Cutter {
 
   // Removes corners of the rims that lie on a straight line in a flat part of the surface, where its triangles met.
   // They would otherwise accumulate from cut to cut.
-  void straighten(std::vector<Triangle>& faces, std::vector<std::vector<std::int32_t>>& loops) const {
+  void straighten(std::vector<Triangle>& faces, Loops& loops) const {
     std::vector<std::int32_t> times(points_.size(), 0);  // number of times a point is on a rim
     for (const std::vector<std::int32_t>& loop : loops)
       for (const std::int32_t v : loop) ++times[v];
@@ -209,7 +183,7 @@ class Cutter {
     return true;
   }
 
-  OpenSide compacted(const std::vector<Triangle>& faces, const std::vector<std::vector<std::int32_t>>& rims) const {
+  OpenSide compacted(const std::vector<Triangle>& faces, const Loops& rims) const {
     OpenSide out;
     Renumbered numbered(points_, out.mesh.vertices);
     out.mesh.faces.reserve(faces.size());
@@ -244,6 +218,47 @@ std::vector<Edge> net(std::vector<Edge> edges) {
     else
       left.push_back(e);
   return left;
+}
+
+std::optional<Loops> loops_of(std::vector<Edge> edges, const std::function<double(Edge before, Edge next)>& turn) {
+  std::sort(edges.begin(), edges.end());
+  std::vector<char> is_used(edges.size(), 0);
+  Loops loops;
+  for (std::size_t first = 0; first < edges.size(); ++first) {
+    std::vector<std::int32_t> loop;
+    for (std::size_t edge = first; !is_used[edge];) {
+      is_used[edge] = 1;
+      loop.push_back(edges[edge][0]);
+      const std::int32_t at = edges[edge][1];
+      if (at == edges[first][0]) break;
+      std::size_t best = edge;
+      for (auto e = std::lower_bound(edges.begin(), edges.end(), Edge{at, -1}); e != edges.end() && (*e)[0] == at;
+           ++e) {
+        const auto i = static_cast<std::size_t>(e - edges.begin());
+        if (is_used[i]) continue;
+        if (best == edge || (turn && turn(edges[edge], *e) < turn(edges[edge], edges[best]))) best = i;
+      }
+      if (best == edge) return std::nullopt;
+      edge = best;
+    }
+    if (loop.size() > 2) loops.push_back(std::move(loop));
+  }
+  return loops;
+}
+
+int winding_left_of(const std::vector<PlanePoint>& at, std::size_t own) {
+  const PlanePoint a = at[2 * own], b = at[2 * own + 1];
+  const int v = std::fabs(b[1] - a[1]) >= std::fabs(b[0] - a[0]) ? 1 : 0, u = 1 - v;
+  const int sign = v == 1 ? 1 : -1;  // swapping the axes mirrors the plane
+  const double x = (a[u] + b[u]) / 2, y = (a[v] + b[v]) / 2;
+  int winding = sign * (b[v] - a[v]) > 0 ? 1 : 0;
+  for (std::size_t i = 0; 2 * i < at.size(); ++i) {
+    const PlanePoint p = at[2 * i], q = at[2 * i + 1];
+    if (i < own && p == a && q == b) ++winding;  // the same edge again: one after the other, from the right
+    if (i == own || (p[v] > y) == (q[v] > y)) continue;
+    if (p[u] + (y - p[v]) / (q[v] - p[v]) * (q[u] - p[u]) > x) winding += sign * (q[v] > p[v] ? 1 : -1);
+  }
+  return winding;
 }
 
 std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal) {

@@ -11,15 +11,19 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/geometry.hpp"
 
 namespace rlacd {
 
+using Loops = std::vector<std::vector<std::int32_t>>;  // of vertices
+
 struct OpenSide {
   Mesh mesh;
-  std::vector<std::vector<std::int32_t>> rims;  // loops of vertices
+  Loops rims;
 };
 
 using Edge = std::array<std::int32_t, 2>;
@@ -33,8 +37,15 @@ inline std::uint64_t undirected(std::int32_t a, std::int32_t b) { return directe
 // The edges without those that also run the other way, by their ends.
 std::vector<Edge> net(std::vector<Edge> edges);
 
+// Joins edges to loops; nothing if some are open. Where several continue, one is taken with the least turn, the first.
+std::optional<Loops> loops_of(std::vector<Edge> edges, const std::function<double(Edge before, Edge next)>& turn = {});
+
 // Coordinates of points on a plane that preserve orientation as seen against the normal.
 std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal);
+
+// How often edges run around the points to the left of one of them, by a ray across its longer side. Edge i goes from
+// point 2 i to the next.
+int winding_left_of(const std::vector<PlanePoint>& ends, std::size_t own);
 
 // The sides below and above.
 std::array<OpenSide, 2> cut_by_plane(const Mesh& mesh, Vec3 normal, double offset);

@@ -165,52 +165,19 @@ class Reunion {
         sides[left - 1].push_back({rim[i][1], rim[i][0]});
     }
     for (const auto& [times, edges] : sides) {
+      const std::optional<Loops> loops = loops_of(edges);
+      if (!loops) return false;
       std::vector<std::int32_t> vertices;
       std::vector<std::vector<PlanePoint>> outlines;
-      if (!walk(edges, vertices, outlines, normal)) return false;
+      for (const std::vector<std::int32_t>& loop : *loops) {
+        vertices.insert(vertices.end(), loop.begin(), loop.end());
+        std::vector<Vec3> points;
+        for (const std::int32_t v : loop) points.push_back(mesh_.vertices[v]);
+        outlines.push_back(on_plane(points, normal));
+      }
       for (const Triangle& t : triangulate(outlines, vertices))
         caps_.push_back(times > 0 ? Triangle{vertices[t[0]], vertices[t[1]], vertices[t[2]]}
                                   : Triangle{vertices[t[0]], vertices[t[2]], vertices[t[1]]});
-    }
-    return true;
-  }
-
-  // How often the rims run around the points to the left of an edge, by a ray across its longer side.
-  static int winding_left_of(const std::vector<PlanePoint>& at, std::size_t own) {
-    const PlanePoint a = at[2 * own], b = at[2 * own + 1];
-    const int v = std::fabs(b[1] - a[1]) >= std::fabs(b[0] - a[0]) ? 1 : 0, u = 1 - v;
-    const int sign = v == 1 ? 1 : -1;  // swapping the axes mirrors the plane
-    const double x = (a[u] + b[u]) / 2, y = (a[v] + b[v]) / 2;
-    int winding = sign * (b[v] - a[v]) > 0 ? 1 : 0;
-    for (std::size_t i = 0; 2 * i < at.size(); ++i) {
-      const PlanePoint p = at[2 * i], q = at[2 * i + 1];
-      if (i < own && p == a && q == b) ++winding;  // the same edge again: one after the other, from the right
-      if (i == own || (p[v] > y) == (q[v] > y)) continue;
-      if (p[u] + (y - p[v]) / (q[v] - p[v]) * (q[u] - p[u]) > x) winding += sign * (q[v] > p[v] ? 1 : -1);
-    }
-    return winding;
-  }
-
-  // Loops of edges; whether all are closed.
-  bool walk(std::vector<Edge> edges, std::vector<std::int32_t>& vertices,
-            std::vector<std::vector<PlanePoint>>& outlines, Vec3 normal) const {
-    std::sort(edges.begin(), edges.end());
-    std::vector<char> is_used(edges.size(), 0);
-    for (std::size_t first = 0; first < edges.size(); ++first) {
-      std::vector<Vec3> points;
-      for (std::size_t edge = first; !is_used[edge];) {
-        is_used[edge] = 1;
-        vertices.push_back(edges[edge][0]);
-        points.push_back(mesh_.vertices[edges[edge][0]]);
-        const std::int32_t to = edges[edge][1];
-        if (to == edges[first][0]) break;
-        auto next = std::lower_bound(edges.begin(), edges.end(), Edge{to, -1});
-        while (next != edges.end() && (*next)[0] == to && is_used[static_cast<std::size_t>(next - edges.begin())])
-          ++next;
-        if (next == edges.end() || (*next)[0] != to) return false;
-        edge = static_cast<std::size_t>(next - edges.begin());
-      }
-      if (!points.empty()) outlines.push_back(on_plane(points, normal));
     }
     return true;
   }

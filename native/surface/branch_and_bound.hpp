@@ -195,10 +195,7 @@ template <class Field>
 Greatest maximize_in_waves(const Field& field, const Mesh& mesh, double tolerance, int threads) {
   constexpr std::size_t kChunk = 128;
   const auto for_each = [&](std::size_t count, const auto& task) {
-    const std::size_t chunks = (count + kChunk - 1) / kChunk;
-    parallel_for(chunks, chunks < 4 ? 1 : threads, [&](std::size_t chunk) {
-      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i);
-    });
+    parallel_for(count, count <= 3 * kChunk ? 1 : threads, task, kChunk);
   };
 
   Greatest found;

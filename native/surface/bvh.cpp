@@ -270,6 +270,15 @@ Bvh::Hit Bvh::closest(Vec3 p, std::int32_t hint, double enough, double within) c
   return best;
 }
 
+Bvh::Hit Bvh::closest_near(Vec3 p, std::int32_t near) const {
+  constexpr double kSlack = 1e-7;  // of the triangle's longest edge
+  if (near >= 0) {
+    const Hit hit = closest(p, -1, 0, distance(near, p) + kSlack * std::sqrt(triangle(near).longest2));
+    if (hit.slot >= 0) return hit;
+  }
+  return closest(p);
+}
+
 void Bvh::within(Vec3 x, double radius, std::vector<std::int32_t>& found) const {
   const std::size_t before = found.size();
   const double most = radius * radius;

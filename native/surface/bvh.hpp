@@ -94,6 +94,10 @@ class Bvh {
   Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0,
               double within = std::numeric_limits<double>::infinity()) const;
 
+  // The same closest point, found sooner if the triangle of a slot (-1: none is known) is near: its distance bounds the
+  // search, with an allowance for rounding, so that the triangle found is the same without it.
+  Hit closest_near(Vec3 p, std::int32_t near) const;
+
   // Appends the faces whose first corners are at most `radius` away from x, ascending.
   void within(Vec3 x, double radius, std::vector<std::int32_t>& found) const;
 

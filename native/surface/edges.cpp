@@ -14,26 +14,6 @@ namespace rlacd {
 
 namespace {
 
-// The other halfedge along the same edge; empty if there are not always two, in opposite directions.
-std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::size_t vertices) {
-  Buckets<Run> runs = sorted_halfedges(faces, vertices);
-  std::vector<std::uint32_t> mate(3 * faces.size());
-  for (std::size_t v = 0; v < vertices; ++v) {
-    const auto [begin, end] = runs.range(v);
-    if ((end - begin) % 2 != 0) return {};
-    for (const Run* r = begin; r != end; r += 2) {
-      const bool is_pair = r[0].high == r[1].high && (r + 2 == end || r[2].high != r[0].high);
-      const auto low = static_cast<std::int32_t>(v);
-      const bool ascends[2] = {faces[r[0].halfedge / 3][r[0].halfedge % 3] == low,
-                               faces[r[1].halfedge / 3][r[1].halfedge % 3] == low};
-      if (!is_pair || ascends[0] == ascends[1]) return {};
-      mate[r[0].halfedge] = r[1].halfedge;
-      mate[r[1].halfedge] = r[0].halfedge;
-    }
-  }
-  return mate;
-}
-
 std::uint32_t next_of(std::uint32_t halfedge) { return halfedge % 3 == 2 ? halfedge - 2 : halfedge + 1; }
 
 // Whether the faces around each vertex form one fan.
@@ -138,6 +118,25 @@ Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t ve
               [](const Run& a, const Run& b) { return a.high != b.high ? a.high < b.high : a.halfedge < b.halfedge; });
   }
   return runs;
+}
+
+std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::size_t vertices) {
+  Buckets<Run> runs = sorted_halfedges(faces, vertices);
+  std::vector<std::uint32_t> mate(3 * faces.size());
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const auto [begin, end] = runs.range(v);
+    if ((end - begin) % 2 != 0) return {};
+    for (const Run* r = begin; r != end; r += 2) {
+      const bool is_pair = r[0].high == r[1].high && (r + 2 == end || r[2].high != r[0].high);
+      const auto low = static_cast<std::int32_t>(v);
+      const bool ascends[2] = {faces[r[0].halfedge / 3][r[0].halfedge % 3] == low,
+                               faces[r[1].halfedge / 3][r[1].halfedge % 3] == low};
+      if (!is_pair || ascends[0] == ascends[1]) return {};
+      mate[r[0].halfedge] = r[1].halfedge;
+      mate[r[1].halfedge] = r[0].halfedge;
+    }
+  }
+  return mate;
 }
 
 Edges edges_of(const std::vector<Triangle>& faces, std::size_t vertices) {

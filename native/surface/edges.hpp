@@ -44,6 +44,10 @@ struct Run {
 Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t vertices);
 
 // Halfedge 3 f + c runs from corner c of face f to its next corner.
+
+// The other halfedge along the same edge; empty if there are not always two, in opposite directions.
+std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::size_t vertices);
+
 struct Edges {
   std::vector<std::int64_t> of_halfedge;              // [3F]
   std::vector<std::array<std::int64_t, 2>> vertices;  // [E], the smaller first, in ascending order
