@@ -20,12 +20,13 @@ from rlacd.solid.input_mesh import InputMesh
 
 _NAMES = (
     *("criterion", "threshold", "radius", "tolerance", "volume_tolerance", "quality", "primitives"),
-    *("overlap", "keep_open", "open", "max_hulls", "max_vertices", "preset"),
+    *("overlap", "keep_open", "open", "keep_cavities", "max_hulls", "max_vertices", "preset"),
 )
 _USUAL, _SPACE = Options(), NavigableSpace()
 _NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
 
 CONTROLS: dict[str, Any] = {name: getattr(_SPACE if hasattr(_SPACE, name) else _USUAL, name) for name in _NAMES}
+_FLAGS = {name for name, usual in CONTROLS.items() if usual is False}
 CONTROLS["primitives"] = False
 """The page's controls, by the names of options, with their first values."""
 
@@ -123,7 +124,8 @@ def as_command(subject: Subject, mesh: str | os.PathLike[str], controls: dict[st
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for name, value in controls.items():
         if name not in others and value not in (None, CONTROLS[name]):
-            words += [f"--{name.removeprefix('volume_').replace('_', '-')}", _word(value)]
+            flag = f"--{name.removeprefix('volume_').replace('_', '-')}"
+            words += [flag] if name in _FLAGS else [flag, _word(value)]
     ending = Path(mesh).suffix if subject.is_robot else ".glb"
     return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls{ending}"])
 

@@ -72,6 +72,9 @@ const repaired = (report, ...steps) => (report?.repair ?? []).filter(({ step }) 
 /** Whether repair had to decide what is inside. */
 export const hasOpenBodies = ({ report }) => repaired(report, "slab", "wrapped", "capped") > 0;
 
+/** Whether repair filled cavities and said so. */
+export const hasFilledCavities = ({ report }) => (report?.warnings ?? []).some((text) => text.includes("keep_cavities"));
+
 /** What repair made of open bodies, in a sentence, with its explanation. */
 export function notes({ report }) {
   const [shells, wrapped] = [repaired(report, "slab"), repaired(report, "wrapped")];
