@@ -65,4 +65,4 @@ def assert_covers(
         valid.append(Hull(np.asarray(hull.vertices), np.asarray(hull.faces, dtype=np.int32), hull.volume))
     assert valid
     longest = np.ptp(points, axis=0).max()
-    assert hull_distances(valid, points, triangles, tolerance=1e-3 * longest).under[0] <= within * longest / 2
+    assert hull_distances(valid, points, triangles, 1e-3 * longest, floor=0.0).under[0] <= within * longest / 2

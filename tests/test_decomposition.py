@@ -79,7 +79,7 @@ def test_show_opens_a_page_in_the_browser(real: Decomposition, monkeypatch: pyte
 def test_it_describes_itself_in_one_line() -> None:
     cup = result(2)
     faces = sum(len(hull.faces) for hull in cup)
-    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} triangles, max concavity 0.0312>"
+    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} triangles, concavity at most 0.0312>"
     assert "1 hull of" in repr(result(1))
     assert "stopped early by timeout" in repr(result(2, complete=False, stopped_by="timeout"))
     assert repr(Decomposition([], {}, SOURCE)) == "<Decomposition: 0 hulls of mesh, 0 triangles>"

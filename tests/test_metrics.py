@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,13 @@ import trimesh
 from benchmarks.metrics import COVERED, TOLERANCE, Metrics, is_valid, measure
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 
 import rlacd
 from rlacd.errors import OptionError
-from rlacd.finish import report
+from rlacd.fit import fit_words, length_unit
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.solid.distance import hull_distances
-from rlacd.solid.frame import Frame
-from rlacd.solid.hull import Hull
 from tests.shapes import box, dense, from_manifold, point_to_triangles
 
 # The input of most tests: its longest side is 2 and it is centred, so that lengths are the frame's.
@@ -139,19 +138,33 @@ def test_the_report_of_a_decomposition_says_the_same(corpus: Path) -> None:
     assert found.concavity <= result.report["concavity"]["max"] + 2 * TOLERANCE
 
 
-@pytest.mark.parametrize("side", [-1, 1])
-def test_no_warning_is_due_to_how_coarsely_a_report_measures(side: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Near the limit of a warning, distances are measured more finely than the usual interval is wide."""
+@pytest.mark.promise("report-true")
+@pytest.mark.parametrize("how", [{"threshold": 1.0}, {"threshold": 0.1}, {"threshold_abs": 0.1}])
+def test_the_length_that_is_said_is_within_one_per_cent(how: dict[str, float]) -> None:
+    """Against places of the hulls' outer surface, which climb to where it is farthest from the input."""
     ring = trimesh.creation.torus(1, 0.4, major_sections=48, minor_sections=20)
-    result = rlacd.decompose(ring, threshold=1.0, quality="fast", threads=1)
-    frame = Frame.of(ring.vertices)
-    hulls = [hull for part in result if (hull := Hull.of(frame.to_frame(part.vertices)))]
-    surface = frame.to_frame(ring.vertices), np.array(ring.faces, dtype=np.int32)
-    lower, upper = hull_distances(hulls, *surface, threads=1).over
-    least, most = hull_distances(hulls, *surface, 1e-6, threads=1).over
-    assert upper - most > 2e-4, "the usual interval is not wide enough for this test"
-    limit = most + 1.5e-4 if side > 0 else least - 1.5e-4
-    monkeypatch.setattr(report, "COVERAGE_TOLERANCE", limit - 1.0)
-    again = rlacd.decompose(ring, threshold=1.0, quality="fast", threads=1).report
-    assert any("beyond the input's surface" in line for line in again["warnings"]) == (side < 0)
-    assert lower <= again["hausdorff"]["over"] <= most + (1e-4 if side > 0 else 2e-3)
+    result = rlacd.decompose(ring, **how, quality="fast", threads=1)
+    planes = [ConvexHull(hull.vertices).equations for hull in result]
+    corners = np.concatenate([hull.triangles for hull in result])
+    whose = np.repeat(np.arange(len(result)), [len(hull.faces) for hull in result])
+    rng, best = np.random.default_rng(0), [0.0]
+    facets, weights = np.repeat(np.arange(len(corners)), 4), rng.dirichlet((1, 1, 1), 4 * len(corners))
+    for step in 0.5 ** np.arange(9):
+        points = (corners[facets] * weights[:, :, None]).sum(axis=1)
+        heights = np.array([(points @ each[:, :3].T + each[:, 3]).max(axis=1) for each in planes])
+        heights[whose[facets], np.arange(len(points))] = np.inf  # its own hull hides nothing
+        away = np.where((heights > 1e-6).all(axis=0), point_to_triangles(points, ring.vertices, ring.faces), -1.0)
+        farthest = np.argsort(away)[-8:]
+        best.append(float(away[farthest[-1]]))
+        facets, near = np.repeat(facets[farthest], 60), np.repeat(weights[farthest], 60, axis=0)
+        weights = np.maximum(near + 0.2 * step * rng.normal(size=near.shape), 0) + 1e-12
+        weights /= weights.sum(axis=1, keepdims=True)
+    said = re.search(r"hulls reach ([\d.]+) beyond the input and cover it", fit_words(result.report))
+    assert said is not None
+    length = float(said[1]) * length_unit(result.report)[0] / result.report["scale"]
+    assert max(best) <= 1.0002 * length <= 1.01 * max(best)
+
+
+def test_of_the_shortest_lengths_only_a_bound_is_said() -> None:
+    words = fit_words(rlacd.decompose(trimesh.creation.icosphere(3), detail="full", threads=1).report)
+    assert re.search(r"concavity at most .*; hulls reach at most 0.00\d+ beyond the input and cover it", words)

@@ -98,7 +98,7 @@ void bind_surface(nb::module_& m) {
   m.def("directed_hausdorff",
         released([](const Mesh& mesh, const Surface& surface, double tolerance, int threads) -> Interval {
           require_positive(tolerance);
-          return maximize_in_waves(SurfaceField(surface.bvh()), mesh, tolerance, threads);
+          return maximize_in_waves(SurfaceField(surface.bvh()), mesh, {tolerance}, threads);
         }),
         "vertices"_a, "faces"_a, "surface"_a, "tolerance"_a, "threads"_a = 0,
         "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface; upper - lower <= "
@@ -229,18 +229,21 @@ void bind_union(nb::module_& m) {
            "gap"_a = 1e-6, "threads"_a = 0,
            "Surface of the union as triangles (vertices [V, 3], faces [F, 3]); touching facets are no part of it.")
       .def("over",
-           released([](const HullUnion& self, const Surface& surface, double tolerance, double gap, int threads) {
+           released([](const HullUnion& self, const Surface& surface, double tolerance, double gap, int threads,
+                       double floor) {
              require_positive(tolerance, gap);
-             return as_tuple(self.over(surface.bvh(), tolerance, gap, threads));
+             return as_tuple(self.over(surface.bvh(), {tolerance, floor}, gap, threads));
            }),
-           "surface"_a, "tolerance"_a, "gap"_a = 1e-6, "threads"_a = 0,
-           "(lower, upper, place) of the greatest distance from the union's surface to the given surface.")
-      .def("under", released([](const HullUnion& self, const Mesh& mesh, double tolerance, int threads) {
+           "surface"_a, "tolerance"_a, "gap"_a = 1e-6, "threads"_a = 0, "floor"_a = 0.0,
+           "(lower, upper, place) of the greatest distance from the union's surface to the given surface.\n\n"
+           "The interval is at most `tolerance` wide, or ends below `floor`.")
+      .def("under", released([](const HullUnion& self, const Mesh& mesh, double tolerance, int threads, double floor) {
              require_positive(tolerance);
-             return as_tuple(self.under(mesh, tolerance, threads));
+             return as_tuple(self.under(mesh, {tolerance, floor}, threads));
            }),
-           "vertices"_a, "faces"_a, "tolerance"_a, "threads"_a = 0,
-           "(lower, upper, place) of the greatest distance from the mesh's faces to the union as a solid, 0 inside.")
+           "vertices"_a, "faces"_a, "tolerance"_a, "threads"_a = 0, "floor"_a = 0.0,
+           "(lower, upper, place) of the greatest distance from the mesh's faces to the union as a solid, 0 inside; as "
+           "narrow as that of `over`.")
       .def("distance", released([](const HullUnion& self, const std::vector<Vec3>& points, int threads) {
              std::vector<double> distances(points.size());
              parallel_for(

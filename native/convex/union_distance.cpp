@@ -206,11 +206,11 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
   return {resolved.take(), unresolved.take()};
 }
 
-Greatest HullUnion::over(const Bvh& surface, double tolerance, double gap, int threads) const {
+Greatest HullUnion::over(const Bvh& surface, const Goal& goal, double gap, int threads) const {
   const Exposed found = exposed(gap, threads);
-  Greatest over = maximize_in_waves(SurfaceField(surface), found.exposed, tolerance, threads);
+  Greatest over = maximize_in_waves(SurfaceField(surface), found.exposed, goal, threads);
   if (!found.unresolved.faces.empty()) {
-    const Greatest most = maximize_in_waves(SurfaceField(surface), found.unresolved, tolerance, threads);
+    const Greatest most = maximize_in_waves(SurfaceField(surface), found.unresolved, goal, threads);
     if (most.upper > over.upper) over.upper = most.upper, over.at = most.at;
   }
   return over;
@@ -246,7 +246,7 @@ std::vector<char> HullUnion::held_faces(const Mesh& surface, int threads) const 
   return is_held;
 }
 
-Greatest HullUnion::under(const Mesh& surface, double tolerance, int threads) const {
+Greatest HullUnion::under(const Mesh& surface, const Goal& goal, int threads) const {
   if (members_.empty()) return {{kInfinity, kInfinity}, {}};
   std::vector<Offsets> grown;
   for (const auto& member : members_)
@@ -277,7 +277,7 @@ Greatest HullUnion::under(const Mesh& surface, double tolerance, int threads) co
   Gathering left;
   for (const std::vector<Polygon>& polygons : outside)
     for (const Polygon& polygon : polygons) left.add(polygon);
-  return maximize_in_waves(HullField(*this), left.take(), tolerance, threads);
+  return maximize_in_waves(HullField(*this), left.take(), goal, threads);
 }
 
 }  // namespace rlacd

@@ -3,7 +3,7 @@
 // In:  convex hulls (closed, convex, outward oriented), which may touch and overlap; a triangle surface.
 // Out: over:  the greatest distance from the surface *of the union* to the given surface: what the hulls add;
 //      under: the greatest distance from the given surface to the union as a solid, 0 inside any hull: what they miss;
-//      each as an interval of the requested width, and a place where its lower end is reached.
+//      each as an interval that meets a goal, and a place where its lower end is reached.
 // How: the triangles are clipped exactly against the hulls, which leaves a set of small convex polygons, and
 //      branch_and_bound.hpp finds the maximum over those. Over: a facet of a hull loses the regions inside other hulls
 //      and those that touch another hull's facet from the opposite side; of two facets that coincide facing the same
@@ -37,8 +37,8 @@ class HullUnion {
   };
   Exposed exposed(double gap, int threads) const;
 
-  Greatest over(const Bvh& surface, double tolerance, double gap, int threads) const;
-  Greatest under(const Mesh& surface, double tolerance, int threads) const;
+  Greatest over(const Bvh& surface, const Goal& goal, double gap, int threads) const;
+  Greatest under(const Mesh& surface, const Goal& goal, int threads) const;
 
   // From p to the solid, 0 inside.
   double distance(Vec3 p) const;

@@ -192,7 +192,7 @@ struct Greatest : Interval {
 // Multi-threaded: all open cells are halved at once, wave after wave. A wave depends only on the waves before it, so
 // the interval does not depend on the number of threads, nor does the place.
 template <class Field>
-Greatest maximize_in_waves(const Field& field, const Mesh& mesh, double tolerance, int threads) {
+Greatest maximize_in_waves(const Field& field, const Mesh& mesh, const Goal& goal, int threads) {
   constexpr std::size_t kChunk = 128;
   const auto for_each = [&](std::size_t count, const auto& task) {
     parallel_for(count, count <= 3 * kChunk ? 1 : threads, task, kChunk);
@@ -225,7 +225,7 @@ Greatest maximize_in_waves(const Field& field, const Mesh& mesh, double toleranc
 
   const auto drop = [&](std::vector<Cell>& open) {
     const auto settled = [&](const Cell& cell) {
-      if (cell.upper > found.lower + tolerance) return false;
+      if (cell.upper > std::max(goal.pass, found.lower + goal.tolerance)) return false;
       dropped = std::max(dropped, cell.upper);
       return true;
     };

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from rlacd.options.names import UNITS
+
 _LENGTHS = ("concavity", "distance")
+
+RESOLVED = 1e-3
+"""Distances in the frame above this (0.05 % of the longest side) are measured to 1 %; others are upper bounds."""
+
+COVERED = 5e-5
+"""The hulls cover an input of which they miss no more."""
 
 
 class Fit(NamedTuple):
@@ -70,12 +78,51 @@ class Fit(NamedTuple):
         if self.worst is None:
             return None
         if self.limit is None:
-            return f"max {self.name} {self.worst / scale:.4g}"
+            return f"{self.name} at most {self.worst / scale:.4g}"
         if self.name == "added_volume":
             most, tolerance = told_apart(100 * self.worst, 100 * self.limit)
             return f"hulls add up to {most} % of volume (tolerance {tolerance} %)"
         most, threshold = told_apart(self.worst / scale, self.limit / scale)
-        return f"max {self.name} {most} (threshold {threshold}{', exceeded' * (self.worst > self.limit)})"
+        return f"{self.name} at most {most} (threshold {threshold}{', exceeded' * (self.worst > self.limit)})"
+
+
+def length_unit(report: Mapping[str, Any], unit: str | None = None) -> tuple[float, str]:
+    """What a report's lengths are written in: as the threshold was given, so that they can be compared.
+
+    Parameters
+    ----------
+    report : mapping
+        Its `scale`, and of its `options` the `threshold_abs`.
+    unit : str, optional
+        In which the threshold was typed: ``%`` of the longest side, or of `UNITS` for an input in metres.
+
+    Returns
+    -------
+    float, str
+        Units of the frame per such unit, and what that is.
+    """
+    if unit == "%":
+        return 0.02, "in % of the longest side"
+    if unit is not None:
+        return report["scale"] * UNITS[unit], f"in {unit}"
+    if report.get("options", {}).get("threshold_abs") is not None:
+        return report["scale"], "in the input's unit"
+    return 1.0, "longest side = 2"
+
+
+def fit_words(report: Mapping[str, Any], unit: str | None = None) -> str:
+    """Say how well hulls fit: by the criterion, and how far they reach beyond the input; empty if nothing is known."""
+    scale, in_words = length_unit(report, unit)
+    fit, (over, under) = Fit.of(report), (report.get("hausdorff", {}).get(side) for side in ("over", "under"))
+    words = [said] if fit is not None and (said := fit.words(scale)) else []
+    if over is not None and under is not None:
+        missed = "and cover it" if under <= COVERED else f"and miss it by {_length(under, scale)}"
+        words.append(f"hulls reach {_length(over, scale)} beyond the input {missed}")
+    return "; ".join(words) + (f" ({in_words})" if words else "")
+
+
+def _length(length: float, scale: float) -> str:
+    return f"{'at most ' * (length <= RESOLVED)}{length / scale:.4g}"
 
 
 def told_apart(value: float, limit: float) -> tuple[str, str]:

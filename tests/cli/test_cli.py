@@ -89,7 +89,7 @@ def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path,
     run = rlacd("decompose", mesh)
     assert (run.exit_code, run.stdout) == (0, "")
     assert len(trimesh.load_scene(mesh.with_name("ell_hulls.glb")).geometry) == 1
-    for words in ("ell_hulls.glb", "1 hull,", "max concavity 0.01 (threshold 0.05)", "0.30 s", "one body was open"):
+    for words in ("ell_hulls.glb", "1 hull,", "concavity at most 0.01 (threshold 0.05)", "0.30 s", "one body was open"):
         assert words in run.stderr
     assert stand_in.calls == [{}], "defaults belong to rlacd.decompose"
 
@@ -97,8 +97,8 @@ def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path,
 @pytest.mark.parametrize(
     ("typed", "said"),
     [
-        ("5mm", "max concavity 4.98 (threshold 5); hulls extend up to 20 beyond the input and cover it (in mm)"),
-        ("2.5%", "max concavity 2.49 (threshold 2.5); hulls extend up to 10 beyond the input and cover it (in %"),
+        ("5mm", "concavity at most 4.98 (threshold 5); hulls reach 20 beyond the input and cover it (in mm)"),
+        ("2.5%", "concavity at most 2.49 (threshold 2.5); hulls reach 10 beyond the input and cover it (in %"),
     ],
 )
 def test_lengths_are_said_in_the_unit_that_was_given(mesh: Path, stand_in: StandIn, typed: str, said: str) -> None:
@@ -163,7 +163,7 @@ def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> N
     run = CliRunner().invoke(
         app, ["decompose", str(tmp_path / "ball.stl"), "-o", str(tmp_path / "b.glb"), "-t", "0.05"]
     )
-    reach = re.search(r"extend up to (0\.0\d+) beyond the input and cover it \(longest side = 2\)", run.stderr)
+    reach = re.search(r"reach at most (0\.0\d+) beyond the input and cover it \(longest side = 2\)", run.stderr)
     assert reach is not None, run.stderr
     assert float(reach[1]) <= 0.05
     assert "(threshold 0.05)" in run.stderr

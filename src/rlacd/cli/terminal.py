@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
-from rlacd.fit import Fit
+from rlacd.fit import fit_words, length_unit
 from rlacd.options.names import UNITS
 from rlacd.run import Progress, ProgressCallback
 
@@ -108,9 +108,9 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
     total = report.get("seconds", {}).get("total")
     time = ("" if total is None else f", {total:.2f} s") + STOPPED[report.get("stopped_by")]
     lines = [f"{written}: {counted(len(result), 'hull', 'hulls')}, {triangles} triangles{time}"]
-    lines += [f"  {fit}" for fit in [_fit(report, unit)] if fit]
+    lines += [f"  {fit}" for fit in [fit_words(report, unit)] if fit]
     if report.get("deviation_abs") is not None:
-        scale, in_words = _unit(report, unit)
+        scale, in_words = length_unit(report, unit)
         moved = report["deviation_abs"] * report["scale"] / scale
         lines.append(f"  measured to triangles, up to {moved:.4g} from the surface in the file ({in_words})")
     least, parts = report.get("at_least") or 1, report["parts"]
@@ -166,27 +166,3 @@ def counted(count: int, one: str, many: str) -> str:
 
 
 STOPPED = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}
-
-
-def _fit(report: dict[str, Any], unit: str | None = None) -> str:
-    """How well the hulls fit; lengths in `unit`, in the input's if the threshold was given in that, or in the frame."""
-    scale, in_words = _unit(report, unit)
-    fit = Fit.of(report)
-    words = [said] if fit is not None and (said := fit.words(scale)) else []
-    reach = report.get("hausdorff", {})
-    if reach.get("over") is not None:
-        missed = reach["under"] / scale
-        covered = "and cover it" if reach["under"] < 5e-5 else f"and miss it by up to {missed:.4g}"
-        words.append(f"hulls extend up to {reach['over'] / scale:.4g} beyond the input {covered}")
-    return "; ".join(words) + (f" ({in_words})" if words else "")
-
-
-def _unit(report: dict[str, Any], unit: str | None) -> tuple[float, str]:
-    """Frame units per unit that lengths are written in, and what that is."""
-    if unit == "%":
-        return 0.02, "in % of the longest side"
-    if unit is not None:
-        return report["scale"] * UNITS[unit], f"in {unit}"
-    if report.get("options", {}).get("threshold_abs") is not None:
-        return report["scale"], "in the input's unit"
-    return 1.0, "longest side = 2"

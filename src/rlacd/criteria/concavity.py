@@ -168,7 +168,8 @@ class Distance(Criterion):
             return CriterionSummary({self.name: {"per_part": None, "max": None}}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
         worst, threshold = told_apart(max(errors) / self.unit, self.threshold / self.unit)
-        warning = f"{len(exceeding)} of {len(errors)} parts exceed the {self.name} {threshold}; the worst has {worst}."
+        exceed = f"{len(exceeding)} of {len(errors)} parts exceed the {self.name} {threshold}"
+        warning = f"{exceed}; the worst has at most {worst}."
         entries = {self.name: {"per_part": list(errors), "max": max(errors)}}
         return CriterionSummary(entries, (warning,) if exceeding else ())
 

@@ -16,7 +16,7 @@ from rlacd.criteria.avoided import FINEST_SHARE, warnings_of
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
-from rlacd.fit import Fit, told_apart
+from rlacd.fit import RESOLVED, Fit, length_unit, told_apart
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
@@ -24,7 +24,7 @@ from rlacd.options.presets import Preset, find_preset
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
-from rlacd.solid.distance import Interval, Place, hull_distances, hull_union
+from rlacd.solid.distance import Place, hull_distances, hull_union
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.hull import Hull
 from rlacd.solid.mass import Mass, joint_mass, mass_of
@@ -34,11 +34,8 @@ COVERAGE_TOLERANCE = 5 * HALF_THICKNESS
 """How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
 measurement."""
 
-NEARLY = HALF_THICKNESS
+NEARLY = RESOLVED
 """No point of the input should lie farther outside the hulls than this."""
-
-FINE = NEARLY / 10
-"""Width of the intervals where the usual one would decide a warning, or whether hulls have to grow to the input."""
 
 MOST_HOLES = 1000
 """Holes that a report lists."""
@@ -270,9 +267,6 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
     surface = surface or _native.Surface(*solid.surface, run.threads)
     hulls = [part.hull for part in parts]
     found = hull_distances(hulls, *solid.surface, threads=run.threads, surface=surface)
-    outside = any(_is_undecided(found.under, limit) for limit in (NEARLY, COVERAGE_TOLERANCE))
-    if outside or _is_undecided(found.over, reached.goal.overhang + COVERAGE_TOLERANCE):
-        found = hull_distances(hulls, *solid.surface, FINE, threads=run.threads, surface=surface)
 
     def place(point: Place) -> str:
         if solid.body_of is None or len(solid.bodies) == 1:
@@ -318,11 +312,6 @@ def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
         f"{_hulls(len(beyond), 'sticks', 'stick')} out by up to {farthest}, more than {allowed} (in the input's unit): "
         f"with at most {most} they cannot fit closer unless there are many more."
     ]
-
-
-def _is_undecided(interval: Interval, limit: float) -> bool:
-    """Whether a warning would be due only to how wide the interval is."""
-    return interval[0] <= limit < interval[1]
 
 
 def _unmeasured(solid: Solid) -> list[str]:
@@ -376,20 +365,21 @@ def _early_end(run: Run) -> list[str]:
 
 def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
     """What hulls fall short of; how far they reach out is known where the criterion has said so (`exceeds`)."""
-    options = reached.options
+    options, scale = reached.options, reached.solid.frame.scale
+    unit, in_words = length_unit({"options": vars(options), "scale": scale})
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if apart is not None and apart.under > COVERAGE_TOLERANCE:
         sentences.append(
-            f"Some of the input's surface lies up to {apart.under:.4g} outside the hulls, farthest near "
-            f"{apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
+            f"Some of the input's surface lies up to {apart.under / unit:.4g} ({in_words}) outside the hulls, farthest "
+            f"near {apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
         )
     sentences += apart.left_out.said if apart is not None else []
     if apart is not None and not exceeds and apart.over > reached.goal.overhang + COVERAGE_TOLERANCE:
         sentences.append(
-            f"The hulls extend up to {apart.over:.4g} beyond the input's surface, more than the threshold, farthest "
-            f"near {apart.over_at}: {_why_beyond(reached.solid, options)}."
+            f"The hulls reach {apart.over / unit:.4g} ({in_words}) beyond the input's surface, more than the "
+            f"threshold, farthest near {apart.over_at}: {_why_beyond(reached.solid, options)}."
         )
     return sentences
 

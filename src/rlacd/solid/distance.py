@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd import _native
+from rlacd.fit import RESOLVED
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import TOLERANCE, Hull
 
 Interval = tuple[float, float]
@@ -20,9 +20,9 @@ Interval = tuple[float, float]
 
 Place = tuple[float, float, float]
 
-DISTANCE_ACCURACY = 2 * HALF_THICKNESS
-"""Default width of the intervals: 0.1 % of the input's longest side in the normalised frame."""
-
+DISTANCE_ACCURACY = RESOLVED / 1000
+"""Default width of the intervals, in the normalised frame. It costs no more than one a thousand times as wide, but near
+zero, where a surface and hulls that lie on it would be cut into cells as small as that."""
 
 PLACES = 2000
 """Number of places at which it is looked how something compares with what it stands for."""
@@ -55,6 +55,7 @@ def hull_distances(
     vertices: FloatArray,
     faces: IntArray,
     tolerance: float = DISTANCE_ACCURACY,
+    floor: float = RESOLVED,
     threads: int | None = None,
     surface: _native.Surface | None = None,
 ) -> HullDistances:
@@ -68,7 +69,9 @@ def hull_distances(
     faces : int32 [F, 3]
         The input surface, of any quality.
     tolerance
-        Width of both intervals.
+        Width of both intervals,
+    floor
+        unless they end below this.
     threads
         None uses every core.
     surface
@@ -83,8 +86,8 @@ def hull_distances(
     """
     union = hull_union(hulls, threads)
     surface = surface or _native.Surface(vertices, faces)
-    least_over, over, over_at = union.over(surface, tolerance, TOLERANCE, threads or 0)
-    least_under, under, under_at = union.under(vertices, faces, tolerance, threads or 0)
+    least_over, over, over_at = union.over(surface, tolerance, TOLERANCE, threads or 0, floor)
+    least_under, under, under_at = union.under(vertices, faces, tolerance, threads or 0, floor)
     return HullDistances((least_over, over), (least_under, under), over_at, under_at)
 
 
