@@ -45,6 +45,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.provenance import owners
+from rlacd.solid.topology import used_points
 
 MeshLike: TypeAlias = (
     "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
@@ -288,7 +289,7 @@ def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> R
 
 def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
-    frame = Frame.of(source.vertices[np.unique(source.faces)])
+    frame = Frame.of(used_points(source.vertices, source.faces))
     scale = frame.scale
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()

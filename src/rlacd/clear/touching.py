@@ -5,6 +5,7 @@ The hulls of a body hold its surface, so bodies whose hulls are apart need no te
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,6 +19,7 @@ from rlacd.clear.motion import Motion
 from rlacd.errors import import_extra
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.poses import inverse, moved
+from rlacd.solid.topology import used_points
 
 TOUCH = 1e-6
 """Share of the size of all bodies at rest up to which an overlap of hulls, or a gap between bodies, means nothing."""
@@ -68,6 +70,10 @@ class Touching:
         return new > int(np.count_nonzero(self.meshes))
 
 
+def _coal() -> Any:
+    return sys.modules.get("coal") or import_extra("coal", "checking that bodies stay clear of each other", "clear")
+
+
 def check(
     bodies: Sequence[Body],
     motion: Motion,
@@ -91,7 +97,7 @@ def check(
     MissingExtraError
         The extra ``clear`` is not installed.
     """
-    import_extra("coal", "checking that bodies stay clear of each other", "clear")
+    _coal()
     filled = [i for i, body in enumerate(bodies) if body.hulls and len(body.mesh[1])]
     if len(filled) < 2:
         return {}
@@ -166,13 +172,13 @@ class _Place(NamedTuple):
 
 
 def _place(pose: FloatArray) -> _Place:
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     return _Place(coal.Transform3s.Identity(), coal.Transform3s(pose[:3, :3], pose[:3, 3]))
 
 
 def _depth(first: Any, second: Any, pose: FloatArray) -> float:
     """How deep two convex polytopes overlap; 0 if they do not."""
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     at, result = _place(pose), coal.CollisionResult()
     if not coal.collide(first, at.fixed, second, at.moved, coal.CollisionRequest(), result):
         return 0.0
@@ -227,7 +233,7 @@ class Shapes:
         return self._known.meets[key]
 
     def _meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
-        coal = import_extra("coal", "", "clear")
+        coal = _coal()
         at, request = _place(pose), coal.CollisionRequest()
         request.enable_contact, request.security_margin = False, reach
         if coal.collide(self.mesh, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()):
@@ -236,13 +242,13 @@ class Shapes:
 
     def gap(self, other: Shapes, pose: FloatArray) -> float:
         """How far the surfaces of the bodies are apart, the other seen at a pose."""
-        coal = import_extra("coal", "", "clear")
+        coal = _coal()
         at, request = _place(pose), coal.DistanceRequest()
         return float(coal.distance(self.mesh, at.fixed, other.mesh, at.moved, request, coal.DistanceResult()))
 
     def enters(self, other: Shapes, pose: FloatArray) -> bool:
         """Whether a hull touches the other body's surface, seen at a pose."""
-        coal = import_extra("coal", "", "clear")
+        coal = _coal()
         at, request = _place(pose), coal.CollisionRequest()
         request.enable_contact = False
         return any(
@@ -250,19 +256,20 @@ class Shapes:
         )
 
     @cached_property
+    def used(self) -> FloatArray:
+        """The corners [N, 3] of the surface."""
+        return used_points(*self.body.mesh)
+
+    @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the box around the body [2, 3]."""
-        vertices, faces = self.body.mesh
-        used = vertices[np.unique(faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        return np.stack([self.used.min(axis=0), self.used.max(axis=0)])
 
     @cached_property
     def corner(self) -> FloatArray:
         """The point [1, 3] of the surface farthest from its middle: hardly ever in the box of another body."""
-        vertices, faces = self.body.mesh
-        used = vertices[np.unique(faces)]
-        away = used - self.box.mean(axis=0)
-        return used[[dots(away, away).argmax()]]
+        away = self.used - self.box.mean(axis=0)
+        return self.used[[dots(away, away).argmax()]]
 
     @cached_property
     def _surface(self) -> _native.Surface:
@@ -277,7 +284,7 @@ class Shapes:
 
 
 def _mesh(surface: Surface) -> Any:
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     vertices, faces = surface
     model = coal.BVHModelOBBRSS()
     model.beginModel(len(faces), len(vertices))
@@ -288,7 +295,7 @@ def _mesh(surface: Surface) -> Any:
 
 
 def _convex(surface: Surface) -> Any:
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     points.extend([np.asarray(vertex, dtype=np.float64) for vertex in surface[0]])
     triangles.extend([coal.Triangle(*face) for face in surface[1].tolist()])

@@ -17,6 +17,7 @@ from rlacd.options import CRITERIA, FAST, Options, with_criterion
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.topology import used_points
 
 _NAMES = (
     *("criterion", "threshold", "radius", "tolerance", "volume_tolerance", "quality", "primitives"),
@@ -112,7 +113,7 @@ STANDING = 0.005
 
 def guessed_up(mesh: InputMesh) -> Axis:
     """Guess y if the mesh stands on y = 0 and not on z = 0, else z, which files are taken for elsewhere."""
-    points = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
+    points = used_points(mesh.vertices, mesh.faces)
     low = points.min(axis=0)
     stands = np.abs(low) <= STANDING * (points.max(axis=0) - low).max()
     return "y" if stands[1] and not stands[2] else "z"

@@ -20,6 +20,7 @@ from rlacd.errors import MeshFileError
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.hull import Hull
 from rlacd.solid.poses import inverse, moved, product
+from rlacd.solid.topology import used_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,12 +173,9 @@ def size_of(bodies: Sequence[Body]) -> float:
     The world's count only if there is nothing else: a robot may stand on a terrain of any size.
     """
     moving = [body for body in bodies if not body.is_world] or bodies
-    used = [moved(body.pose, _used(body.mesh())) for body in moving]
+    meshes = placed(moving, [body.pose for body in moving])
+    used = [used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh in meshes]
     return float(np.ptp(np.concatenate(used), axis=0).max()) if used else 0.0
-
-
-def _used(mesh: trimesh.Trimesh) -> FloatArray:
-    return np.asarray(mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices)
 
 
 def _joined(meshes: Sequence[PlacedMesh], poses: Sequence[FloatArray]) -> trimesh.Trimesh:
