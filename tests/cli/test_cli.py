@@ -304,6 +304,7 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
         ("decompose {dir}", "rlacd batch {dir} -o hulls/"),
         ("decompose {dir}/ell.stl {dir}/out.obj", "rlacd decompose {dir}/ell.stl -o {dir}/out.obj"),
         ("batch {dir}", "a batch needs -o"),
+        ("batch {dir} -o {dir}/out --link finger=1mm", "--link is for one robot: run  rlacd decompose"),
     ],
 )
 def test_what_a_command_is_not_for_is_one_sentence(mesh: Path, words: str, says: str) -> None:

@@ -96,8 +96,8 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
     if earlier:
         depth, worst = max(earlier)
         sentences.append(
-            f"Links that collide at some joint positions, as {worst} do, touch at others too as hulls, up to "
-            f"{length(depth)} deep ({len(earlier)} such pairs)."
+            f"Hulls of {worst} touch at some places where the links do not, up to {length(depth)} deep; since the "
+            f"links collide at least as often themselves, their hulls were not cut finer ({len(earlier)} such pairs)."
         )
     if always:
         said = (

@@ -14,6 +14,7 @@ from rlacd.cli.options import PoolOptions, decompose_options, how
 from rlacd.errors import OptionError
 from rlacd.options.fields import check_fields, option, stated
 from rlacd.options.output import OutputOptions
+from rlacd.options.robots import RobotOptions
 from rlacd.plain_json import printable
 
 if TYPE_CHECKING:
@@ -84,6 +85,9 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     with ctrl_c_at_once():
         from rlacd.batch import Batch, JobSpec
 
+    for name in taken(given, RobotOptions):
+        flag = {"links": "link"}.get(name, name)
+        raise OptionError(f"--{flag} is for one robot: run  rlacd decompose ROBOT --{flag} ...  for each.")
     own, where = BatchOptions(**taken(given, BatchOptions)), PoolOptions(**taken(given, PoolOptions))
     if where.jobs == 0:
         raise OptionError("--jobs is 0; a batch needs at least 1 process.")
@@ -130,12 +134,15 @@ def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
 
 
 _OWN = [*options_of(BatchOptions), *options_of(PoolOptions), *options_of(OutputOptions, only=(*WRITTEN, "quiet"))]
+_ROBOT = options_of(RobotOptions)
+for _option in _ROBOT:
+    _option.hidden = True  # they are refused, with a sentence
 _HOW = [option for option in how() if option.name not in {own.name for own in _OWN}]
 
 COMMAND = Command(
     "batch",
     _batch,
-    [Argument("assets", "ASSETS", "A folder of meshes, of any depth."), *_OWN, *_HOW],
+    [Argument("assets", "ASSETS", "A folder of meshes, of any depth."), *_OWN, *_ROBOT, *_HOW],
     first=(
         *(own.name for own in _OWN if own.panel != "Output"),
         *("threshold", "quality", "max_hulls", "max_vertices", "preset", "quiet"),

@@ -19,7 +19,7 @@ from rlacd.repair.union import Cavities, area_of, as_manifold, size_of, slab_of_
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.component import DENSE
-from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
@@ -166,7 +166,9 @@ def fill_slits(state: State) -> None:
     is_on_cap = state.surface.distance(points) > 2 * HALF_THICKNESS
     across *= gap * np.where(is_on_cap, _BETWEEN_CAPS, _BESIDE)[:, None]
     for side in (1, -1):  # the solid lies on both sides of a slit
-        inside = query.inside(points + side * across)
+        beside = points + side * across
+        off = np.flatnonzero(query.distance(beside) > ROUNDING)  # in a corner, that is on the other wall
+        inside = off[query.inside(beside[off])]
         points, across = points[inside], across[inside]
     if len(points) == 0:
         return

@@ -124,7 +124,7 @@ def rewrite_robot(
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
     if asked.srdf is not None and (done.samples or len(plan.bodies) < 2):
         write_file(Path(asked.srdf), srdf_of(root.attributes.get("name", "robot"), done.pairs))
-    warnings += [*warnings_of(done.results), *done.warnings, *said]
+    warnings += [*warnings_of(description, done.results), *done.warnings, *said]
     return rewritten(description, done, names, (place, folder), warnings, began)
 
 
@@ -139,7 +139,7 @@ def rewrite_stage(
     robot, prims = robot_of_stage(stage, apart=asked.per == "mesh")
     done = decomposed_robot(robot, options, asked)
     data, warnings, files = usd.encode_layer(stage, place, prims, done.results, flat=keep_input)
-    warnings += [*warnings_of(done.results), *done.warnings, *left_behind(files, stage.source.parent, place)]
+    warnings += [*warnings_of(robot, done.results), *done.warnings, *left_behind(files, stage.source.parent, place)]
     names = {collider: [*map(hull_name, range(len(result)))] for collider, result in done.results.items()}
     if not robot.bodies:
         warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")

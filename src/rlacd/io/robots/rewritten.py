@@ -15,6 +15,7 @@ import trimesh
 from rlacd.clear import LinkPair
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError
+from rlacd.fit import Fit
 from rlacd.io.robots.bodies import Body, Collider, size_of
 from rlacd.io.robots.clearance import Checked, Robot
 from rlacd.io.robots.shown import shown
@@ -169,11 +170,31 @@ def rewritten(
     return Rewritten(*places, links, warnings, seconds, size, robot.metres, done.pairs, done.samples, show)
 
 
-def warnings_of(results: Mapping[Collider, Decomposition]) -> list[str]:
+def warnings_of(robot: Robot, results: Mapping[Collider, Decomposition]) -> list[str]:
     """What the reports of all solids warn of; the worst lost the widest passage, or has hulls that reach farthest."""
     solids = {id(result): (collider.name, result) for collider, result in results.items()}
     each = [(name, result, said) for name, result in solids.values() for said in result.report["warnings"]]
-    return grouped([(name, said, _widest(r) if "passage" in said else _reach(r) or 0.0) for name, r, said in each])
+    others = [one for one in each if " parts exceed the " not in one[2] or not _too_far(one[1])]
+    said = grouped([(name, said, _widest(r) if "passage" in said else _reach(r) or 0.0) for name, r, said in others])
+    far = [(*found, name) for name, result in solids.values() if (found := _too_far(result))]
+    if far:
+        worst, asked, _, name = max(far)
+        links = name if len(far) == 1 else f"{len(far)} solids, the worst {name},"
+        many = sum(count for _, _, count, _ in far)
+        hulls = "1 hull of" if many == 1 else f"{many} hulls of"
+        said.append(
+            f"{hulls} {links} exceed the tolerance of {robot.in_mm(asked)}, by up to {robot.in_mm(worst - asked)}."
+        )
+    return said
+
+
+def _too_far(result: Decomposition) -> tuple[float, float, int] | None:
+    """The farthest of the hulls that exceed the threshold, the threshold, and how many do; None if it is no length."""
+    fit = Fit.of(result.report)
+    if fit is None or not fit.is_length or fit.worst is None or fit.limit is None or fit.worst <= fit.limit:
+        return None
+    scale = float(result.report["scale"])
+    return fit.worst / scale, fit.limit / scale, sum(error > fit.limit for error in fit.per_part or ())
 
 
 def grouped(warnings: Sequence[tuple[str, str, float]]) -> list[str]:

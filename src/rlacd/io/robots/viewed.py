@@ -54,4 +54,4 @@ def decompose_viewed(mesh: Path, *, package_dirs: Sequence[str] = (), **options:
     check_options(options)
     robot, said = read_robot(mesh, package_dirs)
     done = decomposed_robot(robot, options, RobotOptions())
-    return shown(robot, done, [*said, *warnings_of(done.results), *done.warnings], time.perf_counter() - began)
+    return shown(robot, done, [*said, *warnings_of(robot, done.results), *done.warnings], time.perf_counter() - began)
