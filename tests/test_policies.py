@@ -94,7 +94,7 @@ def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:
     assert row
     fewer = f"{100 * (1 - float(row[2])):.0f} % fewer parts than the best greedy rule"
     page = (ROOT / "docs" / "what_learning_is_worth.md").read_text(encoding="utf-8")
-    assert f"`learned` {row[1]}" in page
+    assert f"`learned` | {row[1]}" in page
     for text in (page, (ROOT / "README.md").read_text(encoding="utf-8")):
         assert f"policy leaves {fewer}" in text.replace("`learned`", "policy").replace("\n", " ")
 
