@@ -70,7 +70,8 @@ $(VENV)/bench: $(VENV)/installed
 stubs: $(VENV)/installed
 	$(BIN)/python -m nanobind.stubgen --quiet --exclude-docstrings -m rlacd._native -o src/rlacd/_native.pyi
 
-lint: $(VENV)/test-extras
+# Formats and types; neither needs the kernels or the extras.
+lint: $(VENV)/lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/clang-format --dry-run --Werror native/*/*.cpp native/*/*.hpp
@@ -80,10 +81,10 @@ lint: $(VENV)/test-extras
 test-fast: $(VENV)/test-extras
 	$(PYTEST) -m 'not slow and not nightly'
 
-test: lint
+test: lint $(VENV)/test-extras
 	$(PYTEST) -m 'not nightly'
 
-test-all: lint
+test-all: lint $(VENV)/test-extras
 	RLACD_RANDOM=1 $(PYTEST)
 
 nightly: test-all sanitize soak
@@ -143,7 +144,11 @@ fuzz-shapes: $(VENV)/installed
 fuzz-files: $(VENV)/test-extras
 	$(BIN)/python -m fuzz.damaged $(MESHES) --minutes $(MINUTES) --seed $(SEED)
 
-format: $(VENV)/test-extras
+$(VENV)/lint: $(VENV)/tools
+	@$(BIN)/pip install --quiet --constraint constraints-dev.txt --group lint
+	@touch $@
+
+format: $(VENV)/lint
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i native/*/*.cpp native/*/*.hpp

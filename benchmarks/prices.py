@@ -19,7 +19,6 @@ from rlacd.cli.exit_codes import exit_codes
 from rlacd.criteria.concavity import Concavity, DistanceScreen
 from rlacd.policies import Greedy
 from rlacd.run import work
-from rlacd.search import operators
 from rlacd.solid.component import ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
@@ -47,7 +46,6 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
         lambda part, solid, parts, hull: (sum(one.size for one in parts), len(hull.faces)),
         work.filling,
     ),
-    "reuniting": (operators, "reunite", lambda members: (sum(m.size for m in members), len(members)), work.reuniting),
 }
 """By the name of its price: where the kernel is, and the sizes of a call."""
 

@@ -36,9 +36,9 @@ WEIGHT = 1000.0
 """The larger of the two rewards' weights, as in the paper."""
 
 ARMS: Mapping[str, Mapping[str, Any]] = {
-    "λ1 = λ2": {"objective": "rewards"},
-    "without r1": {"objective": "rewards", "volume_reward": 0.0, "finish_reward": WEIGHT},
-    "without r2": {"objective": "rewards", "volume_reward": WEIGHT, "finish_reward": 0.0},
+    "λ1 = λ2": {"volume_reward": WEIGHT, "finish_reward": WEIGHT},
+    "without r1": {"volume_reward": 0.0, "finish_reward": WEIGHT},
+    "without r2": {"volume_reward": WEIGHT, "finish_reward": 0.0},
 }
 """Changes to the preset made by each arm; they say all that the arms differ in, so that they hold for every preset."""
 
@@ -168,7 +168,7 @@ def _trees(meshes: Path, names: list[str], count: int, depth: int) -> list[Node]
 @app.command()
 @click.argument("meshes", type=PATH)
 @OUT
-@click.option("--preset", default="two-cores", show_default=True, help="Of `rlacd train`.")
+@click.option("--preset", default="returns", show_default=True, help="Of `rlacd train`.")
 @click.option("--env-steps", type=int, help="Cuts an arm.")
 @click.option("--seeds", type=click.IntRange(1), default=1, show_default=True, help="Training runs of each arm.")
 def rewards(meshes: Path, out: Path, preset: str, env_steps: int | None, seeds: int) -> None:
@@ -176,6 +176,22 @@ def rewards(meshes: Path, out: Path, preset: str, env_steps: int | None, seeds: 
     with exit_codes():
         find_meshes(meshes)
         write(train_arms(meshes, out, preset, env_steps, seeds, click.echo), out, "rewards")
+
+
+@app.command()
+@click.argument("meshes", type=PATH)
+@OUT
+@click.option("--weights", required=True, type=PATH, help="I2P-MAE's published checkpoint.")
+@click.option("--env-steps", type=int, help="Cuts.")
+def paper(meshes: Path, out: Path, weights: Path, env_steps: int | None) -> None:
+    """Train to the letter (4.1): the preset `paper` on I2P-MAE's features, on a GPU if there is one."""
+    with exit_codes():
+        from benchmarks.learned.i2p_mae import I2PMAEEncoder, PublishedEncoder
+        from rlacd.learn.train import train
+
+        encoder = PublishedEncoder(I2PMAEEncoder.from_checkpoint(weights))
+        options = TrainOptions.preset("paper", **({} if env_steps is None else {"env_steps": env_steps}))
+        train(meshes, out, options, resume=True, say=click.echo, encoder=encoder)
 
 
 @app.command()

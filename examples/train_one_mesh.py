@@ -53,7 +53,7 @@ def main(mesh: Path | None, run: Path, **changes: object) -> list[dict[str, floa
     print(f"\n   cuts  parts/greedy  (random: {points[0]['validation_random']:.2f})")
     for point in points:
         own = point["validation_own_plane"]
-        print(f"{point['cuts']:7d}  {own:12.2f}  {'#' * min(round(20 * own), 100)}")
+        print(f"{point['env_steps']:7d}  {own:12.2f}  {'#' * min(round(20 * own), 100)}")
 
     # %% The network as a policy. `own` is what it learned; decompose adds planes of concave edges, and merges.
     [file] = folder.iterdir()

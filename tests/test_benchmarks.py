@@ -382,7 +382,7 @@ class TestCommands:
         assert "| 0.99 + 0.99 |" in page
 
 
-@pytest.mark.parametrize("preset", ["two-cores", "paper"])
+@pytest.mark.parametrize("preset", ["returns", "paper"])
 def test_arms_differ_in_what_they_say_only(preset: str) -> None:
     arms = [_options(preset, 100, 1, changes) for changes in ARMS.values()]
     assert len(set(arms)) == len(arms)
@@ -399,11 +399,9 @@ def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
     arms = dict(list(ARMS.items())[:2])
     monkeypatch.setattr("benchmarks.training.ARMS", arms)
-    monkeypatch.setattr(
-        "rlacd.learn.options.TRAIN_PRESETS", {"two-cores": {**TRAIN_PRESETS["two-cores"], "validation": 2}}
-    )
+    monkeypatch.setattr("rlacd.learn.options.TRAIN_PRESETS", {"returns": {**TRAIN_PRESETS["returns"], "validation": 2}})
     said: list[str] = []
-    given = (folder, tmp_path / "run", "two-cores", 40, 2, said.append)
+    given = (folder, tmp_path / "run", "returns", 40, 2, said.append)
     page = train_arms(*given)
     table = next(block for block in page.blocks if isinstance(block, Table))
     assert [line[0] for line in table.lines] == list(arms)

@@ -19,7 +19,7 @@ import rlacd
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import Candidates, concave_edge_planes
-from rlacd.policies import Greedy, NavACD, Policy
+from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import mid_planes
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
@@ -259,7 +259,7 @@ def test_planes_turn_with_the_solid(axis: str) -> None:
 def test_navacd_takes_the_cut_with_the_least_hulls(name: str) -> None:
     component = Component(SOLIDS[name]())
     candidates = Candidates.joined(mid_planes(component), concave_edge_planes(component))
-    plane = NavACD().choose(component)
+    plane = make_policy("navacd").choose(component)
     assert plane is not None
     sums = []
     for candidate in (plane, *planes_of(candidates)):
@@ -269,12 +269,12 @@ def test_navacd_takes_the_cut_with_the_least_hulls(name: str) -> None:
 
 
 def test_navacd_halves_a_box_that_has_to_be_cut() -> None:
-    plane = NavACD().choose(Component(box((0, 0, 0), (4, 2, 1))))
+    plane = make_policy("navacd").choose(Component(box((0, 0, 0), (4, 2, 1))))
     assert plane is not None
     assert (abs(np.asarray(plane.normal)).max(), plane.offset) in {(1, 2), (1, 1), (1, 0.5)}
 
 
-@pytest.mark.parametrize("policy", [NavACD(), Greedy()], ids=["navacd", "greedy"])
+@pytest.mark.parametrize("policy", [make_policy("navacd"), make_policy("greedy")], ids=["navacd", "greedy"])
 @pytest.mark.parametrize("name", SOLIDS)
 def test_policies_cut_every_solid_an_l_into_two_convex_parts(policy: Policy, name: str) -> None:
     component = Component(SOLIDS[name]())

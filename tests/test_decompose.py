@@ -59,6 +59,16 @@ def test_convex_input_is_one_hull_exactly() -> None:
     assert result.report["concavity"]["max"] < 1e-6
 
 
+@pytest.mark.slow
+@pytest.mark.promise("convex-input", "dense")
+def test_dense_convex_input_is_one_hull_that_is_simple_only_as_the_threshold_allows() -> None:
+    """What a simple hull adds all around counts for CoACD's concavity: here it alone would exceed the threshold."""
+    result = rlacd.decompose(trimesh.creation.icosphere(5), threshold=0.003, quality="fast")
+    assert len(result) == 1
+    assert result.report["concavity"]["max"] <= 0.003
+    assert not result.report["warnings"]
+
+
 @pytest.mark.parametrize(
     ("solid", "count"),
     [

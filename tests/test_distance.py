@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +212,28 @@ def test_trees_made_by_several_threads_are_the_same() -> None:
         answers.append((*surface.closest(points), surface.distance(points), surface.winding(points)))
     for other in answers[1:]:
         assert all(np.array_equal(a, b) for a, b in zip(answers[0], other, strict=True))
+
+
+def distances_to_a_ball(threads: int) -> Floats:
+    ball = trimesh.creation.icosphere(3)
+    points = np.random.default_rng(2).uniform(-1.5, 1.5, (3000, 3))
+    surface = _native.Surface(np.array(ball.vertices), np.array(ball.faces, dtype=np.int32))
+    return surface.distance(points, threads)
+
+
+def test_loops_that_share_threads_all_end() -> None:
+    alone = distances_to_a_ball(1)
+    with ThreadPoolExecutor(5) as callers:
+        assert all(np.array_equal(alone, found) for found in callers.map(distances_to_a_ball, [3, 8, 2, 16] * 10))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
+def test_a_fork_has_threads_of_its_own() -> None:
+    """Those of its parent are not there: it must not wait for them."""
+    found = distances_to_a_ball(4)
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        for other in pool.map_async(distances_to_a_ball, [4, 1, 2, 4], chunksize=1).get(60):
+            assert np.array_equal(found, other)
 
 
 def test_some_of_the_hulls_are_as_if_they_were_alone() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import pickle
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,17 +16,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from rlacd.cli.main import app
 from rlacd.errors import OptionError, WeightsError
 
 pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
+from benchmarks.learned.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, PublishedEncoder, Sizes, seen_below
+from benchmarks.learned.point_groups import farthest_points, gather, nearest_points
+from benchmarks.training import app as training
 
-from rlacd.learn.dqn import QNetwork
-from rlacd.learn.encoders import PublishedEncoder, pick_device
-from rlacd.learn.encoders.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, Sizes, seen_below
-from rlacd.learn.encoders.point_groups import farthest_points, gather, nearest_points
+from rlacd.learn.dqn import pick_device, q_network
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.train import load_policy, train
 from rlacd.policies.plane_features import PLANES
@@ -61,12 +59,6 @@ def tiny_encoder(seed: int = 0) -> I2PMAEEncoder:
         elif name.endswith("running_mean"):
             value.normal_(0, 0.1)
     return encoder
-
-
-def write_tiny_weights(path: Path, seed: int = 0) -> Path:
-    """Its weights as a file."""
-    torch.save(tiny_encoder(seed).state_dict(), path)
-    return path
 
 
 @pytest.fixture(scope="session")
@@ -236,27 +228,19 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
     assert not (tmp_path / "ran").exists()
 
 
-def test_without_weights_the_error_says_where_to_get_them(meshes: Path, tmp_path: Path) -> None:
-    for asked in (["--encoder", "i2p-mae", "--validation", "2"], ["--preset", "paper", "--validation", "2"]):
-        shown = CliRunner().invoke(app, ["train", str(meshes), "--run", str(tmp_path / "run"), *asked])
-        assert shown.exit_code == 2
-        for word in ("--encoder-weights FILE", "https://", "--encoder sweep"):
-            assert word in shown.output
-        assert "Traceback" not in shown.output
-        assert not (tmp_path / "run" / "checkpoint.npz").exists()
+def test_a_file_that_is_missing_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
+    words = ["paper", str(meshes), "--out", str(tmp_path / "run"), "--weights", str(tmp_path / "nowhere.pth")]
+    shown = CliRunner().invoke(training, words)
+    assert shown.exit_code == 2
+    assert "there is no file" in shown.output
+    assert "Traceback" not in shown.output
+    assert not (tmp_path / "run" / "checkpoint.npz").exists()
 
 
 # Training: from a file of weights to a policy
 
 
-SHORT: dict[str, Any] = {
-    **TINY_RUN,
-    "encoder": "i2p-mae",
-    "env_steps": 60,
-    "learning_starts": 20,
-    "points": 64,
-    "validate_every": 30,
-}
+SHORT: dict[str, Any] = {**TINY_RUN, "env_steps": 60, "learning_starts": 20, "validate_every": 30}
 
 
 @pytest.fixture
@@ -264,48 +248,33 @@ def meshes(tmp_path: Path) -> Path:
     return write_meshes(tmp_path / "meshes")
 
 
-@pytest.fixture
-def weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr("rlacd.learn.encoders.i2p_mae.Sizes", lambda: TINY)
-    return write_tiny_weights(tmp_path / "tiny.pth")
+def run(meshes: Path, folder: Path, seed: int = 0, points: int = 64, resume: bool = False, **changes: Any) -> Path:
+    encoder, options = PublishedEncoder(tiny_encoder(seed), points), TrainOptions(**{**SHORT, **changes})
+    return train(meshes, folder, options, resume=resume, encoder=encoder, say=lambda line: None)
 
 
-def run(meshes: Path, folder: Path, weights: Path, resume: bool = False, **changes: Any) -> Path:
-    options = TrainOptions(**{**SHORT, "encoder_weights": str(weights), **changes})
-    return train(meshes, folder, options, resume=resume, say=lambda line: None)
-
-
-def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, weights: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "whole", weights)
-    run(meshes, tmp_path / "halves", weights, env_steps=34)
-    elsewhere = shutil.copy(weights, tmp_path / "the_same.pth")
-    run(meshes, tmp_path / "halves", elsewhere, resume=True)
+def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "whole")
+    run(meshes, tmp_path / "halves", env_steps=34)
+    run(meshes, tmp_path / "halves", resume=True)
     assert whole_state(tmp_path / "whole") == whole_state(tmp_path / "halves")
-    assert load_policy(tmp_path / "halves").choose(Component(small_solids()["angle"])) is not None
+    encoder = PublishedEncoder(tiny_encoder(), 64)
+    assert load_policy(tmp_path / "halves", encoder).choose(Component(small_solids()["angle"])) is not None
 
 
-def test_other_weights_do_not_go_on_with_a_run(meshes: Path, weights: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "run", weights, env_steps=30, validation=0)
-    other = write_tiny_weights(tmp_path / "other.pth", seed=1)
-    with pytest.raises(OptionError, match=r"other\.pth holds other weights than the run began with"):
-        run(meshes, tmp_path / "run", other, resume=True, validation=0)
+def test_other_weights_do_not_go_on_with_a_run(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "run", env_steps=30, validation=0)
+    with pytest.raises(OptionError, match="has other weights than the run began with"):
+        run(meshes, tmp_path / "run", seed=1, resume=True, validation=0)
 
 
-def test_too_few_points_and_unusable_files_are_reported_before_a_run_begins(
-    meshes: Path, weights: Path, tmp_path: Path
-) -> None:
+def test_too_few_points_are_reported_before_a_run_begins(meshes: Path, tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="16 points; this encoder needs at least 32"):
-        run(meshes, tmp_path / "run", weights, points=16)
-    weights.write_bytes(weights.read_bytes()[:500])
-    with pytest.raises(WeightsError, match="damaged"):
-        run(meshes, tmp_path / "run", weights)
-    assert not (tmp_path / "run" / "checkpoint.npz").exists()
+        run(meshes, tmp_path / "run", points=16)
 
 
-def test_the_paper_preset_sees_what_the_paper_sees() -> None:
-    paper = TrainOptions.preset("paper")
-    assert (paper.encoder, paper.points) == ("i2p-mae", 2048)
-    network = QNetwork(I2PMAEEncoder().dim, PLANES)
+def test_the_papers_network_sees_what_the_paper_sees() -> None:
+    network = q_network(I2PMAEEncoder().dim, PLANES)
     widths = [layer.out_features for layer in network.modules() if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
     assert next(network.parameters()).shape == (1024, 384 + 384)
@@ -313,13 +282,10 @@ def test_the_paper_preset_sees_what_the_paper_sees() -> None:
 
 def test_a_gpu_is_taken_where_it_pays_or_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    chosen = {
-        (encoder, device): pick_device(TrainOptions(encoder=encoder, device=device)).type
-        for encoder in ("sweep", "i2p-mae")
-        for device in ("auto", "cpu", "cuda")
+    taken = {
+        (name, large)
+        for name in ("auto", "cpu", "cuda")
+        for large in (False, True)
+        if pick_device(name, large).type == "cuda"
     }
-    assert {pair for pair, device in chosen.items() if device == "cuda"} == {
-        ("sweep", "cuda"),
-        ("i2p-mae", "auto"),
-        ("i2p-mae", "cuda"),
-    }
+    assert taken == {("auto", True), ("cuda", False), ("cuda", True)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,6 +29,8 @@ from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
 from tests.pool.obedient import pool_processes
+
+CHECKPOINTS = Path(__file__).parent.parent / "research" / "checkpoints"
 
 TINY: dict[str, Any] = {
     "env_steps": 120,
@@ -87,11 +90,9 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
     paper = TrainOptions.preset("paper")
     assert (paper.threshold, paper.volume_reward, paper.finish_reward) == (0.04, 1000, 1000)
     assert (paper.buffer_size, paper.env_steps, paper.learning_starts) == (100_000, 1_000_000, 10_000)
-    assert (paper.epsilon, paper.epsilon_decay, paper.points, paper.encoder) == (0.2, 0.99, 2048, "i2p-mae")
-    assert (paper.temperature, paper.objective) == (0, "rewards")
+    assert (paper.epsilon, paper.epsilon_decay, paper.target, paper.rotate) == (0.2, 0.99, "one-step", True)
     assert paper.max_parts >= 512
-    assert (paper.static_discount, paper.rotate) == (0, True)
-    assert TrainOptions.preset("two-cores", seed=3).seed == 3
+    assert TrainOptions.preset("returns", seed=3).seed == 3
 
 
 @pytest.mark.parametrize(
@@ -101,7 +102,7 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
         ({"batch_size": 2.5}, "batch_size is"),
         ({"threshold": float("nan")}, "threshold is"),
         ({"epsilon": 1.1}, "epsilon is"),
-        ({"objective": "both"}, "objective is"),
+        ({"target": "both"}, "target is"),
         ({"rotate": 1}, "rotate is"),
         ({"seed": -1}, "seed is"),
         ({"volume_reward": 0.0, "finish_reward": 0.0}, "both 0; there is nothing to learn"),
@@ -110,7 +111,7 @@ def test_presets_are_valid_and_the_papers_is_the_papers() -> None:
 )
 def test_options_out_of_range_and_unknown_ones_are_reported(changes: dict[str, Any], told: str) -> None:
     with pytest.raises(OptionError, match=told):
-        TrainOptions.preset(**{"name": "two-cores", **changes})
+        TrainOptions.preset(**{"name": "returns", **changes})
 
 
 def test_every_option_has_help_and_the_command_line_shows_it() -> None:
@@ -158,11 +159,29 @@ def test_a_resumed_run_is_the_run_that_was_never_stopped(
 
 @pytest.mark.slow
 def test_a_run_resumes_before_it_has_learned_anything(meshes: Path, tmp_path: Path) -> None:
-    returns: dict[str, Any] = {"n_step": 0, "value_unit": "excess", "tau": 0.02, "env_steps": 60, "validation": 0}
+    returns: dict[str, Any] = {"target": "return", "env_steps": 60, "validation": 0}
     run(meshes, tmp_path / "whole", **returns)
     run(meshes, tmp_path / "halves", **{**returns, "env_steps": 20})
     run(meshes, tmp_path / "halves", resume=True, **returns)
     assert weights(tmp_path / "whole") == weights(tmp_path / "halves")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kept", sorted(CHECKPOINTS.glob("seed_*")), ids=lambda kept: kept.name)
+def test_the_checkpoints_of_the_repository_can_be_resumed(meshes: Path, tmp_path: Path, kept: Path) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from rlacd.learn.train import train
+
+    for name in ("checkpoint.npz", "curves.jsonl"):
+        shutil.copy(kept / name, tmp_path)
+    listed = {"training": [path.name for path in meshes.glob("[act]*.ply")], "validation": []}
+    (tmp_path / "meshes.json").write_text(json.dumps(listed | {"unreadable": 0, "too_large": 0}))
+    done, said = curves(kept)[-1]["env_steps"], list[str]()
+    options = TrainOptions.preset("returns", seed=int(kept.name[5:]), env_steps=int(done) + 60, log_every=20)
+    train(meshes, tmp_path, options, resume=True, say=said.append)
+    assert any(line.startswith("resuming at step") for line in said)
+    assert curves(tmp_path)[-1]["env_steps"] > done
+    assert 0 < curves(tmp_path)[-1]["loss"] < 0.1
 
 
 @pytest.mark.nightly
@@ -170,7 +189,7 @@ def test_a_killed_run_resumes_exactly(meshes: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     run(meshes, whole, env_steps=400)
     given = [f"--{k.replace('_', '-')}={v}" for k, v in {**TINY, "env_steps": 400, "jobs": 2}.items()]
-    words = ["train", str(meshes), "--run", str(killed), "--preset", "paper", "--encoder", "sweep"]  # the defaults
+    words = ["train", str(meshes), "--run", str(killed), "--preset", "paper"]  # the defaults
     process = subprocess.Popen([sys.executable, "-m", "rlacd", *words, *given], stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while not (killed / "policy.npz").exists() and time.monotonic() < deadline:

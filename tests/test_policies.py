@@ -19,9 +19,10 @@ import rlacd
 from fuzz.networks import ABOUT, q_network
 from rlacd.errors import WeightsError
 from rlacd.options.names import LEARNED
-from rlacd.planes.sweep import paper_planes, valid_planes
+from rlacd.planes.candidates import concave_edge_planes
+from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import make_policy
-from rlacd.policies.greedy import RandomShortlist, excess_norm, hull_sum
+from rlacd.policies.greedy import Greedy, RandomShortlist, excess_norm, hull_sum, paper_planes_and_edges
 from rlacd.policies.learned import PROMISING
 from rlacd.policies.network import KIND, QPolicy, load_network
 from rlacd.policies.plane_features import FEATURES, PLANES, sweep_features
@@ -52,7 +53,7 @@ def test_policies_of_the_docs_decompose(name: str) -> None:
 
 
 def test_the_least_hull_sum_written_by_a_user_is_ours() -> None:
-    ours = make_policy("greedy-hull-sum+edges")
+    ours = Greedy("hull-sum")
     root = component_of(table())
     chosen = [policy.choose(root) for policy in (of_the_docs("LeastHulls"), ours)]
     sums = [sum(side.hull.volume for side in root.cut(plane) if side is not None) for plane in chosen]
@@ -144,8 +145,8 @@ def test_random_shortlists_cut_by_one_of_their_planes_whatever_was_cut_before(na
     policy = make_policy(name)
     policy.choose(root.cut(plane)[0])
     assert policy.choose(again) == plane
-    known = [rlacd.SweepCache(concave_edges=4 if "edges" in name else 0).candidates(root)]
-    assert plane in [block.plane(i) for block in known for i in range(len(block))]
+    known = (paper_planes_and_edges if "edges" in name else paper_planes)(root)
+    assert plane in [known.plane(i) for i in range(len(known))]
 
 
 def test_a_random_shortlist_of_all_planes_is_greedy_and_seeds_draw_different_ones() -> None:
@@ -183,6 +184,14 @@ def test_the_papers_planes_lie_about_the_centre_a_25th_of_the_longest_side_apart
     assert 75 < valid_planes(component, planes).sum() < 150
 
 
+def test_planes_along_principal_axes_that_are_coordinate_axes_are_chosen_once() -> None:
+    brick = Component(Manifold.cube((1, 2, 3)))
+    planes = paper_planes(brick)
+    distinct = np.flatnonzero(distinct_planes(brick, planes))
+    assert distinct.max() < 75
+    assert len(distinct) == valid_planes(brick, planes).sum() / 2 == len({planes.plane(int(i)) for i in distinct})
+
+
 def test_a_component_anywhere_has_the_same_features_at_the_same_size_in_thresholds() -> None:
     one = sweep_features(Component(chair()), 0.05)
     moved = sweep_features(Component(chair().translate((3, -2, 1)).scale([0.25] * 3)), 0.0125)
@@ -198,11 +207,11 @@ def test_alone_the_greatest_value_decides_and_deployed_the_least_hulls_of_the_te
 ) -> None:
     component, values = Component(chair()), load_network(network, KIND, FEATURES, 1)
     candidates = paper_planes(component)
-    worth = np.where(valid_planes(component, candidates), values(sweep_features(component, 0.05))[:, 0], -np.inf)
+    worth = np.where(distinct_planes(component, candidates), values(sweep_features(component, 0.05))[:, 0], -np.inf)
     planes = [candidates.plane(int(i)) for i in np.argsort(-worth)[:shortlist]]
     if edges:
-        cache = rlacd.SweepCache(1, 4).candidates(component)
-        planes += [cache.plane(i) for i in range(6, len(cache))]
+        beside = concave_edge_planes(component, 4)
+        planes += [beside.plane(i) for i in range(len(beside))]
     sums = [sum(side.hull.volume for side in component.cut(plane) if side is not None) for plane in planes]
     chosen = QPolicy(lambda c: values(sweep_features(c, 0.05))[:, 0], shortlist, edges).choose(component)
     assert chosen in planes

@@ -100,7 +100,7 @@ def test_a_part_without_room_below_the_threshold_keeps_its_own_hull() -> None:
         broken, met = (broken, middle) if Concavity(middle).is_met(solid) else (middle, met)
     goal, policy = Concavity(met), make_policy("greedy", SweepCache(), None)
     lift = Lift(solid, proxy, goal, policy, Run(1))
-    (part,) = lift([proxy.component])
+    (part,), _ = lift([proxy.component])
     assert goal.is_met(part)
     assert hull_union([part.hull], 1).distance(solid.vertices, 1).max() <= 1e-9
 

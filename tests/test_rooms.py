@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import runpy
 from collections import defaultdict
 from collections.abc import Iterator
@@ -170,6 +171,20 @@ def test_a_room_imports_what_its_row_says() -> None:
         if room.imports != (ANY,):
             assert allowed == set(found[room.name]) - below, f"{room.name} no longer imports all that its row lists"
         above.append(room.name)
+
+
+def test_a_layer_of_kernels_includes_those_before_it() -> None:
+    row = next(line for line in DESIGN.read_text(encoding="utf-8").splitlines() if line.startswith("| `native/`"))
+    layers = [folder.rstrip("/") for folder in row.split("`")[3::2]]
+    files = [path for path in (ROOT / NATIVE).rglob("*") if path.is_file()]
+    assert {path.parent.name for path in files} == set(layers)
+    climbs = [
+        f"{path.name} includes {layer}/"
+        for path in files
+        for layer in re.findall(r'^#include "(\w+)/', path.read_text(encoding="utf-8"), re.MULTILINE)
+        if layers.index(layer) > layers.index(path.parent.name)
+    ]
+    assert climbs == []
 
 
 def test_the_picture_is_that_of_the_code() -> None:

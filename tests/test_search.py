@@ -13,7 +13,6 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from manifold3d import Manifold
 
 import rlacd
 from rlacd import _native
@@ -22,15 +21,13 @@ from rlacd.criteria.criterion import Criterion
 from rlacd.cut import CutTree
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
-from rlacd.planes.sweep import SweepCache
-from rlacd.policies import Greedy, make_policy
+from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
-from rlacd.search.operators import Exchange, give, recut, redistribute
-from rlacd.search.part_graph import PartGraph
+from rlacd.search.operators import Exchange, give, redistribute
 from rlacd.search.search import search
-from rlacd.solid.component import Component, Part, Plane, reunite, touch
+from rlacd.solid.component import Component, Part, Plane, reunite
 from tests.hulls import assert_same_hulls
 from tests.shapes import bent_bar, box, depth_outside, own_volume, stacks, strangers, together, trimesh_of
 
@@ -111,42 +108,13 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
     root = Component(frame())
     with Run(1) as run:
         parts = first_pass(root, run)
-        state = Neighbourhood(
-            SearchContext(root, CRITERION, scores=["hull-sum"], near_sweeps=SweepCache(12, 0)), parts, run
-        )
+        state = Neighbourhood(SearchContext(root, CRITERION), parts, run)
         for steps in range(3, 15, 3):
             state.improve(steps)
             assert all(CRITERION.is_met(part) for part in state.parts)
             assert sum(own.volume for part in state.parts for own in part.members) == pytest.approx(
                 root.volume, rel=1e-6
             )
-
-
-def cubes(*places: tuple[float, float, float]) -> list[Part]:
-    return [Component(Manifold.cube().translate(place)) for place in places]
-
-
-def test_neighbours_share_a_face() -> None:
-    parts = cubes(*((float(x), float(y), 0.0) for x in range(3) for y in range(2)))
-    here = PartGraph(parts, CRITERION, Run(1))
-    assert here.around((0,)) == (1, 2)  # not 3, which has an edge in common
-    assert here.around((0, 1)) == (2, 3)
-    for seed in range(20):
-        cluster = here.draw(3, np.random.default_rng(seed))
-        assert cluster is not None
-        assert len(cluster) == 3
-        assert all(set(here.around((i,))) & set(cluster) for i in cluster)
-    assert here.draw(7, np.random.default_rng(0)) is None
-    assert here.apply(Exchange((parts[0], parts[1]), ()))
-    assert not here.apply(Exchange((parts[1], parts[2]), ()))  # gone already
-    assert here.around((2,)) == (3, 4)
-
-
-def test_touching_is_face_to_face() -> None:
-    cube, face, edge, apart = cubes((0, 0, 0), (1, 0.5, 0.5), (1, 1, 0), (1 + 1e-6, 0, 0))
-    assert touch(cube, face)
-    assert not touch(cube, edge)
-    assert not touch(cube, apart)
 
 
 def test_reuniting_again_and_again_leaves_no_crumbs() -> None:
@@ -161,20 +129,6 @@ def test_reuniting_again_and_again_leaves_no_crumbs() -> None:
         again = reunited
     assert again.volume == pytest.approx(solid.volume, rel=1e-6)
     assert len(again.faces) < 12 * len(solid.faces)  # 160 times as many without cleaning up
-
-
-def test_a_cluster_that_was_cut_badly_becomes_fewer_parts() -> None:
-    bar = Component(Manifold.cube((3, 1, 1), True))
-    pieces: list[Component] = [bar]
-    for offset in (-1.0, 0.2, 1.1):
-        pieces = [side for piece in pieces for side in piece.cut(Plane((1, 0, 0), offset)) if side is not None]
-    policy = Greedy("hull-sum", sweeps=SweepCache(12, 0))
-    exchange = recut(pieces, [], CRITERION, policy, bar, Run(1))
-    assert exchange is not None
-    assert exchange.gain == 3
-    assert exchange.into[0].volume == pytest.approx(3)
-    # With no time left, nothing is found.
-    assert recut(pieces, [], CRITERION, policy, bar, Run(1, -1.0)) is None
 
 
 def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Criterion) -> None:

@@ -27,7 +27,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.merge import drop_slivers, merge_parts
 from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
-from rlacd.planes.sweep import paper_planes, valid_planes
+from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import least_hulls
 from rlacd.policies.network import KIND, SHORTLIST, Network, best_planes, load_network
@@ -78,7 +78,8 @@ class Deployment:
         """Choose a plane."""
         candidates = paper_planes(component)
         values = self.network(sweep_features(component, self.length))[:, 0]
-        best = best_planes(values, self.exists & valid_planes(component, candidates), self.planes)
+        valid = (distinct_planes if self.exists.all() else valid_planes)(component, candidates)
+        best = best_planes(values, self.exists & valid, self.planes)
         return least_hulls(component, candidates, np.sort(best), self.edges, threads)
 
 

@@ -88,7 +88,7 @@ def fit(labels: Labels, chosen: NDArray[np.intp], seed: int) -> Network:
             error = error - (torch.zeros(len(batch)).index_add(0, owner, error) / count)[owner]
             loss = nn.functional.huber_loss(error, torch.zeros_like(error), delta=0.5)
             optimizer.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()
             optimizer.step()
             schedule.step()
     layers = [(h.weight.detach().numpy(), h.bias.detach().numpy()) for h in hidden]

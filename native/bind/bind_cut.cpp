@@ -1,11 +1,11 @@
 // Python bindings of candidate planes, of the plane sweep, of plane cuts, and of reuniting the pieces they leave.
 #include "bind/released.hpp"
-#include "cut/concave_edges.hpp"
-#include "cut/least_excess.hpp"
-#include "cut/pieces.hpp"
-#include "cut/reunite.hpp"
-#include "cut/sweep.hpp"
-#include "distance/filling.hpp"
+#include "decompose/concave_edges.hpp"
+#include "decompose/least_excess.hpp"
+#include "decompose/sweep.hpp"
+#include "solid/filling.hpp"
+#include "solid/pieces.hpp"
+#include "solid/reunite.hpp"
 
 namespace rlacd {
 

@@ -1,46 +1,30 @@
 // Python bindings of distances: of points, of a part from its hull, of hulls from a solid and of their union.
-#include "base/parallel.hpp"
 #include "bind/released.hpp"
-#include "distance/apart.hpp"
-#include "distance/concavity.hpp"
-#include "distance/crossings.hpp"
-#include "distance/filling.hpp"
-#include "distance/glue.hpp"
-#include "distance/surface.hpp"
-#include "distance/surface_field.hpp"
-#include "distance/union_distance.hpp"
+#include "convex/union_distance.hpp"
+#include "core/parallel.hpp"
+#include "solid/apart.hpp"
+#include "solid/concavity.hpp"
+#include "solid/filling.hpp"
+#include "solid/glue.hpp"
+#include "surface/crossings.hpp"
+#include "surface/pushed.hpp"
+#include "surface/surface.hpp"
+#include "surface/surface_field.hpp"
 
 namespace rlacd {
 
 constexpr int fields(Tag<Interval>) { return 2; }
+constexpr int fields(Tag<Pushed>) { return 3; }
 
 namespace {
 
 constexpr std::size_t kChunk = 256;  // points, enough to justify a thread
 
-// Runs task(begin, end) for the chunks of a number of points.
-template <class Task>
-void for_each_chunk(std::size_t count, int threads, const Task& task) {
-  parallel_for((count + kChunk - 1) / kChunk, threads,
-               [&](std::size_t chunk) { task(chunk * kChunk, std::min(count, (chunk + 1) * kChunk)); });
-}
-
-// The closest points of a surface: neighbours in the list are often near each other, so the triangle found for one
-// point bounds the distance of the next. The bound allows for rounding, so that the triangle found is the same without
-// it.
+// The closest points of a surface: neighbours in the list are often near each other.
 std::vector<Bvh::Hit> closest(const Bvh& bvh, const std::vector<Vec3>& points, int threads) {
   std::vector<Bvh::Hit> hits(points.size());
-  for_each_chunk(points.size(), threads, [&](std::size_t begin, std::size_t end) {
-    std::int32_t near = -1;
-    for (std::size_t i = begin; i < end; ++i) {
-      if (near >= 0) {
-        const double known = bvh.distance(near, points[i]), slack = 1e-7 * std::sqrt(bvh.triangle(near).longest2);
-        hits[i] = bvh.closest(points[i], -1, 0, known + slack);
-      }
-      if (hits[i].slot < 0) hits[i] = bvh.closest(points[i]);
-      near = hits[i].slot;
-    }
-  });
+  const auto find = [&](std::size_t i) { hits[i] = bvh.closest_near(points[i], i % kChunk ? hits[i - 1].slot : -1); };
+  parallel_for(points.size(), threads, find, kChunk);
   return hits;
 }
 
@@ -77,6 +61,15 @@ void bind_surface(nb::module_& m) {
            }),
            "points"_a, "threads"_a = 0,
            "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
+      .def("pushed",
+           released([](const Surface& self, const std::vector<Vec3>& points, const VectorIn<double>& steps, int times,
+                       int threads) {
+             require(steps.size() == points.size(), "one step for each point");
+             return pushed(self.bvh(), points, copied<double>(steps), times, threads);
+           }),
+           "points"_a, "steps"_a, "times"_a, "threads"_a = 0,
+           "Points [N, 3] pushed `times` times away from the nearest place of the surface, each by its step [N]: the "
+           "places [N, 3] on their ways that are farthest from the surface, how far [N], and the ends [N, 3].")
       .def(
           "crossing", released([](const Surface& self, const Mesh& mesh, double slack) {
             require(slack >= 0, "the slack must not be negative");
@@ -91,10 +84,10 @@ void bind_surface(nb::module_& m) {
                  require(accuracy >= 1, "the accuracy must be at least 1");
                  std::vector<double> windings(points.size());
                  const Winding& winding = self.winding();
-                 for_each_chunk(points.size(), threads, [&](std::size_t begin, std::size_t end) {
-                   for (std::size_t i = begin; i < end; ++i)
-                     windings[i] = is_closed ? winding.of_closed(points[i]) : winding.at(points[i], accuracy);
-                 });
+                 const auto find = [&](std::size_t i) {
+                   windings[i] = is_closed ? winding.of_closed(points[i]) : winding.at(points[i], accuracy);
+                 };
+                 parallel_for(points.size(), threads, find, kChunk);
                  return windings;
                }),
            "points"_a, "accuracy"_a = 2.0, "threads"_a = 0, "is_closed"_a = false,
@@ -253,9 +246,8 @@ void bind_union(nb::module_& m) {
            "narrow as that of `over`.")
       .def("distance", released([](const HullUnion& self, const std::vector<Vec3>& points, int threads) {
              std::vector<double> distances(points.size());
-             for_each_chunk(points.size(), threads, [&](std::size_t begin, std::size_t end) {
-               for (std::size_t i = begin; i < end; ++i) distances[i] = self.distance(points[i]);
-             });
+             parallel_for(
+                 points.size(), threads, [&](std::size_t i) { distances[i] = self.distance(points[i]); }, kChunk);
              return distances;
            }),
            "points"_a, "threads"_a = 0, "Distances [N] of points [N, 3] to the solid, 0 inside a hull.");

@@ -1,14 +1,14 @@
 // Python bindings of convex hulls: built, joined, simplified, and in contact.
 #include <cmath>
 
-#include "base/mesh_measures.hpp"
-#include "base/parallel.hpp"
 #include "bind/released.hpp"
-#include "distance/filling.hpp"
-#include "hull/convex_body.hpp"
-#include "hull/flush.hpp"
-#include "hull/hull.hpp"
-#include "hull/simplify_hull.hpp"
+#include "convex/convex_body.hpp"
+#include "convex/flush.hpp"
+#include "convex/hull.hpp"
+#include "convex/simplify_hull.hpp"
+#include "core/mesh_measures.hpp"
+#include "core/parallel.hpp"
+#include "solid/filling.hpp"
 
 namespace rlacd {
 
@@ -43,6 +43,13 @@ std::vector<double> joint_hull_volumes(const std::vector<const HullCorners*>& hu
   return volumes;
 }
 
+// Nothing if the hull is flat.
+std::optional<std::tuple<std::vector<Vec3>, std::vector<Triangle>, double>> with_volume(Mesh hull) {
+  if (hull.faces.empty()) return std::nullopt;
+  const double volume = mesh_volume(hull);
+  return std::tuple(std::move(hull.vertices), std::move(hull.faces), volume);
+}
+
 void require_depth(double depth, double touch) {
   require(depth > 0 && std::isfinite(depth), "the depth must be positive");
   require(touch >= 0, "the gap of a touch must not be negative");
@@ -57,15 +64,24 @@ void bind_hull(nb::module_& m) {
         "Every index is an extreme point, the facets are exactly convex (no rounding in the decisions) and outward "
         "oriented. rank < 3 (all points coplanar): no indices, no faces.");
   m.def(
-      "joint_hull", released([](const std::vector<PointsIn>& groups) {
-        Mesh hull = hull_mesh(to_numbers_only(groups));
-        const double volume = mesh_volume(hull);
-        auto found = std::tuple(std::move(hull.vertices), std::move(hull.faces), volume);
-        return std::get<1>(found).empty() ? std::nullopt : std::optional(std::move(found));
-      }),
+      "joint_hull",
+      released([](const std::vector<PointsIn>& groups) { return with_volume(hull_mesh(to_numbers_only(groups))); }),
       "groups"_a,
       "Corners [H, 3], faces [F, 3] and volume of the convex hull of several arrays of points [N, 3]; None if all lie "
       "in a plane.");
+  m.def("cut_back", released([](Mesh hull, const std::vector<HalfSpace>& spaces) {
+          const auto is_beyond = [&](const HalfSpace& space) {
+            return std::any_of(hull.vertices.begin(), hull.vertices.end(), [&](Vec3 p) { return space.depth(p) < 0; });
+          };
+          bool is_cut = false;
+          for (const HalfSpace& space : spaces)
+            if (Mesh rest; is_beyond(space) && !(rest = hull_below(hull, space)).faces.empty())
+              hull = std::move(rest), is_cut = true;
+          return is_cut ? with_volume(std::move(hull)) : std::nullopt;
+        }),
+        "vertices"_a, "faces"_a, "spaces"_a,
+        "Corners [H, 3], faces [F, 3] and volume of what of a convex hull lies in half-spaces n.x <= d, rows of n and "
+        "d [P, 4], but for those that would leave it flat; None if nothing of it is outside.");
   m.def("holds_ball", released(holds_ball), "vertices"_a, "faces"_a, "radius"_a,
         "Whether a ball of this radius fits into a convex hull.");
   m.def("joint_hull_volumes", released(joint_hull_volumes), "hulls"_a, "pairs"_a, "threads"_a = 0,

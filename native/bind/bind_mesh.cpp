@@ -1,19 +1,19 @@
 // Python bindings of welding, of the topology of soups and of closed meshes, and of what is measured on meshes.
 #include <cmath>
 
-#include "base/mesh_measures.hpp"
-#include "base/stop.hpp"
 #include "bind/released.hpp"
-#include "distance/bvh.hpp"
-#include "distance/crossings.hpp"
-#include "distance/filling.hpp"
-#include "mesh/curve.hpp"
-#include "mesh/edges.hpp"
-#include "mesh/least_bent.hpp"
-#include "mesh/near_boxes.hpp"
-#include "mesh/spread_points.hpp"
-#include "mesh/weld.hpp"
-#include "proxy/simplifier.hpp"
+#include "core/mesh_measures.hpp"
+#include "core/stop.hpp"
+#include "decompose/simplifier.hpp"
+#include "solid/filling.hpp"
+#include "surface/bvh.hpp"
+#include "surface/crossings.hpp"
+#include "surface/curve.hpp"
+#include "surface/edges.hpp"
+#include "surface/least_bent.hpp"
+#include "surface/near_boxes.hpp"
+#include "surface/spread_points.hpp"
+#include "surface/weld.hpp"
 
 namespace rlacd {
 

@@ -1,6 +1,6 @@
 // Python bindings of the navigable space: its balls, and hulls against balls.
 #include "bind/released.hpp"
-#include "navigable/spread_balls.hpp"
+#include "decompose/spread_balls.hpp"
 
 namespace rlacd {
 

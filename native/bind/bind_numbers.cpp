@@ -1,7 +1,7 @@
 // Python bindings of the elementary functions, elementwise, and of networks.
-#include "base/elementary.hpp"
 #include "bind/released.hpp"
-#include "network/layers.hpp"
+#include "core/elementary.hpp"
+#include "decompose/network.hpp"
 
 namespace rlacd {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <limits>
 
-#include "base/interrupts.hpp"
-#include "base/kernel_time.hpp"
-#include "base/stop.hpp"
+#include "core/interrupts.hpp"
+#include "core/kernel_time.hpp"
+#include "core/stop.hpp"
 
 namespace rlacd {
 

@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/geometry.hpp"
-#include "base/kernel_time.hpp"
+#include "core/geometry.hpp"
+#include "core/kernel_time.hpp"
 
 namespace rlacd {
 

@@ -45,6 +45,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.provenance import owners
+from rlacd.solid.topology import used_points
 
 MeshLike: TypeAlias = (
     "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
@@ -171,7 +172,8 @@ def decompose(
     gap : float
         Radius of a ball, as a share of the longest side: what it cannot get into through the openings counts as closed.
     seed : int
-        Seed of all random choices; the same input, options and seed give the same bytes.
+        Seed of all random choices; the same input, options and seed give the same bytes. Another seed starts from cuts
+        by other planes: the best of several is often better than any one.
     threads : int, optional
         Number of threads; all processors by default. The result does not depend on it.
     timeout : float, optional
@@ -188,7 +190,7 @@ def decompose(
         Seconds the search may take, instead of the limits of the level; the result then depends on the speed of the
         machine. ``best`` has 5, and more if the search of ``balanced`` takes longer.
     search_steps : int, optional
-        Steps the search may take, instead of the limits of the level (about 10 to 20 a second on one core). The result
+        Steps the search may take, instead of the limits of the level (about 100 a second on one core). The result
         does not depend on the speed of the machine.
     preset : str, optional
         The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton``,
@@ -287,7 +289,7 @@ def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> R
 
 def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
-    frame = Frame.of(source.vertices[np.unique(source.faces)])
+    frame = Frame.of(used_points(source.vertices, source.faces))
     scale = frame.scale
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()

@@ -154,8 +154,9 @@ class _Decomposer:
     @classmethod
     def of(cls, model: Model, goal: Criterion, options: Options, run: Run) -> _Decomposer:
         """Prepare to decompose a model."""
-        sweeps = SweepCache()
-        second = Greedy("hull-sum", sweeps=sweeps) if options.first_policy == options.default_policy else None
+        is_default = options.first_policy == options.default_policy
+        sweeps = SweepCache(seed=(options.seed,) if is_default and options.seed else None)
+        second = Greedy("hull-sum", sweeps=sweeps) if is_default else None
         policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(goal)))
         tree = CutTree(model.component, policy, run, second=second)
         return cls(model, options, run, sweeps, tree)

@@ -288,7 +288,6 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("view robot.urdf", "is a robot; view shows a single mesh"),
         ("view -", "only rlacd decompose reads stdin"),
         ("view {dir}/nothing.glb", "does not exist"),
         ("view {dir}", "is a folder"),

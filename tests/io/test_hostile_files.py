@@ -233,9 +233,9 @@ def restore(place: Path) -> Any:
 
 
 TRAPS = {
-    "bomb": (zipfile.ZIP_DEFLATED, "it.npy", lambda: array_of(2**25) + bytes(2**28), "it is compressed"),
-    "shape": (zipfile.ZIP_STORED, "it.npy", lambda: array_of(10**12) + bytes(80), "Unable to allocate"),
-    "objects": (zipfile.ZIP_STORED, "it.npy", lambda: npy(np.array([{}])), "Object arrays cannot be loaded"),
+    "bomb": (zipfile.ZIP_DEFLATED, "net.it.npy", lambda: array_of(2**25) + bytes(2**28), "it is compressed"),
+    "shape": (zipfile.ZIP_STORED, "net.it.npy", lambda: array_of(10**12) + bytes(80), "Unable to allocate"),
+    "objects": (zipfile.ZIP_STORED, "net.it.npy", lambda: npy(np.array([{}])), "Object arrays cannot be loaded"),
     "depth": (zipfile.ZIP_STORED, "state.npy", lambda: npy(np.frombuffer(b"[" * 10**6, np.uint8)), "recursion"),
 }
 

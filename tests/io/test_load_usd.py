@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -137,14 +138,23 @@ def test_files_outside_the_folder_or_missing_are_named_and_never_opened(tmp_path
 
 
 @pytest.mark.parametrize("changes", [{1604: 137, 1628: 56}, {107: 90, 241: 56, 431: 188}])
-def test_a_file_that_crashes_openusd_is_refused(tmp_path: Path, changes: dict[int, int]) -> None:
+def test_a_file_that_crashes_openusd_is_refused_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changes: dict[int, int]
+) -> None:
+    """OpenUSD writes a report of its crash into TMPDIR as it is when it is loaded."""
     path = cupboard(tmp_path / "cupboard.usdc")
     content = bytearray(path.read_bytes())
     for at, byte in changes.items():
         content[at] = byte  # usd-core 26.11 ends the process
     path.write_bytes(bytes(content))
-    with pytest.raises(MeshFileError, match=r"cupboard\.usdc.*export it again"):
-        load_mesh(path)
+    left = tmp_path / "left"
+    left.mkdir()
+    monkeypatch.setenv("TMPDIR", str(left))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    for read in (load_mesh, read_colliders):
+        with pytest.raises(MeshFileError, match=r"cupboard\.usdc.*export it again"):
+            read(path)
+    assert list(left.iterdir()) == []
 
 
 def test_faces_that_do_not_fit_are_refused(tmp_path: Path) -> None:

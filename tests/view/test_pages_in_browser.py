@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from click.testing import CliRunner
 
 import rlacd
+from rlacd.cli.main import app
 from rlacd.view.server import ViewServer
 from tests.view.viewing import open_viewer
 
@@ -245,6 +247,21 @@ def test_another_mesh_is_dropped_and_shown(seen: Watched, viewer: ViewServer, tm
     assert "400" in seen.complaints.pop()
 
 
+@pytest.mark.slow
+def test_an_option_that_is_refused_keeps_no_other_mesh_out_and_is_said_again(seen: Watched, tmp_path: Path) -> None:
+    page = seen.page
+    page.fill("#threshold-number", "-3")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#trouble:not([hidden])")
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.ply")
+    page.set_input_files("#file", tmp_path / "ball.ply")
+    wait_for_run(page, 2)
+    page.wait_for_selector("#trouble:not([hidden])")
+    assert page.title() == "ball: 1 hull"
+    assert "threshold is -3" in page.locator("#trouble").inner_text()
+    assert all("400" in seen.complaints.pop() for _ in range(2))
+
+
 @pytest.mark.nightly
 def test_the_command_is_copied(viewer: ViewServer, mesh: Path, browser: Any) -> None:
     with open_page(browser, permissions=["clipboard-read", "clipboard-write"]) as watched:
@@ -322,6 +339,20 @@ def test_an_open_box_is_explained_and_filled_at_a_click(seen: Watched, browser: 
         assert page.locator("#notes").is_hidden()
 
 
+@pytest.mark.slow
+def test_a_closed_cavity_is_explained_and_kept_at_a_click(seen: Watched, browser: Any, tmp_path: Path) -> None:
+    assert seen.page.locator("#cavities").is_hidden(), "nothing is asked of a mesh without"
+    inner = trimesh.creation.box(extents=(0.8, 0.8, 0.8))
+    inner.invert()
+    with shown(browser, trimesh.creation.box() + inner, tmp_path / "room.stl") as watched:
+        page = watched.page
+        assert rows(page) == 1
+        page.check("#cavities input[value=keep]")
+        wait_for_run(page, 2)
+        assert rows(page) == 6
+        assert page.locator("#cavities").is_visible()
+
+
 @pytest.mark.nightly
 def test_rows_and_hulls_point_at_each_other(seen: Watched) -> None:
     page = seen.page
@@ -364,6 +395,28 @@ def test_a_laptop_shows_ten_rows(seen: Watched) -> None:
     shown = page.locator("#list").bounding_box()
     head = page.locator("#list thead").bounding_box()
     assert min(shown["y"] + shown["height"], 800) - (head["y"] + head["height"]) >= 10 * height
+
+
+@pytest.mark.slow
+def test_figures_are_those_of_the_command_and_all_stays_in_the_frame(seen: Watched, mesh: Path, tmp_path: Path) -> None:
+    page = seen.page
+    page.fill("#threshold-number", "0.4")
+    page.keyboard.press("Enter")
+    wait_for_run(page, 2)
+    words = ["decompose", str(mesh), "-o", str(tmp_path / "hulls.glb"), "--quality", "fast", "--threshold", "0.4"]
+    said = re.search(r"max concavity ([\d.]+)", CliRunner().invoke(app, words).output)
+    assert said is not None
+    figure = page.locator("#summary").inner_text().split("concavity\u00a0")[1].split()[0]
+    listed = page.locator("#parts tbody td:nth-child(4)").all_inner_texts()
+    assert float(figure) == pytest.approx(float(said[1]), rel=0.006) == pytest.approx(max(map(float, listed)), rel=0.06)
+    page.set_viewport_size({"width": 900, "height": 1000})  # the sides are nearest
+    page.locator("#explode").focus()
+    page.keyboard.press("End")
+    page.locator("#explode").blur()
+    settle(page)
+    scene = pixels(page)
+    assert abs(np.diff(scene[:, [0, -1]], axis=0)).max() <= 3, "the sides show nothing but the background"
+    assert len({tuple(color) for color in scene.reshape(-1, 4)[::7].tolist()}) > 50
 
 
 @pytest.mark.nightly

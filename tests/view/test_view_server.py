@@ -233,7 +233,7 @@ def test_the_input_is_there_before_any_hull(mesh: Path) -> None:
         scene = ask(viewer, "GET", "/scene").json
         go.set()
         assert (scene["report"], scene["parts"], scene["name"]) == (None, [], NAME)
-        assert scene["input"]["faces"]
+        assert scene["input"][0]["faces"]
         assert scene["scale"] == pytest.approx(1.0)
         settled(viewer, run=1)
 
@@ -297,7 +297,7 @@ def test_a_file_that_is_no_mesh_is_refused_and_nothing_is_lost(
         ({"primitives": True, "overlap": 0.02}, ["--primitives all", "--overlap 0.02"]),
         ({"primitives": ["box", "sphere"], "overlap": 0.0}, ["--primitives box,sphere"]),
         ({"criterion": "volume", "volume_tolerance": 0.02}, ["--criterion volume", "--tolerance 0.02"]),
-        ({"open": "solid"}, ["--open solid"]),
+        ({"open": "solid", "keep_cavities": True}, ["--open solid", "--keep-cavities"]),
         ({"criterion": None, "threshold": None, "quality": None}, []),
     ],
 )
@@ -438,7 +438,7 @@ def test_a_port_in_use_is_one_sentence_and_without_one_a_free_one_is_found(viewe
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
     controls, usual, space = read_controls({}), Options(), NavigableSpace()
-    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap", "open"):
+    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap", "open", "keep_cavities"):
         assert controls[name] == getattr(usual, name)
     assert bool(controls["primitives"]) == bool(usual.primitives)
     assert (controls["radius"], controls["tolerance"]) == (space.radius, space.tolerance)

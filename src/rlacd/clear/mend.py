@@ -16,7 +16,7 @@ import numpy as np
 
 from rlacd.clear.bodies import Body, Surface
 from rlacd.clear.motion import Motion
-from rlacd.clear.touching import TOUCH, Offence, Shapes, Touching, check, size_of
+from rlacd.clear.touching import TOUCH, Known, Offence, Shapes, Touching, check, size_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import concatenated
 from rlacd.solid.obstacle import Obstacle
@@ -103,12 +103,12 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
         The extra ``clear`` is not installed.
     """
     bodies = list(bodies)
-    known: dict[tuple[int, int, bytes], bool] = {}
+    known = Known()
     touching = check(bodies, motion, known=known)
     first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
-        again = _wish(bodies, wrong, wishes)
+        again = _wish(bodies, wrong, wishes, known)
         if not again:
             break
         for body in sorted(again):
@@ -122,9 +122,9 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))
 
 
-def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:
+def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes, known: Known) -> set[int]:
     """Add what bodies are to stay out of, and return those to decompose again: not both of a pair at once."""
-    shapes = {i: Shapes(bodies[i]) for pair in wrong for i in pair}
+    shapes = {i: Shapes(bodies[i], known) for pair in wrong for i in pair}
     again, fixed = set[int](), set[int]()
     for (i, j), found in sorted(wrong.items(), key=lambda one: (-one[1].offences[0].depth, one[0])):
         seen = [place.pose for place in _spread(found.offences)]

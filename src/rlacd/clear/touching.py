@@ -5,8 +5,9 @@ The hulls of a body hold its surface, so bodies whose hulls are apart need no te
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from rlacd.clear.motion import Motion
 from rlacd.errors import import_extra
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.poses import inverse, moved
+from rlacd.solid.topology import used_points
 
 TOUCH = 1e-6
 """Share of the size of all bodies at rest up to which an overlap of hulls, or a gap between bodies, means nothing."""
@@ -68,11 +70,15 @@ class Touching:
         return new > int(np.count_nonzero(self.meshes))
 
 
+def _coal() -> Any:
+    return sys.modules.get("coal") or import_extra("coal", "checking that bodies stay clear of each other", "clear")
+
+
 def check(
     bodies: Sequence[Body],
     motion: Motion,
     pairs: Collection[tuple[int, int]] | None = None,
-    known: dict[tuple[int, int, bytes], bool] | None = None,
+    known: Known | None = None,
 ) -> dict[tuple[int, int], Touching]:
     """Find the pairs of bodies whose hulls touch at some sample, by the numbers of the two, the lower first.
 
@@ -83,21 +89,22 @@ def check(
     motion : Motion
     pairs : collection of (int, int), optional
         Look at no others.
-    known : dict, optional
-        Keeps which bodies touch, for other hulls of the same bodies.
+    known : Known, optional
+        Keeps what another check of these bodies, with the same hulls or others, needs again.
 
     Raises
     ------
     MissingExtraError
         The extra ``clear`` is not installed.
     """
-    import_extra("coal", "checking that bodies stay clear of each other", "clear")
+    _coal()
     filled = [i for i, body in enumerate(bodies) if body.hulls and len(body.mesh[1])]
     if len(filled) < 2:
         return {}
     boxes = np.stack([bodies[i].box for i in filled])
     placed = placed_boxes(boxes, motion.poses[:, filled])
     size = size_of(bodies, motion)
+    known = known or Known()
     shapes = {i: Shapes(bodies[i], known) for i in filled}
     near, numbers = overlapping(placed), np.array(filled)
     near[:, 1:] = numbers[near[:, 1:]]
@@ -165,45 +172,68 @@ class _Place(NamedTuple):
 
 
 def _place(pose: FloatArray) -> _Place:
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     return _Place(coal.Transform3s.Identity(), coal.Transform3s(pose[:3, :3], pose[:3, 3]))
 
 
 def _depth(first: Any, second: Any, pose: FloatArray) -> float:
     """How deep two convex polytopes overlap; 0 if they do not."""
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     at, result = _place(pose), coal.CollisionResult()
     if not coal.collide(first, at.fixed, second, at.moved, coal.CollisionRequest(), result):
         return 0.0
     return max(0.0, -float(result.getContact(0).penetration_depth))
 
 
-class Shapes:
-    """A body as coal's shapes, made when first needed; `known` keeps which bodies touch."""
+@dataclass(frozen=True)
+class Known:
+    """What checks of the same bodies share.
 
-    def __init__(self, body: Body, known: dict[tuple[int, int, bytes], bool] | None = None) -> None:
-        self.body, self._known = body, {} if known is None else known
+    Attributes
+    ----------
+    meets : dict
+        Whether two bodies touch, by their surfaces' numbers and the pose of the second.
+    shapes : dict
+        coal's shapes, by their surfaces' numbers; with the surfaces, so that these numbers stay theirs.
+    """
+
+    meets: dict[tuple[int, int, bytes], bool] = field(default_factory=dict)
+    shapes: dict[int, tuple[Surface, Any]] = field(default_factory=dict)
+
+    def shape(self, surface: Surface, make: Callable[[Surface], Any]) -> Any:
+        """A surface as a shape."""
+        key = id(surface[0])
+        if key not in self.shapes:
+            self.shapes[key] = surface, make(surface)
+        return self.shapes[key][1]
+
+
+class Shapes:
+    """A body as coal's shapes, made when first needed."""
+
+    def __init__(self, body: Body, known: Known) -> None:
+        self.body, self._known = body, known
         self.boxes = np.stack([np.stack([v.min(axis=0), v.max(axis=0)]) for v, _ in body.hulls])
 
     @cached_property
     def mesh(self) -> Any:
         """The surface as it was read."""
-        return _mesh(self.body.mesh)
+        return self._known.shape(self.body.mesh, _mesh)
 
     @cached_property
     def hulls(self) -> list[Any]:
         """The hulls as convex polytopes."""
-        return [_convex(hull) for hull in self.body.hulls]
+        return [self._known.shape(hull, _convex) for hull in self.body.hulls]
 
     def meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
         """Whether the bodies are within reach of each other, the other seen at a pose, or one holds the other."""
         key = id(self.body.mesh[0]), id(other.body.mesh[0]), pose.tobytes()
-        if key not in self._known:
-            self._known[key] = self._meets(other, pose, reach)
-        return self._known[key]
+        if key not in self._known.meets:
+            self._known.meets[key] = self._meets(other, pose, reach)
+        return self._known.meets[key]
 
     def _meets(self, other: Shapes, pose: FloatArray, reach: float) -> bool:
-        coal = import_extra("coal", "", "clear")
+        coal = _coal()
         at, request = _place(pose), coal.CollisionRequest()
         request.enable_contact, request.security_margin = False, reach
         if coal.collide(self.mesh, at.fixed, other.mesh, at.moved, request, coal.CollisionResult()):
@@ -212,13 +242,13 @@ class Shapes:
 
     def gap(self, other: Shapes, pose: FloatArray) -> float:
         """How far the surfaces of the bodies are apart, the other seen at a pose."""
-        coal = import_extra("coal", "", "clear")
+        coal = _coal()
         at, request = _place(pose), coal.DistanceRequest()
         return float(coal.distance(self.mesh, at.fixed, other.mesh, at.moved, request, coal.DistanceResult()))
 
     def enters(self, other: Shapes, pose: FloatArray) -> bool:
         """Whether a hull touches the other body's surface, seen at a pose."""
-        coal = import_extra("coal", "", "clear")
+        coal = _coal()
         at, request = _place(pose), coal.CollisionRequest()
         request.enable_contact = False
         return any(
@@ -226,19 +256,20 @@ class Shapes:
         )
 
     @cached_property
+    def used(self) -> FloatArray:
+        """The corners [N, 3] of the surface."""
+        return used_points(*self.body.mesh)
+
+    @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the box around the body [2, 3]."""
-        vertices, faces = self.body.mesh
-        used = vertices[np.unique(faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        return np.stack([self.used.min(axis=0), self.used.max(axis=0)])
 
     @cached_property
     def corner(self) -> FloatArray:
         """The point [1, 3] of the surface farthest from its middle: hardly ever in the box of another body."""
-        vertices, faces = self.body.mesh
-        used = vertices[np.unique(faces)]
-        away = used - self.box.mean(axis=0)
-        return used[[dots(away, away).argmax()]]
+        away = self.used - self.box.mean(axis=0)
+        return self.used[[dots(away, away).argmax()]]
 
     @cached_property
     def _surface(self) -> _native.Surface:
@@ -253,7 +284,7 @@ class Shapes:
 
 
 def _mesh(surface: Surface) -> Any:
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     vertices, faces = surface
     model = coal.BVHModelOBBRSS()
     model.beginModel(len(faces), len(vertices))
@@ -264,7 +295,7 @@ def _mesh(surface: Surface) -> Any:
 
 
 def _convex(surface: Surface) -> Any:
-    coal = import_extra("coal", "", "clear")
+    coal = _coal()
     points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     points.extend([np.asarray(vertex, dtype=np.float64) for vertex in surface[0]])
     triangles.extend([coal.Triangle(*face) for face in surface[1].tolist()])

@@ -150,7 +150,7 @@ def _rewrite(
     stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None
 ) -> bool:
     """Replace the collision meshes of a robot, or of a stage that has been read; returns whether all are complete."""
-    from rlacd.cli.terminal import rewrite_summary, watching
+    from rlacd.cli.terminal import rewrite_summary, watching, writing
     from rlacd.io.robots.rewrite import rewrite_robot, rewrite_stage
     from rlacd.plain_json import to_json
 
@@ -163,7 +163,11 @@ def _rewrite(
             done = rewrite_robot(robot, place, **given, **options)
     if not wanted.quiet:
         say(rewrite_summary(done, unit))
-    _write_report(wanted, to_json(done.report()))
+    if wanted.report is not None and is_html(wanted.report):
+        with writing("report", wanted.report, quiet=bool(wanted.quiet)):
+            done.save_report(wanted.report)
+    else:
+        _write_report(wanted, to_json(done.report()))
     return done.complete
 
 
@@ -214,8 +218,6 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes."""
     if wanted.output == STDIO:
         raise OptionError("a robot is several files, which do not fit into stdout: give -o a file name.")
-    if wanted.report is not None and is_html(wanted.report):
-        raise OptionError("--report as a page is for a single mesh; for a robot give a .json file.")
     for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "scene"):
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_format" else name.replace("_", "-")

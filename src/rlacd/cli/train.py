@@ -12,7 +12,7 @@ from rlacd.cli.options import PoolOptions
 from rlacd.errors import OptionError, import_extra
 from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
 
-DEFAULT_PRESET = "two-cores"
+DEFAULT_PRESET = "returns"
 
 
 def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> None:
@@ -24,7 +24,7 @@ def _train(meshes: Path, run: Path, preset: str, resume: bool, **given: Any) -> 
       rlacd train meshes/ --run run/ --seed 1
       rlacd train meshes/ --run run/ --seed 1 --resume --jobs 8
       rlacd train meshes/ --run run/ --environments 256 --ray auto
-      rlacd train meshes/ --run run/ --preset paper --encoder-weights i2p_mae.pth
+      rlacd train meshes/ --run run/ --preset paper
 
     The training is the reinforcement learning of RL-ACD (Luo et al. 2025); numbers in parentheses are the paper's
     sections. The run's folder receives the curves, a checkpoint for --resume, and policy.npz, the best network so far,

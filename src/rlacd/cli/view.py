@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import webbrowser
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of
-from rlacd.cli.decompose import ROBOTS
 from rlacd.cli.exit_codes import leave, say
 from rlacd.cli.lean import ctrl_c_at_once
 from rlacd.cli.options import lengths
 from rlacd.cli.pipes import refuse_stdin
-from rlacd.errors import OptionError
 from rlacd.options import Options
 from rlacd.options.output import OutputOptions
 
@@ -29,19 +28,22 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
       rlacd view chair.glb
       rlacd view chair.glb --threshold 0.02 --port 9000
       rlacd view chair.glb --no-browser       # prints the address only, for ssh -L 8765:localhost:8765
+      rlacd view robot.urdf                   # its links, with a slider for each joint
 
     On the page, rotate the hulls, pull them apart, colour them by error, change thresholds and criteria, and download
     any format. Nothing leaves this machine. Ctrl-C ends it.
     """
     refuse_stdin(mesh)
-    if mesh.suffix.lower() in ROBOTS:
-        raise OptionError(f"{mesh} is a robot; view shows a single mesh: give one of the meshes that it refers to.")
+    packages = given.pop("package_dirs") or ()
     with ctrl_c_at_once():
-        from rlacd.decompose_mesh import decompose
+        from rlacd.io.robots.viewed import USUAL, decompose_viewed, moves, read_viewed
         from rlacd.view.viewer import open_viewer
 
-    controls = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
-    with open_viewer(mesh, decompose, controls, **given) as server, contextlib.suppress(KeyboardInterrupt):
+    asked = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
+    controls = {**USUAL, **asked} if moves(mesh) else asked
+    given["read"] = partial(read_viewed, package_dirs=packages)
+    decompose = partial(decompose_viewed, package_dirs=packages)
+    with open_viewer(mesh, decompose, controls, **given) as server, suppress(KeyboardInterrupt):
         say(f"{mesh.name} is shown at {server.address} (Ctrl-C ends)")
         if browser:
             webbrowser.open(server.address)
@@ -54,9 +56,9 @@ COMMAND = Command(
     "view",
     _view,
     [
-        Argument("mesh", "IN", "The mesh, as for decompose; not a robot."),
+        Argument("mesh", "IN", "The mesh or robot, as for decompose."),
         *options_of(Options, only=(*CONTROLS, "threads")),
-        *options_of(OutputOptions, only=("up",)),
+        *options_of(OutputOptions, only=("up", "package_dirs")),
         Option("--port", type=int, help="Where the page is served.  [default: 8765, or any free one]"),
         Option("--browser/--no-browser", default=True, help="Open the page in the browser."),
     ],

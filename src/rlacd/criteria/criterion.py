@@ -105,7 +105,7 @@ class Criterion(Protocol):
 
 
 class Feasibility(IntEnum):
-    """Whether a solid clipped to a hull may meet a criterion (see native/distance/filling.hpp)."""
+    """Whether a solid clipped to a hull may meet a criterion (see native/solid/filling.hpp)."""
 
     MAYBE = 0
     NO = 1

@@ -26,7 +26,7 @@ from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray, dots
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import DENSE, Part
 from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
@@ -255,19 +255,10 @@ def kept_within(part: Part, sides: FloatArray, criterion: Criterion) -> Part:
 
     The part stays as it is if nothing is beyond, or if it would no longer meet the criterion.
     """
-    hull = part.hull
-    for side in sides:
-        beyond = dots(hull.vertices, side[:3]) - side[3]
-        if beyond.max() > 0:
-            a, b = hull.faces.ravel(), np.roll(hull.faces, -1, axis=1).ravel()
-            crossing = (beyond[a] <= 0) & (beyond[b] > 0)
-            a, b = a[crossing], b[crossing]
-            share = beyond[a] / (beyond[a] - beyond[b])
-            on_plane = hull.vertices[a] + share[:, None] * (hull.vertices[b] - hull.vertices[a])
-            hull = Hull.of(np.concatenate([hull.vertices[beyond <= 0], on_plane])) or hull
-    if hull is part.hull:
+    cut_back = _native.cut_back(part.hull.vertices, part.hull.faces, sides)
+    if cut_back is None:
         return part
-    clipped = part.with_hull(hull)
+    clipped = part.with_hull(Hull(*cut_back))
     return clipped if criterion.is_met(clipped) or not criterion.is_met(part) else part
 
 

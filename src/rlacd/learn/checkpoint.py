@@ -41,8 +41,7 @@ def save_checkpoint(path: Path, arrays: Mapping[str, Mapping[str, Any]], state: 
     OutputError
         The disk is full or the folder is not writable.
     """
-    known = {"version": __version__, "owners": [*arrays], **state}  # an optimizer has no arrays before its first step
-    plain = {"state": np.frombuffer(json.dumps(known).encode(), np.uint8)}
+    plain = {"state": np.frombuffer(json.dumps({"version": __version__, **state}).encode(), np.uint8)}
     for owner, own in arrays.items():
         for name, value in own.items():
             plain[f"{owner}.{name}"] = value.cpu().numpy() if isinstance(value, torch.Tensor) else value
@@ -66,11 +65,11 @@ def load_checkpoint(path: Path) -> tuple[dict[str, dict[str, NDArray[Any]]], dic
                 raise ValueError("it is compressed")  # a small file must not expand in memory
         with np.load(path, allow_pickle=False) as file:
             state = json.loads(file["state"].tobytes())
-            arrays: dict[str, dict[str, NDArray[Any]]] = {owner: {} for owner in state["owners"]}
+            arrays: dict[str, dict[str, NDArray[Any]]] = {}
             for whole in file.files:
                 owner, _, name = whole.partition(".")
                 if name:
-                    arrays[owner][name] = file[whole]
+                    arrays.setdefault(owner, {})[name] = file[whole]
         version = state["version"]
     except damage as error:
         raise TrainingError(f"the checkpoint {path} is damaged ({error}); remove it to train again.") from error

@@ -19,17 +19,7 @@ from rlacd.solid.component import Component, Plane
 
 @dataclass(eq=False)
 class Settled:
-    """Components sorted by status.
-
-    Attributes
-    ----------
-    unfinished : list of Component
-        Connected components that miss the criterion and have a valid plane left.
-    finished : list of Component
-        Components that meet the criterion.
-    stuck : list of Component
-        Components that miss the criterion and have no valid plane left.
-    """
+    """Components by status: those that miss the criterion are *unfinished*, or *stuck* if no valid plane is left."""
 
     unfinished: list[Component] = field(default_factory=list)
     finished: list[Component] = field(default_factory=list)
@@ -37,30 +27,22 @@ class Settled:
 
     @property
     def all(self) -> list[Component]:
-        """All components."""
+        """Get all of them."""
         return self.unfinished + self.finished + self.stuck
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Outcome of a cut.
-
-    Attributes
-    ----------
-    left : Settled
-        The pieces; the component itself, stuck, if the plane left nothing, or only a sliver, on one side.
-    saved : float
-        r_1 (eq. 2): (|CH(m_i)| - the sum of |CH| over its pieces) / |CH(m)|, where m is the original solid.
-    finishes : float
-        r_2 (eq. 3): 1 / (1 + log(|M'| - 1)) if this cut leaves every component of the solid finished, else 0.
-    discounts : list of float
-        Eq. 9 for each unfinished component: |CH(child)| / |CH(component)|; their sum is at most 1.
-    """
+    """Outcome of a cut."""
 
     left: Settled
+    """The pieces; the component itself, stuck, if the plane left nothing, or only a sliver, on one side."""
     saved: float
+    """r_1 (eq. 2): (|CH(m_i)| - the sum of |CH| over its pieces) / |CH(m)|, where m is the original solid."""
     finishes: float
+    """r_2 (eq. 3): 1 / (1 + log(|M'| - 1)) if this cut leaves every component of the solid finished, else 0."""
     discounts: list[float]
+    """Eq. 9 for each unfinished component: |CH(child)| / |CH(component)|; their sum is at most 1."""
 
     def reward(self, options: TrainOptions) -> float:
         """r = lambda_1 r_1 + lambda_2 r_2."""
@@ -85,22 +67,14 @@ class Memory:
 class CutEnv(Settled):
     """The decision process of one solid; `reset` and `step` are those of Gymnasium, with components for observations.
 
-    The state is the connected components that miss the criterion, and the parts finished so far. Every unfinished
-    component has to be cut eventually, and its cuts do not depend on the others, so the order matters for r_2 alone.
-
-    Parameters
-    ----------
-    solid : Component
-    criterion : Criterion
-        Decides when a component is finished.
-    memory : Memory, optional
-        That of earlier episodes with the same `solid` and criterion; affects only the time taken.
+    Components are connected, and finished when they meet the criterion. Every unfinished one has to be cut eventually,
+    and its cuts do not depend on the others, so the order matters for r_2 alone. `memory` is that of earlier episodes
+    with the same solid and criterion; it affects only the time taken.
     """
 
     def __init__(self, solid: Component, criterion: Criterion, memory: Memory | None = None) -> None:
         super().__init__()
-        self._criterion = criterion
-        self.memory = memory or Memory()
+        self._criterion, self.memory = criterion, memory or Memory()
         self._solid, self._hull_volume = solid, solid.hull.volume
         self.reset()
 

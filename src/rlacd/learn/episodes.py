@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.learn.checkpoint import packed, unpacked
-from rlacd.learn.encoders import Encoder
+from rlacd.learn.encoder import Encoder
 from rlacd.learn.environment import CutEnv
 from rlacd.learn.options import TrainOptions
 from rlacd.planes.sweep import valid_planes
@@ -60,28 +60,17 @@ class Episode:
         none = np.empty((0, 0), np.float16), np.empty((0, 0), np.bool_)
         return cls(*none, floats, ints, ints, floats, ints, ints, floats, 0, ended)
 
-    def children(self) -> list[dict[int, float]]:
-        """Discounts of the unfinished children of each cut, by their numbers."""
-        left: list[dict[int, float]] = [{} for _ in self.state]
-        for child, owner, discount in zip(*(a.tolist() for a in (self.child, self.owner, self.discounts)), strict=True):
-            left[owner][child] = discount
-        return left
-
-    def returns(self, steps: int) -> tuple[FloatArray, list[dict[int, float]]]:
-        """Rewards of each cut and of those below it, `steps` deep in all (0: to the end), and what is left there."""
-        children, cut = self.children(), {int(component): t for t, component in enumerate(self.state)}
-        sums, left, deeper = self.rewards, children, True
-        while deeper and steps != 1:
-            added, below = self.rewards.copy(), [dict[int, float]() for _ in children]
-            for t, own in enumerate(children):
-                for child, discount in own.items():
-                    if child in cut:
-                        added[t] += discount * sums[cut[child]]
-                        below[t].update((c, discount * d) for c, d in left[cut[child]].items())
-                    else:
-                        below[t][child] = discount
-            deeper, sums, left, steps = below != left, added, below, steps - 1
-        return sums, left
+    def returns(self) -> FloatArray:
+        """Monte Carlo return of each cut [T]: eq. 8 down to the leaves, with what was played below for the values."""
+        sums, cut = self.rewards.copy(), {int(component): t for t, component in enumerate(self.state)}
+        below: list[list[tuple[int, float]]] = [[] for _ in sums]
+        for t, child, discount in zip(self.owner.tolist(), self.child.tolist(), self.discounts.tolist(), strict=True):
+            if child in cut:
+                below[t].append((cut[child], discount))
+        for t in reversed(range(len(sums))):  # children are cut later
+            for later, discount in below[t]:
+                sums[t] += discount * sums[later]
+        return sums
 
     def to_bytes(self) -> bytes:
         """Pack it for `from_bytes`."""
@@ -96,18 +85,9 @@ class Episode:
 
 @dataclass
 class Player:
-    """Plays one episode, a pure function of the attributes.
+    """Plays one episode of `env`, which must need a cut: a pure function of the attributes.
 
-    Attributes
-    ----------
-    env : CutEnv
-        It must need a cut.
-    network : Network or None
-        None for uniformly random valid planes.
-    epsilon : float
-        Fraction of cuts that are uniformly random anyway.
-    rng : Generator
-        Generator of this episode only.
+    `network` is None for uniformly random valid planes; a share `epsilon` of the cuts is random anyway.
     """
 
     env: CutEnv
@@ -129,7 +109,7 @@ class Player:
             step = env.step(component, env.candidates(component).plane(plane))
             for child, share in zip(step.left.unfinished, step.discounts, strict=True):
                 numbers[child] = len(numbers)
-                children.append((numbers[child], len(cuts), self.options.static_discount or share))
+                children.append((numbers[child], len(cuts), share))
             cuts.append((numbers[component], plane, step.reward(self.options)))
         seen = [self._see(component) for component in numbers]
         state, planes, rewards = (np.array(column) for column in zip(*cuts, strict=True))

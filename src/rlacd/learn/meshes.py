@@ -27,15 +27,7 @@ TURNS = (0.0, 45.0, 90.0, 180.0)
 
 @dataclass(frozen=True)
 class MeshList:
-    """The meshes of a folder.
-
-    Attributes
-    ----------
-    training, validation : tuple of str
-        Paths relative to the folder.
-    unreadable, too_large : int
-        Number of files skipped.
-    """
+    """The meshes of a folder, by their paths in it, and how many files were skipped."""
 
     training: tuple[str, ...]
     validation: tuple[str, ...]
@@ -104,15 +96,7 @@ def turned(content: bytes, axis: int, degrees: float) -> Component | None:
 
 
 class Solids:
-    """Repaired solids by name, each repaired once.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the meshes.
-    cache : Path
-        A folder used by this class only.
-    """
+    """Solids of a folder's meshes by name, each repaired once; the folder `cache` is this class's own."""
 
     def __init__(self, folder: Path, cache: Path) -> None:
         self._folder, self._cache = folder, cache

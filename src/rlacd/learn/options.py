@@ -1,12 +1,4 @@
-"""The options of a training run: one dataclass, whose fields also define the command line and its help.
-
-Commands of the published results (`docs/training.md` explains them)::
-
-    rlacd train MESHES --run RUN --preset paper --encoder-weights i2p_mae.pth           # Table 1
-    rlacd train MESHES --run RUN --preset paper ... --volume-reward 0                   # 4.5.3, without r1
-    rlacd train MESHES --run RUN --preset paper ... --finish-reward 0                   # 4.5.3, without r2
-    rlacd train MESHES --run RUN --preset paper ... --static-discount 0.99              # Fig. 7, diverges
-"""
+"""The options of a training run: one dataclass, whose fields also define the command line and its help."""
 
 from __future__ import annotations
 
@@ -37,16 +29,10 @@ class TrainOptions:
         Rotate each solid about x, y or z by 0, 45, 90 or 180 degrees (4.3).
     max_faces
         Skip meshes with more triangles than this.
-    encoder
-        What the network sees: sweep, the volumes on both sides of each plane, one plane at a time; or i2p-mae, the
-        paper's pre-trained features of the component, for all planes at once.
-    encoder_weights
-        File of the published weights of i2p-mae.
-    points
-        i2p-mae: points on a component's surface and on its hull (4.1).
-    objective
-        What a plane is worth: rewards, its reward plus the values of the two sides (eq. 8); or fewest-cuts, minus the
-        logarithm of the fewest cuts that any episode has needed from there.
+    target
+        What a plane is worth: one-step, its reward plus the values of the two sides (eq. 8); or return, the discounted
+        rewards of the whole episode below it, in units of the component's excess volume, learned by a network whose
+        average plays.
     env_steps
         Cuts made, each followed by learning (4.1).
     learning_starts
@@ -64,26 +50,7 @@ class TrainOptions:
     learning_rate
         Learning rate of Adam.
     target_frequency
-        Gradient steps between copies to the target network.
-    n_step
-        Cuts down the tree whose rewards a target adds up before it asks for values; 0: all, which asks for none.
-    value_unit
-        What the network's outputs are multiplied by: weight, the greater of the two rewards' weights; or excess, what
-        a component can still earn by r1, the excess volume of its hull.
-    clip
-        Limit values and targets to what is possible: between 0 and what the excess volume and the end of the solid can
-        earn.
-    networks
-        With 2, values are the lesser of two networks' (clipped double Q-learning).
-    tau
-        Share of the network that its average takes up each gradient step; the average is then the target network, and
-        plays. With 0 the target network is a copy.
-    huber
-        Error, in units of the values, beyond which the loss is linear; 0 leaves it a square.
-    temperature
-        Temperature of the soft value, in units of reward; 0 takes the greatest value (eq. 7).
-    static_discount
-        Constant weight of the values of the two sides; 0 weights them by hull volume (eq. 9).
+        one-step: gradient steps between copies to the target network.
     seed
         The same seed, meshes and options give the same weights on CPU.
     environments
@@ -91,7 +58,8 @@ class TrainOptions:
     threads
         Threads of the training process.
     device
-        cpu, cuda, or auto: a GPU for i2p-mae, if there is one; sweep learns as fast on the CPU, to the same weights.
+        cpu, cuda, or auto: a GPU, if there is one and the network values all planes at once; a small network that
+        values them one by one learns as fast on the CPU.
     log_every
         Cuts between points of the curves.
     validate_every
@@ -115,13 +83,8 @@ class TrainOptions:
     rotate: bool = option(True)
     max_faces: int = option(2000, least=4)
 
-    # What the network sees (3.3)
-    encoder: str = option("sweep", one_of=("sweep", "i2p-mae"))
-    encoder_weights: str = option("")
-    points: int = option(2048, least=16, most=65536)
-
     # Q-learning (3.5, 4.1)
-    objective: str = option("rewards", one_of=("rewards", "fewest-cuts"))
+    target: str = option("one-step", one_of=("one-step", "return"))
     env_steps: int = option(1_000_000, least=1)
     learning_starts: int = option(10_000, least=0)
     epsilon: float = option(0.2, least=0, most=1)
@@ -131,14 +94,6 @@ class TrainOptions:
     train_frequency: int = option(1, least=1)
     learning_rate: float = option(1e-4, least=0)
     target_frequency: int = option(1000, least=1)
-    n_step: int = option(1, least=0)
-    value_unit: str = option("weight", one_of=("weight", "excess"))
-    clip: bool = option(False)
-    networks: int = option(1, least=1, most=2)
-    tau: float = option(0.0, least=0, most=1)
-    huber: float = option(0.0, least=0)
-    temperature: float = option(0.0, least=0, most=0.1)
-    static_discount: float = option(0.0, least=0, most=1)
 
     # The run
     seed: int = option(0, least=0, most=2**63 - 1)
@@ -169,8 +124,9 @@ class TrainOptions:
         return cls(**{**TRAIN_PRESETS[name], **changes})
 
 
-_TWO_CORES: Mapping[str, Any] = {
-    "objective": "fewest-cuts",
+_RETURNS: Mapping[str, Any] = {
+    "target": "return",
+    "finish_reward": 0.0,
     "env_steps": 100_000,
     "learning_starts": 1_000,
     "epsilon": 0.1,
@@ -178,38 +134,22 @@ _TWO_CORES: Mapping[str, Any] = {
     "train_frequency": 2,
     "learning_rate": 1e-3,
     "max_faces": 700,
-}
-
-_RETURNS: Mapping[str, Any] = {
-    **_TWO_CORES,
-    "objective": "rewards",
-    "finish_reward": 0.0,
-    "n_step": 0,
-    "value_unit": "excess",
-    "clip": True,
-    "tau": 0.01,
     "buffer_size": 10_000,
     "max_parts": 128,
     "environments": 1,
 }
 
 _ONE_MESH: Mapping[str, Any] = {
-    **_TWO_CORES,
+    **_RETURNS,
     "env_steps": 5_000,
     "learning_starts": 200,
     "train_frequency": 1,
     "rotate": False,
     "max_faces": 5000,
-    "environments": 1,
     "validation": 0,
     "validate_every": 250,
 }
 
-TRAIN_PRESETS = {
-    "paper": {"encoder": "i2p-mae"},
-    "returns": _RETURNS,
-    "two-cores": _TWO_CORES,
-    "one-mesh": _ONE_MESH,
-}
-"""Changes to the defaults: the paper's run; its loss without r2 (4.5.3), by returns of the whole tree, and the fewest
-cuts seen, both on cheap features for two cores; the latter for a few meshes that are learned by heart in a minute."""
+TRAIN_PRESETS: Mapping[str, Mapping[str, Any]] = {"paper": {}, "returns": _RETURNS, "one-mesh": _ONE_MESH}
+"""Changes to the defaults, which are the paper's run: its loss without r2 (4.5.3), as far as it can be learned on two
+cores; the same for a few meshes that are learned by heart in a minute."""

@@ -1,14 +1,12 @@
 """Episodes played by a pool, some ahead of the learner, and consumed in order of their numbers.
 
-Episode n is drawn from the seed and n alone, and is played by the network as of the moment when episode n - E has been
-consumed, where E is the number of concurrent episodes. So the result of learning does not depend on the number, place
-or speed of the processes, or on the death of one: its episode is played again.
+Episode n is drawn from the seed and n alone, and is played by the network as it is once episode n - E has been learned
+from, where E is the number of concurrent episodes. So the result does not depend on the number, place or speed of the
+processes, or on the death of one: its episode is played again.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import pickle
 from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +19,7 @@ from numpy.typing import NDArray
 
 from rlacd.criteria import Concavity
 from rlacd.errors import TrainingError
-from rlacd.learn.encoders import Encoder, make_encoder
+from rlacd.learn.encoder import Encoder
 from rlacd.learn.environment import CutEnv, Memory
 from rlacd.learn.episodes import Episode, Player
 from rlacd.learn.meshes import TURNS, Solids, turned
@@ -41,22 +39,9 @@ REMEMBERED = 10_000
 
 
 class Rollouts:
-    """An endless sequence of episodes.
+    """An endless sequence of episodes of the meshes `names`.
 
-    Parameters
-    ----------
-    pool : Pool
-        Closed by the caller.
-    solids : Solids
-    names : sequence of str
-        The meshes to draw from.
-    options : TrainOptions
-    encoder : Encoder, optional
-        The user's, in place of the options'.
-    limits : ProcessLimits
-        Limits of one episode.
-    say : callable
-        Receives messages about episodes that could not be played.
+    The caller closes the pool; `limits` are those of one episode.
     """
 
     def __init__(
@@ -65,30 +50,20 @@ class Rollouts:
         solids: Solids,
         names: Sequence[str],
         options: TrainOptions,
-        encoder: Encoder | None,
+        encoder: Encoder,
         limits: ProcessLimits,
         say: Callable[[str], None],
     ) -> None:
         self._pool, self._solids, self._names, self._options = pool, solids, names, options
         self._limits, self._say = limits, say
-        setting = {"options": json.dumps(dataclasses.asdict(options)).encode()}
-        if encoder is not None:
-            setting["encoder"] = pickle.dumps(encoder)
-        elif options.encoder_weights:
-            setting["weights"] = Path(options.encoder_weights).read_bytes()
-        self._setting = Shared(setting)
+        self._setting = Shared({"encoder": pickle.dumps(encoder), "options": pickle.dumps(options)})
         self._ahead: deque[tuple[int, str, Future[Answer]] | Episode] = deque()
         self._begun = self._without_cuts = self._lost = 0
 
     def begin(self, network: Shared | None, epsilon: float) -> None:
         """Start episodes until the required number is ahead.
 
-        Parameters
-        ----------
-        network : Shared or None
-            The file of the one that chooses cuts; None for random cuts.
-        epsilon : float
-            The share of cuts that are random anyway.
+        `network` is the file of the one that chooses cuts, None for random cuts; a share `epsilon` is random anyway.
         """
         while len(self._ahead) < self._options.environments:
             self._ahead.append(self._start(self._begun, network, epsilon))
@@ -154,16 +129,9 @@ SERVER = "rlacd.learn.rollouts:RolloutServer"
 
 
 class RolloutServer:
-    """Plays episodes in a process of the pool.
-
-    Parameters
-    ----------
-    staging : Path
-        A folder for temporary files.
-    """
+    """Plays episodes in a process of the pool."""
 
     def __init__(self, staging: Path) -> None:
-        self._staging = staging
         self._setting = self._key = ""
         self._options: TrainOptions
         self._encoder: Encoder
@@ -173,26 +141,7 @@ class RolloutServer:
     def __call__(
         self, values: dict[str, Any], blobs: Blobs, shared: Mapping[str, Shared]
     ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Play an episode.
-
-        Parameters
-        ----------
-        values : dict
-            See `Rollouts`.
-        blobs : dict of bytes
-            ``solid``: see `rlacd.learn.meshes.Solids.packed`.
-        shared : dict of Shared
-            ``setting``: ``options`` as JSON, and either the user's ``encoder``, pickled by the trainer itself, or the
-            ``weights`` of the options'. ``network``: see
-            `Rollouts.begin`.
-
-        Returns
-        -------
-        dict
-            Empty.
-        dict of bytes
-            ``episode``.
-        """
+        """Play an episode of the ``solid``, packed by `Solids`; ``setting`` is pickled by the trainer itself."""
         self._take_over(shared)
         key = f"{values['name']} {values['axis'] if values['degrees'] else 0} {values['degrees']}"
         known = self._known.pop(key) if key in self._known else None
@@ -202,8 +151,7 @@ class RolloutServer:
             return {}, {"episode": Episode.empty("nothing").to_bytes()}
         network = self._network if "network" in shared else None
         rng = np.random.default_rng(values["seed"])
-        player = Player(env, self._options, self._encoder, network, values["epsilon"], rng)
-        episode = player.play()
+        episode = Player(env, self._options, self._encoder, network, values["epsilon"], rng).play()
         self._known[key] = component, memory
         while sum(len(memory.met) for _, memory in self._known.values()) > REMEMBERED:
             self._known.popitem(last=False)
@@ -213,14 +161,8 @@ class RolloutServer:
         """Rebuild whatever changed in the shared data since the last request."""
         setting = shared["setting"]
         if setting.key != self._setting:
-            options = TrainOptions(**json.loads(setting.blobs["options"]))
-            if "weights" in setting.blobs:  # this machine may lack the file
-                file = self._staging / Path(options.encoder_weights).name
-                file.write_bytes(setting.blobs["weights"])
-                options = dataclasses.replace(options, encoder_weights=str(file))
-            own = setting.blobs.get("encoder")
-            self._encoder = make_encoder(options) if own is None else pickle.loads(own)
-            self._options, self._setting, self._key = options, setting.key, ""
+            self._options, self._encoder = (pickle.loads(setting.blobs[name]) for name in ("options", "encoder"))
+            self._setting, self._key = setting.key, ""
             self._known.clear()
         if "network" in shared and shared["network"].key != self._key:
             self._network, self._key = parse_network(shared["network"].blobs["network"]), shared["network"].key

@@ -1,9 +1,7 @@
 """A run of `rlacd.learn.dqn`: its folder, curves, validation and checkpoints.
 
-A pool of processes plays episodes (`rlacd.learn.rollouts`), and this process learns from them. On CPU the same meshes,
-options and seed give the same weights bit for bit, wherever episodes are played and whether or not the run was
-interrupted: a checkpoint holds the complete state. The options, and the command of each published result:
-`rlacd.learn.options`.
+On CPU the same meshes, options and seed give the same weights bit for bit, wherever episodes are played and whether or
+not the run was interrupted: a checkpoint holds the complete state.
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import nn
 
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
@@ -24,8 +23,8 @@ from rlacd.cut_and_merge import cut_and_merge
 from rlacd.errors import OptionError, TrainingError
 from rlacd.io.write.atomic import write_file
 from rlacd.learn.checkpoint import load_checkpoint, save_checkpoint
-from rlacd.learn.dqn import DQN, QNetwork
-from rlacd.learn.encoders import Encoder, make_encoder
+from rlacd.learn.dqn import DQN, plain
+from rlacd.learn.encoder import Encoder, SweepEncoder
 from rlacd.learn.episodes import Episode
 from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.options import TrainOptions
@@ -49,25 +48,20 @@ def train(
     pool: Pool | None = None,
     limits: ProcessLimits | None = None,
 ) -> Path:
-    """Train a Q network on a folder of meshes.
+    """Train a Q network on a folder of meshes, searched to any depth.
 
     Parameters
     ----------
-    meshes : Path
-        Folder of mesh files, searched to any depth.
     run : Path
         Folder for ``curves.jsonl``, the checkpoint and the policy.
-    options : TrainOptions
     resume : bool
         Continue exactly from the checkpoint in `run`; without one, start afresh.
     say : callable
         Receives lines of progress.
     encoder : Encoder, optional
         What the network sees, in place of the options' encoder; it must be picklable.
-    pool : Pool, optional
-        Where episodes are played; in this process by default. It affects only the time taken.
-    limits : ProcessLimits, optional
-        Limits of one episode.
+    pool, limits : Pool, ProcessLimits, optional
+        Where episodes are played, in this process by default, and limits of one. They affect only the time taken.
 
     Returns
     -------
@@ -90,8 +84,9 @@ def train(
     say(f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; {left_out}")
     with ExitStack() as stack:
         where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
-        agent = DQN(options, encoder or make_encoder(options))
-        rollouts = Rollouts(where, solids, listed.training, options, encoder, limits or ProcessLimits(), say)
+        sees = encoder or SweepEncoder(options.threshold)
+        rollouts = Rollouts(where, solids, listed.training, options, sees, limits or ProcessLimits(), say)
+        agent = DQN(options, sees)
         training = Training(run, agent, rollouts, Validation(listed, solids, options), say)
         training.restore()
         training.run()
@@ -126,7 +121,7 @@ class Training:
         if not np.isfinite(self.best):
             self.validate()
         self.save()
-        self.say(self.validation.verdict(self.best, self.folder, options))
+        self.say(self.validation.verdict(self.best, self.folder / "policy.npz"))
 
     def see(self, episode: Episode) -> None:
         """Note what an episode adds to the next point of the curves."""
@@ -147,8 +142,8 @@ class Training:
         self._point({f"validation_{name}": value for name, value in ratios.items()})
         if ratios["own_plane"] <= self.best:
             self.best = ratios["own_plane"]
-            about = {"kind": KIND, "threshold": self.options.threshold, "encoder": self.options.encoder}
-            write_file(self.folder / "policy.npz", self.agent.playing.plain(about).to_bytes())
+            about = {"kind": KIND, "threshold": self.options.threshold}
+            write_file(self.folder / "policy.npz", plain(self.agent.playing, about).to_bytes())
 
     def save(self) -> None:
         """Write a checkpoint."""
@@ -166,12 +161,12 @@ class Training:
             return
         arrays, state = found
         for name, value in dataclasses.asdict(self.options).items():
-            if name not in MAY_CHANGE and (was := state["options"].get(name)) != value:
+            if name not in MAY_CHANGE and (was := state["options"].get(name, value)) != value:
                 raise OptionError(
                     f"{name} is {value!r}, but was {was!r} when the run began: give that, or begin another run."
                 )
         if state["encoder"] != self.agent.encoder.digest:
-            raise OptionError(f"{self.options.encoder_weights} holds other weights than the run began with.")
+            raise OptionError("the encoder has other weights than the run began with.")
         self.agent.restore(arrays, state["agent"])
         self.rollouts.restore(arrays["rollouts"])
         self.seconds, self.seen, self.best = state["seconds"], state["seen"], state["best"]
@@ -191,10 +186,9 @@ class Training:
             self.seen.setdefault(name, []).append(value)
 
 
-def policy_of(network: QNetwork | Network, encoder: Encoder, **deployment: int) -> QPolicy:
+def policy_of(network: Network, encoder: Encoder, **deployment: int) -> QPolicy:
     """Make a policy of a network; `deployment` is `QPolicy`'s shortlist and concave_edges."""
-    fixed = network if isinstance(network, Network) else network.plain({"threshold": 1.0})
-    return QPolicy(lambda component: fixed(encoder.describe(component)).reshape(-1), **deployment)
+    return QPolicy(lambda component: network(encoder.describe(component)).reshape(-1), **deployment)
 
 
 def load_policy(run: Path, encoder: Encoder | None = None, **deployment: int) -> QPolicy:
@@ -202,7 +196,7 @@ def load_policy(run: Path, encoder: Encoder | None = None, **deployment: int) ->
     if not (run / "options.json").is_file():
         raise OptionError(f"{run} holds no run.")
     options = TrainOptions(**json.loads((run / "options.json").read_text(encoding="utf-8")))
-    sees = encoder or make_encoder(options)
+    sees = encoder or SweepEncoder(options.threshold)
     return policy_of(load_network(str(run / "policy.npz"), KIND, sees.dim, sees.outputs), sees, **deployment)
 
 
@@ -219,9 +213,10 @@ class Validation:
         self._greedy = self._parts(make_policy("greedy-hull-sum"))
         self._random = mean_ratio(self._parts(RandomShortlist(1, concave_edges=0)), self._greedy)
 
-    def ratios(self, network: QNetwork, encoder: Encoder) -> dict[str, float]:
+    def ratios(self, network: nn.Module, encoder: Encoder) -> dict[str, float]:
         """Ratios of the network's own plane, its ten best, and of random planes."""
-        own, ten = (self._parts(policy_of(network, encoder, shortlist=n)) for n in (1, SHORTLIST))
+        fixed = plain(network, {"threshold": 1.0})
+        own, ten = (self._parts(policy_of(fixed, encoder, shortlist=n)) for n in (1, SHORTLIST))
         ratios = {"own_plane": mean_ratio(own, self._greedy), "ten_best": mean_ratio(ten, self._greedy)}
         return {"parts": sum(own) / len(own), **ratios, "random": self._random}
 
@@ -232,15 +227,11 @@ class Validation:
             cuts = [cut_and_merge(tree, self._criterion, run, merge=False, most=self._most) for tree in trees]
         return [len(one.pieces) for one in cuts]
 
-    def verdict(self, best: float, folder: Path, options: TrainOptions) -> str:
+    def verdict(self, best: float, policy: Path) -> str:
         """Say what the run has reached, and the next command."""
         where = "solids it has not seen" if self._held_out else "the solids it learned from"
-        text = f"On {where}, the network's plane leaves {best:.3f} times greedy's parts (random: {self._random:.3f}). "
-        if best > 1:
-            return f"{text}Greedy is better: go on with  --resume --env-steps {2 * options.env_steps}  in {folder}."
-        if options.encoder == "i2p-mae":
-            return f"{text}Use it in Python:  rlacd.learn.train.load_policy({str(folder)!r}, shortlist=10)."
-        return f"{text}Use it:  rlacd decompose MESH --policy {folder / 'policy.npz'}"
+        text = f"On {where}, the network's plane leaves {best:.3f} times greedy's parts (random: {self._random:.3f})."
+        return f"{text} Use it:  rlacd decompose MESH --policy {policy}"
 
 
 def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
@@ -248,5 +239,5 @@ def mean_ratio(counts: Sequence[int], others: Sequence[int]) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(counts, 1) / np.maximum(others, 1)))))
 
 
-MAY_CHANGE = ["env_steps", "checkpoint_seconds", "log_every", "validate_every", "device", "threads", "encoder_weights"]
-"""Options that may change when a run is resumed: its length, its logging, its place and files."""
+MAY_CHANGE = ["env_steps", "checkpoint_seconds", "log_every", "validate_every", "device", "threads"]
+"""Options that may change when a run is resumed: its length, its logging, its place."""

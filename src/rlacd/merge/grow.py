@@ -1,7 +1,7 @@
 """Growing: hulls grow through the solid, and few of them are chosen that cover it.
 
 Where bodies cross, cuts chop them, and merging, which unites two parts at a time, seldom finds a body again. A piece
-that kept some sides of its body finds it at once (`native/distance/grow.cpp`). That bodies cross shows in the merged
+that kept some sides of its body finds it at once (`native/solid/grow.cpp`). That bodies cross shows in the merged
 parts: many of them share material with others. Other solids pay nothing.
 """
 

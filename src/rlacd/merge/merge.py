@@ -38,7 +38,6 @@ def merge_parts(
     parts: Sequence[Part],
     criterion: Criterion,
     run: Run,
-    beside: Sequence[Part] = (),
     solid: Component | None = None,
 ) -> list[Part]:
     """Unite pairs of parts, the cheapest first, as long as the union meets the criterion.
@@ -56,24 +55,16 @@ def merge_parts(
         Every union meets it.
     run : Run
         When it stops, the parts reached so far are returned.
-    beside : sequence of Part
-        More parts. No two of them are united with each other: that has been tried before.
     solid : Component, optional
         The solid that was decomposed.
 
     Returns
     -------
     list of Part
-        Parts that could not be united further, in the order of their first piece, those from `beside` last.
+        Parts that could not be united further, in the order of their first piece.
     """
-    pairs = _Adjoining(criterion, run)
-    alive = _Merging([*parts, *beside], pairs, run).united(len(parts))
-    if solid is None:
-        return alive
-    waiting = {id(part) for part in beside}
-    new = [part for part in alive if id(part) not in waiting]
-    old = [part for part in alive if id(part) in waiting]
-    return _Merging([*new, *old], _Bridged(criterion, run, solid), run).united(len(new))
+    alive = _Merging(parts, _Adjoining(criterion, run), run).united()
+    return alive if solid is None else _Merging(alive, _Bridged(criterion, run, solid), run).united()
 
 
 def merge_lifted(
@@ -97,7 +88,7 @@ def merge_lifted(
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
     run : Run
     """
-    return _Merging(parts, _Bridged(rehearsal, run, proxy, few=0, confirmed=confirmed), run).united(len(parts))
+    return _Merging(parts, _Bridged(rehearsal, run, proxy, few=0, confirmed=confirmed), run).united()
 
 
 @dataclass(frozen=True)
@@ -183,12 +174,12 @@ class _Merging:
         self._next: list[_Pair] = []  # the cheapest, in their order
         self._begun: dict[_Pair, Begun[tuple[Part | None, float]]] = {}  # more than are needed
 
-    def united(self, new: int) -> list[Part]:
-        """Unite pairs of which at least one is among the first `new` parts or made from them."""
+    def united(self) -> list[Part]:
+        """Unite pairs until none is left that may be united."""
         run, alive = self._run, self._alive.parts
         count = len(alive)
         try:
-            self._find(range(new))
+            self._find(range(count))
             while run.step(count - len(alive), None, len(alive)):
                 self._begin()
                 if not self._next:

@@ -204,7 +204,7 @@ class Options:
     gap
         Openings that a ball of this radius, a share of the longest side, cannot pass count as closed.
     seed
-        The same seed, input and options give the same bytes.
+        The same seed, input and options give the same bytes; another seed finds other hulls.
     threads
         Threads to use; the result does not depend on it.
     timeout

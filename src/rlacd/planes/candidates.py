@@ -4,7 +4,7 @@ concave edges, where a component has to be cut anyway and equidistant planes onl
 A component with a reflex edge is not convex, and stays non-convex until a plane through (or close to) that edge
 separates its two faces. Each edge offers the plane that bisects the reflex angle and the planes of its two faces. Of
 the many edges of a mesh, a few are chosen: deep, sharp and long ones first, and spread out (Andrews,
-"Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024). Implemented in native/cut/concave_edges.hpp.
+"Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024). Implemented in native/decompose/concave_edges.hpp.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ class Sweep:
 
 
 def sweep(component: Component, candidates: Candidates, threads: int = 1) -> Sweep:
-    """Score all candidates of a component: exact volumes of both sides' solids and hulls (see native/cut/sweep.hpp)."""
+    """Score all candidates of a component: volumes of both sides' solids and hulls (native/decompose/sweep.hpp)."""
     scores = _native.sweep(component.vertices, component.faces, candidates.directions, candidates.offsets, threads)
     return Sweep(candidates, *np.ascontiguousarray(scores.T))
 
@@ -82,8 +82,6 @@ class SweepCache:
 
     Parameters
     ----------
-    per_axis : int
-        Planes along each of the six axes.
     concave_edges : int
         Number of concave edges whose planes are added.
     seed : sequence of int, optional
@@ -92,11 +90,9 @@ class SweepCache:
 
     def __init__(
         self,
-        per_axis: int = OFFSETS_PER_AXIS,
         concave_edges: int = EDGES_PER_COMPONENT,
         seed: Sequence[int] | None = None,
     ) -> None:
-        self._per_axis = per_axis
         self._concave_edges = concave_edges
         self._seed = seed
         self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
@@ -108,7 +104,7 @@ class SweepCache:
         return self._once(self._candidates, component, self._planes)
 
     def _planes(self, component: Component) -> Candidates:
-        planes = all_planes(component, self._per_axis, self._concave_edges)
+        planes = all_planes(component, OFFSETS_PER_AXIS, self._concave_edges)
         if self._seed is None:
             return planes
         random = np.random.default_rng([*self._seed, zlib.crc32(component.vertices.tobytes())])
@@ -139,7 +135,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
     """Get the valid plane of least cost; None if every plane misses the solid or shaves off a film.
 
     The cost is the `exponent`-norm of the two sides' |CH(m_i)| - |m_i|. It is computed only for planes that bounds do
-    not rule out (see native/cut/least_excess.hpp). Of planes whose costs are equal up to rounding, as in symmetric
+    not rule out (native/decompose/least_excess.hpp). Of planes whose costs are equal up to rounding, as in symmetric
     shapes, the first is taken, so that the cuts do not depend on the unit and position of the input.
 
     Parameters
@@ -191,3 +187,11 @@ def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
         if valid.any():
             break
     return valid
+
+
+def distinct_planes(component: Component, candidates: Candidates) -> BoolArray:
+    """`valid_planes`, each once: principal axes that are coordinate axes repeat the planes of those."""
+    directions = candidates.directions
+    first = (directions[:, None] == directions).all(axis=2).argmax(axis=1) == np.arange(len(directions))
+    distinct: BoolArray = valid_planes(component, candidates) & np.repeat(first, candidates.offsets.shape[1])
+    return distinct

@@ -4,8 +4,8 @@ from importlib.resources import as_file, files
 
 from rlacd.options.names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
 from rlacd.planes.candidates import EDGES_PER_COMPONENT
-from rlacd.planes.sweep import SweepCache
-from rlacd.policies.greedy import SCORES, Greedy, NavACD, RandomShortlist
+from rlacd.planes.sweep import SweepCache, paper_planes
+from rlacd.policies.greedy import SCORES, Greedy, RandomShortlist, navacd_planes, paper_planes_and_edges
 from rlacd.policies.learned import Learned
 from rlacd.policies.network import deployed
 from rlacd.policies.policy import CheckedPolicy, Policy
@@ -15,8 +15,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     """Build the policy called `name`; an object with a method `choose` is wrapped to check its answers.
 
     - ``greedy``: the plane with the least p-norm of excess volumes, among 150 planes and those of four concave edges.
-    - ``greedy-SCORE``: the plane with the least SCORE among the 150 alone (``hull-sum`` is the paper's baseline);
-      ``greedy-SCORE+edges``: among the 150 and those of the edges.
+    - ``greedy-SCORE``: the plane with the least SCORE among the paper's 150 alone (``hull-sum`` is its baseline);
+      ``greedy-SCORE+edges``: among those and the edges'.
     - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
       concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
@@ -44,7 +44,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     if name == "greedy":
         return Greedy(sweeps=sweeps)
     if name == "navacd":
-        return NavACD()
+        return Greedy("hull-sum", planes=navacd_planes)
     if name == "learned":
         return Learned(sweeps, scale)
     if name == "rl-acd":
@@ -54,10 +54,12 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
         return deployed(name, scale)
     family, _, score = name.partition("-")
     if family == "greedy" and score.removesuffix(EDGES) in SCORES:
-        return Greedy(score.removesuffix(EDGES), concave_edges=EDGES_PER_COMPONENT if score.endswith(EDGES) else 0)
+        return Greedy(
+            score.removesuffix(EDGES), planes=paper_planes_and_edges if score.endswith(EDGES) else paper_planes
+        )
     if name in CONTROLS:
         return RandomShortlist(int(score.removesuffix(EDGES)), EDGES_PER_COMPONENT if score.endswith(EDGES) else 0)
     raise KeyError(name)
 
 
-__all__ = ["AS_PUBLISHED", "POLICIES", "Greedy", "NavACD", "Policy", "is_policy", "make_policy"]
+__all__ = ["AS_PUBLISHED", "POLICIES", "Greedy", "Policy", "is_policy", "make_policy"]

@@ -1,20 +1,20 @@
-"""Policies that look one step ahead: greedy, over all candidate planes; NavACD, over the middle of the box and a few
-concave edges; the paper's deployment rule, and its control, the same rule on random planes.
+"""Policies that look one step ahead: the plane of least score among some candidates; the paper's deployment rule, and
+its control, the same rule on random planes.
 """
 
 from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, axis_and_principal, concave_edge_planes
-from rlacd.planes.sweep import Sweep, SweepCache, least_excess, valid_planes
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, concave_edge_planes
+from rlacd.planes.sweep import Sweep, SweepCache, distinct_planes, least_excess, paper_planes
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
 
@@ -38,48 +38,47 @@ SCORES: Mapping[str, float] = MappingProxyType({"hull-sum": 1.0, "max-excess": m
 (its reward r1), max-excess orders them as the larger R_v of the two sides does (CoACD's one-step cost)."""
 
 
+Planes = Callable[[Component], Candidates]
+"""Candidate planes of a component."""
+
+
 class Greedy:
-    """Chooses the plane with the least score among the paper's 150 and those of a few concave edges.
+    """Chooses the plane with the least score.
 
     Parameters
     ----------
     score : str
         A key of `SCORES`.
-    concave_edges : int
-        Number of concave edges whose planes are added; 0 with `hull-sum` is the paper's baseline.
     sweeps : SweepCache, optional
-        Provides the planes, to share them with other policies; `concave_edges` is then ignored.
+        Provides the planes, to share them with other policies.
+    planes : callable, optional
+        Provides them in its place.
     """
 
     def __init__(
-        self, score: str = "excess-norm", concave_edges: int = EDGES_PER_COMPONENT, sweeps: SweepCache | None = None
+        self, score: str = "excess-norm", sweeps: SweepCache | None = None, planes: Planes | None = None
     ) -> None:
         self._exponent = SCORES[score]
-        self._sweep_cache = sweeps or SweepCache(concave_edges=concave_edges)
+        self._planes = planes or (sweeps or SweepCache()).candidates
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
-        return least_excess(component, self._sweep_cache.candidates(component), self._exponent, threads)
+        return least_excess(component, self._planes(component), self._exponent, threads)
 
 
-class NavACD:
-    """Chooses the plane with the least sum of the two sides' hull volumes among at most 15.
+def paper_planes_and_edges(component: Component) -> Candidates:
+    """Candidates of one component: the paper's 150, and those of four concave edges."""
+    return Candidates.joined(paper_planes(component), concave_edge_planes(component))
 
-    Candidates are the planes through the middle of the component's box along x, y and z, and those of up to four
-    concave edges (J. Andrews, "Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024).
 
-    Notes
-    -----
-    NavACD cuts one part at a time, starting with the largest |CH(m_i)| - |m_i|. Here all unfinished components of a
-    round are cut. The plane that cuts a component does not depend on the others, so both reach the same parts. The
-    order matters only if the process is stopped early (`timeout`); `max_hulls` counts parts of finished
-    decompositions.
+def navacd_planes(component: Component) -> Candidates:
+    """Candidates of one component: the middle of its box along x, y and z, and those of four concave edges.
+
+    J. Andrews, "Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024, takes the one with the least sum of
+    hull volumes. It cuts one part at a time, the largest |CH(m_i)| - |m_i| first, where here all unfinished components
+    of a round are cut: the plane that cuts a component does not depend on the others, so both reach the same parts.
     """
-
-    def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
-        candidates = Candidates.joined(mid_planes(component), concave_edge_planes(component, EDGES_PER_COMPONENT))
-        return least_excess(component, candidates, SCORES["hull-sum"], threads)
+    return Candidates.joined(mid_planes(component), concave_edge_planes(component))
 
 
 def mid_planes(component: Component) -> Candidates:
@@ -131,8 +130,8 @@ class RandomShortlist:
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if no candidate is valid."""
-        candidates = axis_and_principal(component)
-        valid = np.flatnonzero(valid_planes(component, candidates))
+        candidates = paper_planes(component)
+        valid = np.flatnonzero(distinct_planes(component, candidates))
         random = np.random.default_rng([self._seed, zlib.crc32(component.vertices.tobytes())])
         drawn = random.choice(valid, min(self._planes, len(valid)), replace=False)
         return least_hulls(component, candidates, drawn, self._concave_edges, threads)

@@ -22,7 +22,7 @@ from rlacd import _native
 from rlacd.errors import WeightsError
 from rlacd.io.read.open_file import read_file
 from rlacd.planes.candidates import EDGES_PER_COMPONENT
-from rlacd.planes.sweep import paper_planes, valid_planes
+from rlacd.planes.sweep import distinct_planes, paper_planes
 from rlacd.policies.greedy import least_hulls
 from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.solid.arrays import Float32Array
@@ -148,7 +148,7 @@ class QPolicy:
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if no candidate is valid."""
         candidates = paper_planes(component)
-        valid = valid_planes(component, candidates)
+        valid = distinct_planes(component, candidates)
         if not valid.any():
             return None
         best = best_planes(self._values(component), valid, self._shortlist)

@@ -90,18 +90,6 @@ def _neighbours(values: FloatArray, axes: NDArray[np.intp]) -> list[FloatArray]:
     return found
 
 
-def surface_points(component: Component, count: int) -> Float32Array:
-    """Points on the surfaces of a component and of its hull [2, count, 3]; box centred, longest side 2.
-
-    The same component gives the same points.
-    """
-    lower, upper = component.box
-    shapes = (component, component.hull)
-    points = np.stack([_native.sample_surface(shape.vertices, shape.faces, count, 0)[0] for shape in shapes])
-    seen: Float32Array = ((points - (lower + upper) / 2) / (float((upper - lower).max()) / 2)).astype(np.float32)
-    return seen
-
-
 PLANES = 6 * OFFSETS_PER_AXIS
 
 

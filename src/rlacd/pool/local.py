@@ -39,7 +39,9 @@ class _Child:
         self.folder = tempfile.TemporaryDirectory(prefix="rlacd-")
         self.stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         command = [sys.executable, "-m", "rlacd.pool.child", server, self.folder.name]
-        self.process = start(command, subprocess.PIPE, subprocess.PIPE, self.stderr, {"OMP_NUM_THREADS": "1"})
+        temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), self.folder.name)  # a library's report of its crash too
+        environment = {"OMP_NUM_THREADS": "1", **temporary}
+        self.process = start(command, subprocess.PIPE, subprocess.PIPE, self.stderr, environment)
         self.given: dict[str, str] = {}  # keys of the shared data it has
         self.messages: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
         self.reader = threading.Thread(target=self._read, daemon=True)

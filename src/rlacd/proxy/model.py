@@ -95,8 +95,8 @@ class Lift:
     policy: Policy
     run: Run
 
-    def __call__(self, parts: Sequence[Part], mend: bool = True) -> list[Part]:
-        """Get the parts of the solid; together they cover it.
+    def __call__(self, parts: Sequence[Part], mend: bool = True) -> tuple[list[Part], float]:
+        """Get the parts of the solid, which cover it, and the factor of the goal that they meet: 1 if not mended.
 
         Parameters
         ----------
@@ -110,11 +110,12 @@ class Lift:
             lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
             self._cover(lifted)
             covering = [each.hull for each in lifted]
-            return self._tested(lifted) if mend else self.run.map(self._clipped, covering)
+            return self._tested(lifted) if mend else (self.run.map(self._clipped, covering), 1.0)
         except Stopped:
             self.run.note_stop()
         with self.run.shielded():
-            return [part.with_hull(hull) for part, hull in zip(parts, covering or self._covering(parts), strict=True)]
+            hulls = covering or self._covering(parts)
+            return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)], 1.0
 
     def _covering(self, parts: Sequence[Part]) -> list[Hull]:
         """Get hulls that cover the solid, without the time to simplify them."""
@@ -122,7 +123,7 @@ class Lift:
         self._cover(lifted, simple=False)
         return [each.hull for each in lifted]
 
-    def _tested(self, lifted: list[_Lifted]) -> list[Part]:
+    def _tested(self, lifted: list[_Lifted]) -> tuple[list[Part], float]:
         """Clip the solid to the hulls, and cut it there where one fails, until none is left to cut (see `_failing`)."""
         self._clip(lifted)
         while failing := self._failing(lifted):
@@ -130,7 +131,8 @@ class Lift:
                 lifted[i : i + 1] = self._cut_again(lifted[i])
             self._cover(lifted)
             self._clip(lifted)
-        return [each.on_solid for each in lifted]
+        errors = self.run.map(self.goal.error, [each.on_solid for each in lifted if not each.is_met])
+        return [each.on_solid for each in lifted], max([1.0, *(error / self.goal.overhang for error in errors)])
 
     def _cut_again(self, failing: _Lifted) -> list[_Lifted]:
         """Cut a part of the solid; the second time with room for its pieces' hulls to grow."""
@@ -169,13 +171,21 @@ class Lift:
         part = self.solid.inside(hull)
         return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
-    def _failing(self, lifted: Sequence[_Lifted]) -> list[int]:
+    def _failing(self, lifted: list[_Lifted]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there `MOST_CUTS` times."""
         asked = [i for i, each in enumerate(lifted) if each.cuts < MOST_CUTS and not each.is_met]
-        verdicts = self.run.map(self.goal.is_met, [lifted[i].on_solid for i in asked])
-        for i, is_met in zip(asked, verdicts, strict=True):
-            lifted[i].is_met = is_met
+        for i, met in zip(asked, self.run.map(self._met, [lifted[i] for i in asked]), strict=True):
+            if met is not None:
+                lifted[i] = replace(lifted[i], hull=met.hull, part=met, is_met=True)
         return [i for i in asked if not lifted[i].is_met]
+
+    def _met(self, lifted: _Lifted) -> Part | None:
+        """Its part if that meets the goal, if need be with the convex hull of the part in place of a simple one."""
+        part = lifted.on_solid
+        if self.goal.is_met(part):
+            return part
+        exact = Hull.of(part.vertices) if lifted.cuts == 0 else None
+        return tight if exact is not None and self.goal.is_met(tight := part.with_hull(exact)) else None
 
 
 @dataclass(frozen=True)
@@ -222,8 +232,9 @@ class Model:
         scaled = goal if factor == 1.0 else goal.scaled(factor)
         with run.stage("lift"):
             lift = Lift(self.solid, self.proxy, scaled, policy, run)
-            parts = lift(parts, mend=run.stopped_by is None)
-            if merge and run.stopped_by is None:  # the margin may have kept some apart
-                looser = scaled.alone.scaled(1 + self.proxy.margin(goal))
+            parts, worst = lift(parts, mend=run.stopped_by is None)
+            if merge and run.stopped_by is None:  # the margin may have kept some apart, and fewer may fail no more
+                lift = replace(lift, goal=scaled.scaled(worst))
+                looser = lift.goal.alone.scaled(1 + self.proxy.margin(goal))
                 parts = merge_lifted(parts, self.component, looser, lift.confirmed, run)
         return parts

@@ -93,8 +93,3 @@ def gluing(faces: int) -> float:
 def filling(faces: int, hull_faces: int) -> float:
     """Clip a solid to a hull around parts that have `faces` faces in total."""
     return 170 + 1.05 * faces + 4.1 * hull_faces
-
-
-def reuniting(faces: int, count: int) -> float:
-    """Reunite `count` components that have `faces` faces in total into one solid."""
-    return 9.6 * faces + 320 * count

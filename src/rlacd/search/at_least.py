@@ -3,7 +3,7 @@
 Every hull of a valid decomposition keeps its surface within a reach of the solid. A hull that holds two points holds
 the segment between them. If the segment meets the exterior, from where a path leads to infinity farther from the solid
 than the reach, the path leaves the hull too far from the solid: such points are *apart*, and points that are apart from
-each other need a hull each (`native/distance/apart.hpp`).
+each other need a hull each (`native/solid/apart.hpp`).
 """
 
 from __future__ import annotations

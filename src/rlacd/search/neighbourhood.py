@@ -1,11 +1,9 @@
 """Large-neighbourhood search over the parts of a decomposition.
 
-A state is a set of parts, all of which meet the criterion. Three operators change it:
+A state is a set of parts, all of which meet the criterion. Two operators change it:
 
 - redistribute: a part is divided among the parts around it and disappears.
 - give: a part gives what the parts around can take; what is left of it is smaller, and they are different.
-- recut: a cluster of neighbours is reunited into one solid and cut again; the pieces are merged with each other and
-  with the parts around. Accepted if it leaves fewer parts, or equally many with a smaller total hull volume.
 
 The next trial is always one of the operator that has done the least work since it last saved a part.
 
@@ -18,7 +16,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 
@@ -26,27 +24,15 @@ import numpy as np
 
 from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
-from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
-from rlacd.planes.sweep import SweepCache
-from rlacd.policies import Greedy
+from rlacd.merge.numbered import NumberedParts
 from rlacd.run import Begun, Run
-from rlacd.search.operators import Exchange, give, recut, redistribute
-from rlacd.search.part_graph import Cluster, PartGraph
+from rlacd.search.operators import Exchange, give, redistribute
 from rlacd.solid.component import Component, Part
-
-PLANES_PER_AXIS = OFFSETS_PER_AXIS // 2
-"""Neighbourhoods are small: half the planes give results as good in half the time."""
-
-CONCAVE_EDGES = EDGES_PER_COMPONENT // 2
-"""Zero, two and four make little difference: 0.82, 0.81 and 0.81 of the parts after 4 s (nine meshes, one seed)."""
-
-PORTFOLIO = ("excess-norm", "hull-sum", "max-excess")
-"""Scores of the greedy policies that cut neighbourhoods."""
 
 
 @dataclass(frozen=True)
 class SearchContext:
-    """The problem that a search solves and the tools it solves it with.
+    """The problem that a search solves.
 
     Attributes
     ----------
@@ -55,35 +41,22 @@ class SearchContext:
     criterion : Criterion
         Every new part meets it.
     seed : int
-    scores : sequence of str
-        Of the greedy policies that cut neighbourhoods.
     enough : callable
         Returns the least number of parts of any decomposition: the search ends there. May wait for that.
-    near_sweeps : SweepCache
-        Coarser sweeps of components in neighbourhoods.
     """
 
     root: Component
     criterion: Criterion
     seed: int = 0
-    scores: Sequence[str] = PORTFOLIO
     enough: Callable[[], int] = lambda: 1
-    near_sweeps: SweepCache = field(default_factory=lambda: SweepCache(PLANES_PER_AXIS, CONCAVE_EDGES))
 
 
 LAG = 4
 """A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that several can be under way
 at a time. It does not depend on the number of threads, so neither does the result."""
 
-CLUSTER = 3
-"""Parts that are recut together: two rarely become one, and of more, hardly any trial saves a part
-(docs/search.md)."""
-
 MOST_TRIES = 3
 """How often a part is divided between the same parts: of 470 further trials none saved one."""
-
-DRAWS = 10
-"""Draws of a cluster before it is given up to find a new one."""
 
 
 class Operator(Enum):
@@ -91,16 +64,14 @@ class Operator(Enum):
 
     REDISTRIBUTE = "a part is divided among those around"
     GIVE = "a part gives to those around what they can take"
-    RECUT = "a cluster is cut again"
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """An operator applied to some parts; recuts have a policy."""
+    """An operator applied to the part of a number."""
 
     operator: Operator
-    parts: Cluster
-    policy: int = 0
+    part: int
 
 
 @dataclass(frozen=True)
@@ -129,30 +100,28 @@ class Neighbourhood:
     gained : float
         When they became so few, by `time.perf_counter`.
     steps, accepted : int
-        Recuts tried, and trials accepted.
+        Trials made after each part was offered, and trials accepted.
     """
 
     def __init__(self, context: SearchContext, parts: Sequence[Part], run: Run) -> None:
         self._context = context
         self._run = run
-        self._policies = [Greedy(score, sweeps=context.near_sweeps) for score in context.scores]
         self._random = np.random.default_rng(context.seed)
-        self._graph = PartGraph(parts, context.criterion, run)
+        self._now = NumberedParts(parts, context.criterion.screen)
         self.best = list(parts)
         self.gained = time.perf_counter()
         self.steps = self.accepted = 0
-        self._nears: dict[int, Cluster] = {}
+        self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
+        self._around: dict[int, tuple[int, ...]] = {}
         self._begun: deque[_UnderWay] = deque()
         self._again: deque[_Trial] = deque()  # what they found came too late
-        self._recut: set[tuple[Cluster, int]] = set()
-        self._tries: dict[tuple[Operator, int, Cluster], int] = {}
+        self._tries: dict[tuple[Operator, int, tuple[int, ...]], int] = {}
         self._in_vain = dict.fromkeys(Operator, 0)  # units since each last saved a part
-        self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
 
     @property
     def parts(self) -> list[Part]:
         """The parts as they are."""
-        return list(self._graph.parts.values())
+        return list(self._now.parts.values())
 
     @property
     def is_least(self) -> bool:
@@ -160,74 +129,63 @@ class Neighbourhood:
         return len(self.best) <= self._context.enough()
 
     def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
-        """Search until the run is over, `most` recuts are made in total, so many units have saved nothing, or no fewer
+        """Search until the run is over, `most` trials are made in total, so many units have saved nothing, or no fewer
         parts can do."""
         self._in_vain = dict.fromkeys(Operator, 0)
         self._make(self._trials(patience), most)
 
     def redistribute_all(self) -> None:
         """Offer each part to those around, the smallest first."""
-        self._make(_Trial(Operator.REDISTRIBUTE, (which,)) for which in self._by_size())
+        self._make(_Trial(Operator.REDISTRIBUTE, which) for which in self._by_size())
+        self.steps = 0
 
     def _trials(self, patience: float) -> Iterator[_Trial]:
         """Trials of the operator that has done the least work in vain."""
         while sum(self._in_vain.values()) < patience and not self.is_least:
-            for operator in sorted(Operator, key=self._in_vain.__getitem__):
-                trial = self._cluster() if operator is Operator.RECUT else self._least_tried(operator)
-                if trial is not None:
-                    yield trial
-                    break
-            else:
-                if not self._begun:
-                    return
+            found = map(self._least_tried, sorted(Operator, key=self._in_vain.__getitem__))
+            trial = next((trial for trial in found if trial is not None), None)
+            if trial is not None:
+                yield trial
+            elif self._begun:
                 self._settle()  # what they find may bring something new to try
-
-    def _cluster(self) -> _Trial | None:
-        """Draw a cluster and a policy by which it has not been recut."""
-        for _ in range(DRAWS if self._policies else 0):
-            cluster = self._graph.draw(CLUSTER, self._random)
-            if cluster is None:
-                break
-            policy = int(self._random.integers(len(self._policies)))
-            if (cluster, policy) not in self._recut:
-                self._recut.add((cluster, policy))
-                return _Trial(Operator.RECUT, cluster, policy)
-        return None
+            else:
+                return
 
     def _least_tried(self, operator: Operator) -> _Trial | None:
         """The part that was tried the fewest times between the same parts, of those the smallest."""
-        tries = {i: self._tries.get((operator, i, near), 0) for i in self._by_size() if (near := self._around(i))}
+        around = self._neighbours()
+        tries = {i: self._tries.get((operator, i, around[i]), 0) for i in self._by_size() if around[i]}
         which = min(tries, key=tries.__getitem__, default=None)
-        return None if which is None or tries[which] == MOST_TRIES else _Trial(operator, (which,))
+        return None if which is None or tries[which] == MOST_TRIES else _Trial(operator, which)
 
     def _by_size(self) -> list[int]:
-        parts = self._graph.parts
+        parts = self._now.parts
         return sorted(parts, key=lambda i: (parts[i].hull.volume, i))
 
-    def _around(self, which: int) -> Cluster:
-        """The parts that a part may be divided among."""
-        if which not in self._nears:
-            self._nears[which] = self._graph.near(which, self._near)
-        return self._nears[which]
+    def _neighbours(self) -> dict[int, tuple[int, ...]]:
+        """The parts that each part may be divided among, in ascending order."""
+        if not self._around:
+            around: dict[int, list[int]] = {i: [] for i in self._now.parts}
+            for i, j in self._now.boxes.pairs([*around], self._near).tolist():
+                around[i].append(j)
+                around[j].append(i)
+            self._around = {i: tuple(sorted(near)) for i, near in around.items()}
+        return self._around
 
     def _exchange(self, trial: _Trial) -> Callable[[Run], Exchange | None] | None:
-        """What finds an exchange of the parts as they are; None if those of the trial have gone."""
-        graph, context, operator = self._graph, self._context, trial.operator
-        if not all(i in graph.parts for i in trial.parts):
+        """What finds an exchange of the parts as they are; None if that of the trial has gone."""
+        parts, context, operator = self._now.parts, self._context, trial.operator
+        if trial.part not in parts:
             return None
-        parts = graph.of(trial.parts)
-        if operator is Operator.RECUT:
-            around = graph.of(graph.around(trial.parts))
-            return partial(recut, parts, around, context.criterion, self._policies[trial.policy], context.root)
-        near = self._around(trial.parts[0])
-        key = operator, trial.parts[0], near
+        near = self._neighbours()[trial.part]
+        key = operator, trial.part, near
         tries = self._tries[key] = self._tries.get(key, 0) + 1
         random = np.random.default_rng(int(self._random.integers(2**32)))
         divide = give if operator is Operator.GIVE else partial(redistribute, again=tries > 1)
-        return partial(divide, parts[0], graph.of(near), context.criterion, random, context.root)
+        return partial(divide, parts[trial.part], [parts[i] for i in near], context.criterion, random, context.root)
 
     def _make(self, trials: Iterator[_Trial], most: float = math.inf) -> None:
-        """Make trials, `LAG` at a time, and apply what they find, until there are `most` recuts."""
+        """Make trials, `LAG` at a time, and apply what they find, until there are `most`."""
         run = self._run
         try:
             while self.steps < most and run.step(self.steps, None, len(self.best)):
@@ -252,14 +210,13 @@ class Neighbourhood:
         self._run.work.pay(begun.run.work.done)
         if begun.run.work.is_spent:  # it was given all that was left
             self._run.work.close()
-        self.steps += begun.trial.operator is Operator.RECUT
+        self.steps += 1
         self._in_vain[begun.trial.operator] += begun.run.work.done
         if exchange is None:
             return
-        if not self._graph.apply(exchange):
+        if not self._apply(exchange):
             self._again.append(begun.trial)
             return
-        self._nears.clear()
         self.accepted += 1
         if exchange.gain > 0:
             self._in_vain[begun.trial.operator] = 0
@@ -267,6 +224,17 @@ class Neighbourhood:
             if len(self.parts) < len(self.best):
                 self.gained = time.perf_counter()
             self.best = self.parts
+
+    def _apply(self, exchange: Exchange) -> bool:
+        """Apply an exchange; False if some of the parts it takes out are already gone."""
+        numbers = {id(part): i for i, part in self._now.parts.items()}
+        if any(id(part) not in numbers for part in exchange.out):
+            return False
+        self._now.remove([numbers[id(part)] for part in exchange.out])
+        for part in exchange.into:
+            self._now.add(part)
+        self._around = {}
+        return True
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

@@ -1,6 +1,5 @@
 """The operators of the search, which exchange parts for fewer.
 
-- recut: a few parts are reunited, cut differently, and merged with the parts around.
 - redistribute: a part is divided until the parts around have taken all of it, or some piece cannot go. Hulls may
   overlap, so a taker need not end where the part began: it takes a piece if the solid clipped to their joint hull meets
   the criterion (`rlacd.merge.merge.Uniter`). A piece that no part can take is halved, and the halves are offered again.
@@ -16,19 +15,11 @@ from functools import reduce
 import numpy as np
 
 from rlacd.criteria.criterion import Criterion
-from rlacd.cut import CutTree
-from rlacd.merge.merge import Uniter, merge_parts
-from rlacd.policies import Policy
+from rlacd.merge.merge import Uniter
 from rlacd.run import Run, work
 from rlacd.solid.arrays import heights
-from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part, Plane, reunite
+from rlacd.solid.component import ClippedPart, Component, Part, Plane, reunite
 from rlacd.solid.hull import Hull
-
-EXTRA_PIECES = 5
-"""Pieces allowed beyond the number of parts: merging rarely makes up for more."""
-
-LEAST_SHRINKAGE = 1e-4
-"""Equally many parts are better only if their hulls are smaller by this share; otherwise the search would stall."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,66 +42,6 @@ class Exchange:
     def gain(self) -> int:
         """Number of parts saved."""
         return len(self.out) - len(self.into)
-
-
-def recut(
-    parts: Sequence[Part],
-    around: Sequence[Part],
-    criterion: Criterion,
-    policy: Policy,
-    solid: Component,
-    run: Run,
-) -> Exchange | None:
-    """Reunite some parts, cut them again, and merge the pieces with each other and with the parts around.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-        A connected cluster.
-    around : sequence of Part
-        Parts that touch the cluster.
-    criterion : Criterion
-        Every new part meets it.
-    policy : Policy
-        Chooses the planes.
-    solid : Component
-        The solid that was decomposed.
-    run : Run
-        Give up when it is over.
-
-    Returns
-    -------
-    Exchange or None
-        None if the result has neither fewer parts nor equally many with smaller hulls.
-    """
-    members = [member for part in parts for member in part.members]
-    if not run.work.pay(work.reuniting(sum(member.size for member in members), len(members))):
-        return None
-    whole = reunite(members)
-    if whole is None:
-        return None
-    pieces, left = CutTree(whole, policy, run).cut_until(criterion, len(parts) + EXTRA_PIECES)
-    if left or sum(piece.volume for piece in pieces) < (1 - LOST_VOLUME) * whole.volume:
-        return None
-    if _volumes(pieces) == _volumes(parts):  # cut as before: merging these has already been tried
-        return None
-    merged = merge_parts(pieces, criterion, run, beside=around, solid=solid)
-    if run.is_over:
-        return None
-    exchange = Exchange.between([*parts, *around], merged)
-    tighter = hull_volume(exchange.into) < (1 - LEAST_SHRINKAGE) * hull_volume(exchange.out)
-    return exchange if exchange.gain > 0 or (exchange.gain == 0 and tighter) else None
-
-
-def _volumes(parts: Sequence[Part]) -> list[int]:
-    """Sorted shares of the total volume in millionths; two divisions of a solid with equal shares count as the same."""
-    whole = sum(part.volume for part in parts)
-    return sorted(round(1e6 * part.volume / whole) for part in parts)
-
-
-def hull_volume(parts: Sequence[Part]) -> float:
-    """Total volume of the parts' hulls."""
-    return sum(part.hull.volume for part in parts)
 
 
 TAKERS = 6

@@ -20,7 +20,7 @@ from rlacd.solid.component import Part
 BEST_SECONDS = 5.0
 """What ``best`` may take by default, more if its first search takes longer."""
 
-TIMES_FIRST_PASS = 5.0
+TIMES_FIRST_PASS = 4.5
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 8e6
@@ -29,7 +29,7 @@ LEAST_WORK, MOST_WORK = 0.15e6, 8e6
 WORK_OF_A_STEP = 1e5
 """Where only the number of steps is limited, the work allowed for each: far more than most take."""
 
-PATIENCE = 2.0
+PATIENCE = 1.0
 """Another start is tried when the search from the best one has saved nothing in this multiple of the work of the first
 pass: about what another start takes until it shows what it is worth."""
 
@@ -42,11 +42,8 @@ ANOTHER_PASS = 1.5
 HOPELESS = 5
 """... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
-BOUNDED_STARTS = 2
-"""A bounded search ends when it has saved nothing from the last of so many starts for that long."""
-
 IN_VAIN = 8
-"""Any search ends when so many starts in a row have found nothing better."""
+"""A search ends when so many starts in a row have found nothing better."""
 
 
 @dataclass
@@ -65,7 +62,7 @@ class SearchSummary:
     starts : int
         Passes over the whole solid that it searched from.
     steps : int
-        Recuts of clusters.
+        Trials, without the first for each part of a start.
     accepted : int
         Trials that were accepted.
     work : int
@@ -117,7 +114,7 @@ def search(
     seconds : float, optional
         Wall time of the search, in place of that bound.
     steps : int, optional
-        Recuts of clusters, in place of that bound.
+        Trials, in place of that bound.
 
     Returns
     -------
@@ -138,11 +135,11 @@ def search(
     state = _Search(context, parts, run, first_pass)
     most = math.inf if steps is None else steps
     with run.limited(allowed, math.inf if seconds is None else seconds):
-        state.go_on(most, BOUNDED_STARTS if bounded else math.inf)
+        state.go_on(most)
     earlier = state.best
     if bounded and quality == "best":
         with run.limited(seconds=BEST_SECONDS - (time.perf_counter() - begin)):
-            state.go_on(most, math.inf)
+            state.go_on(most)
     summary = SearchSummary(
         level=quality,
         seconds=time.perf_counter() - begin,
@@ -164,7 +161,7 @@ def eliminate_parts(context: SearchContext, parts: Sequence[Part], run: Run) -> 
 
     With `fast` it is the only search, for criteria that ask for it (`Criterion.eliminates`).
     """
-    state = Neighbourhood(replace(context, scores=()), parts, run)
+    state = Neighbourhood(context, parts, run)
     state.redistribute_all()
     return state.parts
 
@@ -190,7 +187,7 @@ class _Search:
     gained : float
         When they became so few, by `time.perf_counter`.
     starts, steps, accepted : int
-        Starts searched from, recuts tried and trials accepted.
+        Starts searched from, trials made and trials accepted.
     """
 
     def __init__(self, context: SearchContext, parts: list[Part], run: Run, first_pass: int) -> None:
@@ -205,12 +202,10 @@ class _Search:
         self._state: Neighbourhood | None = None
         self._ahead = 0  # parts of that when each had been offered to others
 
-    def go_on(self, most: float, starts: float) -> None:
-        """Search until the run is over, `most` recuts are made, no fewer parts can do, or so many starts were tried."""
+    def go_on(self, most: float) -> None:
+        """Search until the run is over, `most` trials are made, or no fewer parts can do."""
         run, enough, in_vain = self._run, self._context.enough, 0
-        while self.steps < most and not run.is_over and len(self.best) > enough():
-            if in_vain == IN_VAIN or self._passes >= starts:
-                return
+        while self.steps < most and not run.is_over and len(self.best) > enough() and in_vain < IN_VAIN:
             before = len(self.best)
             if self._state is None:
                 self._state = self._begun(self.best)

@@ -3,7 +3,7 @@
 ``@``, ``einsum`` and ``np.linalg`` add in an order, and round or do not round between, as the processor and the library
 built for it allow; so do the series behind ``arctan2``, ``log`` and fractional powers. A plane whose offset comes from
 them differs in the last bit from machine to machine, and with it every hull. Sums, products, quotients and square roots
-alone are rounded alike everywhere; other functions made of them are kernels (`native/base/elementary.hpp`).
+alone are rounded alike everywhere; other functions made of them are kernels (`native/core/elementary.hpp`).
 """
 
 from __future__ import annotations

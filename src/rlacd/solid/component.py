@@ -309,10 +309,6 @@ def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArra
     return np.concatenate([vertices for vertices, _ in surfaces]), np.concatenate(faces).astype(np.int32)
 
 
-TOUCHING_FACES = 1e-8
-"""Distance at which faces count as touching (see native/distance/glue.hpp)."""
-
-
 def reunite(components: Sequence[Component]) -> Component | None:
     """Unite components with disjoint interiors into one; None if the result is not a clean solid.
 
@@ -344,18 +340,3 @@ def _joined_again(components: Sequence[Component]) -> list[Component]:
         if not whole:
             return found
         found = [component for component in found if component.within not in whole] + whole
-
-
-def touch(first: Part, second: Part) -> bool:
-    """Tell whether two parts, or members of them, touch face to face."""
-    ours, theirs = _disjoint_pieces(first), _disjoint_pieces(second)
-    return _native.do_touch(
-        [one.vertices for one in ours],
-        [one.faces for one in ours],
-        [one.vertices for one in theirs],
-        [one.faces for one in theirs],
-    )
-
-
-def _disjoint_pieces(part: Part) -> Sequence[Part]:
-    return part.members if isinstance(part, ClippedPart) else (part,)

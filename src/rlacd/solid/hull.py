@@ -113,7 +113,7 @@ def limit_hull(
     Edges are collapsed outwards, cheapest first, each by solving a linear program (progressive hulls: Sander et al.,
     "Silhouette Clipping", SIGGRAPH 2000). Then the remaining corners are moved one at a time to minimise the volume
     while the hull stays convex and contains the given one. If it sticks out too far, all corners are moved at once to
-    stick out about equally (``native/hull/even_out.hpp``).
+    stick out about equally (``native/convex/even_out.hpp``).
     """
     most, most_faces = (min(limit or _NO_LIMIT, _NO_LIMIT) for limit in limits)
     vertices, faces = _native.simplify_hull(hull.vertices, hull.faces, most, most_faces, tolerance, sides, enough)

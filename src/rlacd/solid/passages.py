@@ -159,15 +159,8 @@ def _pushed_by(
     size: FloatArray, times: int, at: FloatArray, surface: _native.Surface, threads: int
 ) -> tuple[Balls, FloatArray]:
     """The best balls on the ways of points that are pushed, and those ways from begin to end."""
-    begin, best, radii = at, at.copy(), np.zeros(len(at))
-    for _ in range(times):
-        touched, _ = surface.closest(at, threads)
-        away = at - touched
-        distance = np.sqrt(dots(away, away))
-        better = distance > radii
-        best[better], radii[better] = at[better], distance[better]
-        at = at + (size / np.where(distance > 0, distance, 1.0))[:, None] * away
-    return Balls(best, radii), at - begin
+    best, radii, ends = surface.pushed(at, size, times, threads)
+    return Balls(best, radii), ends - at
 
 
 def spread(balls: Balls, spacing: float) -> Balls:

@@ -58,6 +58,11 @@ def compacted(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, 
     return vertices[used], (np.cumsum(used, dtype=faces.dtype) - 1).astype(faces.dtype)[faces]
 
 
+def used_points(vertices: FloatArray, faces: NDArray[Index]) -> FloatArray:
+    """The vertices that faces use; of a cloud of points, which has none, all."""
+    return compacted(vertices, faces)[0] if len(faces) else vertices
+
+
 def first_of_doubled(faces: Int64Array, count: int) -> BoolArray:
     """Return ``[F]`` whether a face is the first with its three corners, in any order; ``count`` vertices exist."""
     return _native.first_of_doubled(np.ascontiguousarray(faces), count)

@@ -17,15 +17,17 @@ from rlacd.options import CRITERIA, FAST, Options, with_criterion
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.topology import used_points
 
 _NAMES = (
     *("criterion", "threshold", "radius", "tolerance", "volume_tolerance", "quality", "primitives"),
-    *("overlap", "keep_open", "open", "max_hulls", "max_vertices", "preset"),
+    *("overlap", "keep_open", "open", "keep_cavities", "max_hulls", "max_vertices", "preset"),
 )
 _USUAL, _SPACE = Options(), NavigableSpace()
 _NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
 
 CONTROLS: dict[str, Any] = {name: getattr(_SPACE if hasattr(_SPACE, name) else _USUAL, name) for name in _NAMES}
+_FLAGS = {name for name, usual in CONTROLS.items() if usual is False}
 CONTROLS["primitives"] = False
 """The page's controls, by the names of options, with their first values."""
 
@@ -75,6 +77,8 @@ class Subject:
         The mesh as first read.
     up_is_guess : bool
         Whether the file does not say which axis points up.
+    is_robot : bool
+        Whether it is a robot, which becomes a robot.
     """
 
     path: Path
@@ -83,6 +87,7 @@ class Subject:
     unit: str
     mesh: InputMesh
     up_is_guess: bool = False
+    is_robot: bool = False
 
 
 def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject:
@@ -108,20 +113,22 @@ STANDING = 0.005
 
 def guessed_up(mesh: InputMesh) -> Axis:
     """Guess y if the mesh stands on y = 0 and not on z = 0, else z, which files are taken for elsewhere."""
-    points = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
+    points = used_points(mesh.vertices, mesh.faces)
     low = points.min(axis=0)
     stands = np.abs(low) <= STANDING * (points.max(axis=0) - low).max()
     return "y" if stands[1] and not stands[2] else "z"
 
 
-def as_command(mesh: str | os.PathLike[str], controls: dict[str, Any]) -> str:
+def as_command(subject: Subject, mesh: str | os.PathLike[str], controls: dict[str, Any]) -> str:
     """Write ``rlacd decompose`` with the options set on the page: one line, quoted for a POSIX shell."""
     others = _NUMBERS - {*CRITERIA[controls["criterion"]]}
     words = ["rlacd", "decompose", os.fspath(mesh)]
     for name, value in controls.items():
         if name not in others and value not in (None, CONTROLS[name]):
-            words += [f"--{name.removeprefix('volume_').replace('_', '-')}", _word(value)]
-    return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls.glb"])
+            flag = f"--{name.removeprefix('volume_').replace('_', '-')}"
+            words += [flag] if name in _FLAGS else [flag, _word(value)]
+    ending = Path(mesh).suffix if subject.is_robot else ".glb"
+    return shlex.join([*words, "-o", f"{file_stem(Path(mesh).stem)}_hulls{ending}"])
 
 
 def _word(value: Any) -> str:

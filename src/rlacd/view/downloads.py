@@ -18,6 +18,7 @@ from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
 from rlacd.result import Result
 from rlacd.view.report import report_page
+from rlacd.view.robot import RobotResult
 
 FOLDERS = ("obj", "stl")
 """Formats also offered with one file per hull."""
@@ -106,6 +107,8 @@ def download(decomposition: Result, wanted: str, *, up: str = "z") -> tuple[str,
     names = [offer.name for offer in offered()]
     if wanted not in names:
         raise OptionError(f"{wanted!r} cannot be downloaded; choose one of {', '.join(names)}.")
+    if isinstance(decomposition, RobotResult) and wanted in MODELS:
+        raise OptionError("a robot is not one body: rlacd decompose writes it with its joints; copy the command.")
     stem = file_stem(decomposition.name)
     if wanted == "report.html":
         return (f"{stem}_hulls.html", report_page(decomposition, up=up).encode())

@@ -18,7 +18,10 @@ from typing import Any
 
 from rlacd.plain_json import to_json
 
-MODULES = ("arrays", "camera", "controls", "facts", "ground", "hints", "keys", "link", "list", "stage", "widgets")
+MODULES = (
+    *("arrays", "camera", "controls", "facts", "ground", "hints"),
+    *("joints", "keys", "link", "list", "stage", "widgets"),
+)
 """Modules of the page other than ``main``, imported as ``"page/list"``."""
 
 POLICY = (

@@ -18,6 +18,7 @@ from rlacd.solid.primitive import PRIMITIVE
 from rlacd.view.coloring import color_hulls
 from rlacd.view.heat import HeatMesh, frame_of
 from rlacd.view.picture import apart
+from rlacd.view.robot import RobotResult, robot_scene
 
 
 def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, Any]:
@@ -34,11 +35,12 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     Returns
     -------
     dict
-        ``name``; ``up``; ``unit``; ``scale``, frame units per unit of the input; the unchanged ``report``; ``input``,
-        ``{vertices, faces}`` or None for a cloud of points; ``parts``, a list of ``{vertices, faces, color, rank,
-        error, volume, primitive}`` with ``rank`` the index of the hue, ``error`` the criterion's measurement (or None),
-        ``volume`` in the normalised frame and ``primitive`` its kind (or None); ``balls``, ``{centres, radii, shown,
-        of}`` or None, with the numbers of balls shown and in all.
+        ``name``; ``up``; ``unit``; ``scale``, frame units per unit of the input; the unchanged ``report``; ``input``, a
+        list of ``{vertices, faces}``: of each link of a robot, else one, or none for a cloud of points; ``parts``, a
+        list of ``{vertices, faces, color, rank, error, volume, primitive, link}`` with ``rank`` the index of the hue,
+        ``error`` the criterion's measurement (or None), ``volume`` in the normalised frame, ``primitive`` its kind (or
+        None) and ``link`` the number of a robot's link (or None); ``balls``, ``{centres, radii, shown, of}`` or None,
+        with the numbers of balls shown and in all; ``robot``, how it moves, or None.
     """
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
@@ -52,8 +54,13 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
         shown = min(len(some), 4000)  # more are slow to draw
         centres, radii = frame.to_frame(some.centres[:shown]), some.radii[:shown] * frame.scale
         balls = {"centres": floats(centres), "radii": floats(radii), "shown": shown, "of": len(decomposition.balls)}
+    robot = decomposition if isinstance(decomposition, RobotResult) else None
+    bare = input_scene(decomposition.name, source.vertices, source.faces, up, unit=unit, frame=frame)
+    links: list[int] | list[None] = [None] * len(rgb) if robot is None else [*robot.link_of]
     return {
-        **input_scene(decomposition.name, source.vertices, source.faces, up, unit=unit, frame=frame),
+        **bare,
+        "input": bare["input"] if robot is None else [_mesh(frame.to_frame(m.vertices), m.faces) for m in robot.meshes],
+        "robot": None if robot is None else robot_scene(robot, frame),
         "report": report,
         "parts": [
             {
@@ -63,8 +70,9 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
                 "error": error,
                 "volume": float(hull.volume) * frame.scale**3,
                 "primitive": hull.metadata.get(PRIMITIVE, {}).get("kind"),
+                "link": link,
             }
-            for hull, color, rank, error in zip(decomposition, rgb, ranks, errors, strict=True)
+            for hull, color, rank, error, link in zip(decomposition, rgb, ranks, errors, links, strict=True)
         ],
         "balls": balls,
     }
@@ -82,7 +90,8 @@ def input_scene(
         "unit": unit,
         "scale": frame.scale,
         "report": None,
-        "input": _mesh(frame.to_frame(points), corners) if len(corners) else None,
+        "input": [_mesh(frame.to_frame(points), corners)] if len(corners) else [],
+        "robot": None,
         "parts": [],
         "balls": None,
     }

@@ -7,6 +7,7 @@
 ``GET /download?format=NAME``         a file
 ``POST /open?name=NAME``              open another mesh: the bytes of its file
 ``POST /command``                     the options as a command for a terminal
+``POST /touching``                    the links of a robot that touch at other positions of its joints
 ``POST /decompose``, ``POST /cancel``  JSON in, JSON out
 ====================================  ===========================================================================
 
@@ -41,11 +42,12 @@ from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
 from rlacd.view.connections import ANSWER_SECONDS, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
-from rlacd.view.controls import Subject, as_command, passes_of, read_controls, read_subject
+from rlacd.view.controls import Subject, as_command, passes_of, read_controls
 from rlacd.view.downloads import download, offered
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
 from rlacd.view.picture import check_up
+from rlacd.view.robot import RobotResult
 from rlacd.view.scene import heat_scene, input_scene, scene
 from rlacd.view.session import Session
 
@@ -67,8 +69,12 @@ HARDENING = {
 """Headers of every answer."""
 
 
+Read = Callable[[Path, str | None], Subject]
+"""Reads a file to be shown, with the axis that points up if that is given."""
+
+
 class ViewServer(BoundedServer):
-    """Serves one session: a subject, with the first values of the page's controls.
+    """Serves one session: a subject, with the first values of the page's controls, and what reads another.
 
     It listens on `port`; by default on the usual one, or any that is free.
 
@@ -78,8 +84,8 @@ class ViewServer(BoundedServer):
         The port is in use, forbidden, or out of range.
     """
 
-    def __init__(self, session: Session, subject: Subject, *, port: int | None, options: dict[str, Any]) -> None:
-        self.session, self.subject = session, subject
+    def __init__(self, session: Session, subject: Subject, read: Read, *, port: int | None, options: Any) -> None:
+        self.session, self.subject, self.read = session, subject, read
         self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
         self.uploads = threading.BoundedSemaphore(UPLOADS)
         self.controls = options
@@ -130,7 +136,7 @@ class ViewServer(BoundedServer):
             try:
                 path = Path(folder.name) / file_name(name)
                 path.write_bytes(content)
-                self.subject = read_subject(path)
+                self.subject = self.read(path, None)
             except BaseException:
                 folder.cleanup()
                 raise
@@ -223,7 +229,9 @@ class _Handler(BoundedHandler):
             elif place.path == "/command":
                 path = self.server.subject.path  # an uploaded mesh has no place but a copy that goes with the viewer
                 where = path if self.server.uploaded is None else path.name
-                answer["command"] = as_command(where, read_controls(self._body()))
+                answer["command"] = as_command(self.server.subject, where, read_controls(self._body()))
+            elif place.path == "/touching":
+                answer["contacts"] = self._touching(self._body())
             elif place.path == "/cancel":
                 self._body()
                 self.server.session.stop()
@@ -290,6 +298,17 @@ class _Handler(BoundedHandler):
         if result is None:
             raise OptionError("there are no hulls yet; wait for the first decomposition.")
         return result
+
+    def _touching(self, asked: dict[str, Any]) -> list[Any]:
+        """The links of a robot that touch at given joint positions."""
+        robot, values = self._result()[1], asked.get("values")
+        if not isinstance(robot, RobotResult) or robot.touching is None:
+            raise OptionError("whether links touch is not known here.")
+        is_number = (isinstance(value, (int, float)) and math.isfinite(value) for value in values or ())
+        if not isinstance(values, list) or len(values) != robot.free or not all(is_number):
+            raise OptionError(f"give values, {robot.free} numbers: the positions of the joints.")
+        with self.server.heavy:
+            return robot.touching(values)
 
     def _send_events(self) -> None:
         self.close_connection = True

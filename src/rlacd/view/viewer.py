@@ -7,12 +7,13 @@ import contextlib
 import os
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from rlacd.options import Options, with_criterion
 from rlacd.view.controls import read_controls, read_subject
 from rlacd.view.picture import check_up
-from rlacd.view.server import ViewServer
+from rlacd.view.server import Read, ViewServer
 from rlacd.view.session import Decompose, Session
 
 AT_EXIT = 30.0
@@ -25,6 +26,7 @@ def open_viewer(
     decompose: Decompose,
     options: dict[str, Any] | None = None,
     *,
+    read: Read = read_subject,
     up: str | None = None,
     port: int | None = None,
     threads: int | None = None,
@@ -39,6 +41,8 @@ def open_viewer(
         Any file `rlacd.decompose` takes; it is read again for every decomposition, so that changes to it take effect.
     decompose : callable
         `rlacd.decompose`.
+    read : callable
+        What reads the file; `rlacd.io.robots.shown` has both for robots too.
     options : dict, optional
         Initial values of the page's controls, by their names.
     up : {"x", "y", "z"}, optional
@@ -63,10 +67,10 @@ def open_viewer(
     check_up(up)
     controls = read_controls(options or {})
     Options.of({**with_criterion(options or {}), "threads": threads})
-    subject = read_subject(mesh, up)
+    subject = read(Path(mesh), up)
     session = Session(lambda **given: decompose(**given, threads=threads))
     try:
-        server = ViewServer(session, subject, port=port, options=controls)
+        server = ViewServer(session, subject, read, port=port, options=controls)
     except BaseException:
         session.close()
         raise

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -33,10 +32,9 @@ Answered: TypeAlias = "tuple[Values, dict[str, bytes]]"
 
 
 def served(answer: Callable[[Values, Blobs], Answered]) -> MakeServer:
-    """Make a server of a function; what its libraries write, such as reports of crashes, goes with its process."""
+    """Make a server of a function."""
 
-    def make(folder: Path) -> Server:
-        os.environ["TMPDIR"] = str(folder)
+    def make(_: Path) -> Server:
         return lambda values, blobs, shared: answer(values, blobs)
 
     return make

@@ -1,6 +1,7 @@
 """Existing robot descriptions: every collision mesh is replaced by its hulls, and the rest kept byte for byte."""
 
-from rlacd.io.robots.rewrite import is_robot, rewrite_robot
+from rlacd.io.robots.read import is_robot
+from rlacd.io.robots.rewrite import rewrite_robot
 from rlacd.io.robots.rewritten import Rewritten, RewrittenLink
 
 __all__ = ["Rewritten", "RewrittenLink", "is_robot", "rewrite_robot"]

@@ -20,6 +20,7 @@ from rlacd.errors import MeshFileError
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.hull import Hull
 from rlacd.solid.poses import inverse, moved, product
+from rlacd.solid.topology import used_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +158,13 @@ class Body:
     def hulls(self, results: Mapping[Collider, Decomposition]) -> list[trimesh.Trimesh]:
         """The hulls in their place, in the body's frame; `results` are in those of the colliders."""
         each = [(collider.meshes[0].to_body, hull) for collider in self.colliders for hull in results[collider].hulls]
-        return [trimesh.Trimesh(*_turned(pose, hull.vertices, hull.faces), process=False) for pose, hull in each]
+        return [trimesh.Trimesh(*turned(pose, hull.vertices, hull.faces), process=False) for pose, hull in each]
+
+
+def placed(bodies: Sequence[Body], poses: Sequence[FloatArray]) -> list[trimesh.Trimesh]:
+    """The meshes of bodies where poses put them."""
+    meshes = [(pose, body.mesh()) for body, pose in zip(bodies, poses, strict=True)]
+    return [trimesh.Trimesh(*turned(pose, mesh.vertices, mesh.faces), process=False) for pose, mesh in meshes]
 
 
 def size_of(bodies: Sequence[Body]) -> float:
@@ -166,21 +173,18 @@ def size_of(bodies: Sequence[Body]) -> float:
     The world's count only if there is nothing else: a robot may stand on a terrain of any size.
     """
     moving = [body for body in bodies if not body.is_world] or bodies
-    used = [moved(body.pose, _used(body.mesh())) for body in moving]
+    meshes = placed(moving, [body.pose for body in moving])
+    used = [used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh in meshes]
     return float(np.ptp(np.concatenate(used), axis=0).max()) if used else 0.0
 
 
-def _used(mesh: trimesh.Trimesh) -> FloatArray:
-    return np.asarray(mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices)
-
-
 def _joined(meshes: Sequence[PlacedMesh], poses: Sequence[FloatArray]) -> trimesh.Trimesh:
-    parts = [_turned(pose, mesh.points, mesh.faces) for mesh, pose in zip(meshes, poses, strict=True)]
+    parts = [turned(pose, mesh.points, mesh.faces) for mesh, pose in zip(meshes, poses, strict=True)]
     begins = np.cumsum([0, *(len(points) for points, _ in parts)])
     faces = [faces + begin for (_, faces), begin in zip(parts, begins, strict=False)]
     return trimesh.Trimesh(np.concatenate([points for points, _ in parts]), np.concatenate(faces), process=False)
 
 
-def _turned(pose: FloatArray, points: FloatArray, faces: Int64Array) -> tuple[FloatArray, Int64Array]:
+def turned(pose: FloatArray, points: FloatArray, faces: Int64Array) -> tuple[FloatArray, Int64Array]:
     """Points and faces where a pose puts them; those of a USD stage may mirror."""
     return moved(pose, points), faces if np.linalg.det(pose[:3, :3]) > 0 else faces[:, ::-1]

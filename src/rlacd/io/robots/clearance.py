@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from rlacd.clear import Body as Moving
 from rlacd.clear import (
+    Cleared,
     CrowdedError,
     LinkPair,
     Motion,
@@ -24,7 +25,8 @@ from rlacd.clear import (
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError
 from rlacd.io.robots.bodies import Body, Collider
-from rlacd.io.robots.decomposed import decomposed, options_of_bodies
+from rlacd.io.robots.decomposed import decompose_bodies, decomposed, options_of_bodies
+from rlacd.options.output import Axis
 from rlacd.options.robots import RobotOptions
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.poses import inverse, moved
@@ -34,67 +36,98 @@ MOST_SAID = 5
 
 
 @dataclass(frozen=True)
+class Robot:
+    """A robot file that has been read.
+
+    Attributes
+    ----------
+    source : Path
+    bodies : list of Body
+    motion : callable
+        Takes what is asked and a seed; returns where the bodies can be, and what to say of it.
+    metres : float
+        Its unit of length.
+    up : {"x", "y", "z"}
+        The axis that points up.
+    """
+
+    source: Path
+    bodies: list[Body]
+    motion: Callable[[RobotOptions, int], tuple[Motion, list[str]]]
+    metres: float = 1.0
+    up: Axis = "z"
+
+    def in_mm(self, length: float) -> str:
+        """A length in words."""
+        return f"{1000 * self.metres * length:.3g} mm"
+
+
+@dataclass(frozen=True)
 class Checked:
-    """Links that were checked against each other.
+    """The hulls of links, checked against each other.
 
     Attributes
     ----------
     results : dict of Collider to Decomposition
-        The hulls, finer where links would touch.
-    pairs : list of LinkPair
-        Empty if nothing was checked.
-    samples : int
-        Joint positions looked at, with that at rest.
+        Finer where links would touch.
+    motion : Motion, optional
+        Where the links were looked at; None if they were not.
+    cleared : Cleared, optional
+        What they do there.
     warnings : list of str
     """
 
     results: dict[Collider, Decomposition]
-    pairs: list[LinkPair]
-    samples: int
-    warnings: list[str]
+    motion: Motion | None = None
+    cleared: Cleared | None = None
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def pairs(self) -> list[LinkPair]:
+        """What each two links do; empty if nothing was checked."""
+        return [] if self.cleared is None or self.motion is None else link_pairs(self.cleared, self.motion)
+
+    @property
+    def samples(self) -> int:
+        """Joint positions looked at, with that at rest."""
+        return 0 if self.cleared is None or self.motion is None else len(self.motion.poses)
 
 
-def checked_links(
-    bodies: Sequence[Body],
-    results: dict[Collider, Decomposition],
-    motion: Callable[[], tuple[Motion, list[str]]],
-    options: Mapping[str, Any],
-    robot: RobotOptions,
-    metres: float = 1.0,
-) -> Checked:
-    """Check the hulls of links against each other, and decompose links again whose hulls touch though they do not."""
-    if len(bodies) < 2:
-        return Checked(results, [], 0, [])
+def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> Checked:
+    """Decompose all links, check their hulls against each other, and decompose again what touches though it did not."""
+    results = decompose_bodies(robot.bodies, options, asked)
+    if len(robot.bodies) < 2:
+        return Checked(results)
     if not all(result.report["complete"] for result in results.values()):
-        return Checked(results, [], 0, ["Links were not checked against each other: the work was stopped before."])
+        return Checked(results, warnings=["Links were not checked against each other: the work was stopped before."])
+    bodies, moves = robot.bodies, None
     try:
-        moves, said = motion()
-        results, each = dict(results), options_of_bodies(bodies, options, robot)
-        own = [_moving(body, results) for body in bodies]
+        moves, said = robot.motion(asked, options.get("seed") or 0)
+        each = options_of_bodies(bodies, options, asked)
 
         def redo(number: int, obstacles: Sequence[Obstacle]) -> list[tuple[Any, Any]]:
             results.update(_clear_of(obstacles, bodies[number], results, each[number]))
             return _moving(bodies[number], results).hulls
 
-        cleared = kept_clear(own, moves, redo)
+        cleared = kept_clear([_moving(body, results) for body in bodies], moves, redo)
     except (MissingExtraError, CrowdedError) as error:
-        if robot.exclude or robot.srdf:
+        if asked.exclude or asked.srdf:
             raise
-        return Checked(results, [], 0, [f"Links were not checked against each other: {error}"])
-    found = warnings_of(cleared, moves, lambda length: f"{1000 * metres * length:.3g} mm")
+        return Checked(results, moves, warnings=[f"Links were not checked against each other: {error}"])
+    found = warnings_of(cleared, moves, robot.in_mm)
     more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
     ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in moves.warnings]
     warnings = [*said, *ranges, *found[:MOST_SAID], *more]
-    return Checked(results, link_pairs(cleared, moves), len(moves.poses), warnings)
+    return Checked(results, moves, cleared, warnings)
 
 
 def motion_of(
-    kind: str, path: Path, bodies: Sequence[Body], robot: RobotOptions, seed: int
+    kind: str, path: Path, bodies: Sequence[Body], asked: RobotOptions, seed: int
 ) -> tuple[Motion, list[str]]:
     """Where the bodies of a URDF or MJCF file can be."""
     names = [body.name for body in bodies]
     try:
-        found = (urdf_motion if kind == "urdf" else mjcf_motion)(path, robot.samples, seed)
+        found = (urdf_motion if kind == "urdf" else mjcf_motion)(path, asked.samples, seed)
         return found.some(names), []
     except MissingExtraError:
         raise

@@ -17,6 +17,7 @@ from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import LONGEST_SIDE, shown
 from rlacd.options.robots import RobotOptions
 from rlacd.solid.frame import ROUNDING, Frame
+from rlacd.solid.topology import used_points
 
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
@@ -87,7 +88,7 @@ def relative_to_robot(options: Mapping[str, Any], bodies: Sequence[Body]) -> dic
     if given.setdefault("criterion", "distance") in ("distance", "concavity") and "threshold_abs" not in given:
         share = given.pop("threshold") / LONGEST_SIDE["threshold"] if "threshold" in given else None
         given["threshold_abs"] = float(f"{SHARE * size:.3g}") if share is None else share * size
-    if "overlap" in given and "overlap_abs" not in given:
+    if given.get("overlap") and "overlap_abs" not in given:
         given["overlap_abs"] = given.pop("overlap") * size
     return given
 
@@ -119,8 +120,8 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any]) -> De
 
 def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> dict[str, Any]:
     """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's."""
-    used = mesh.vertices[np.unique(mesh.faces)] if len(mesh.faces) else mesh.vertices
-    fitting, scale = dict(options), Frame.of(used).scale
+    fitting = dict(options)
+    scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
     for name, (least, most) in LENGTHS.items():
         if isinstance(length := fitting.get(f"{name}_abs"), (int, float)):
             unit = LONGEST_SIDE[name] / 2 * scale

@@ -5,28 +5,23 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping, Sequence
-from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshFileError, OptionError
+from rlacd.errors import OptionError
 from rlacd.io.read.contents import Triangles
-from rlacd.io.read.load import load_mesh
-from rlacd.io.read.open_file import read_named
 from rlacd.io.robots import usd
-from rlacd.io.robots.bodies import Body, Collider, Surface, size_of
-from rlacd.io.robots.clearance import checked_links, motion_of, resting
-from rlacd.io.robots.decomposed import check_options, decompose_bodies
+from rlacd.io.robots.bodies import Body, Collider, Surface
+from rlacd.io.robots.clearance import decomposed_robot
+from rlacd.io.robots.decomposed import check_options
 from rlacd.io.robots.matrix import chosen, excludes
 from rlacd.io.robots.matrix import srdf as srdf_of
-from rlacd.io.robots.mjcf import plan_mjcf
-from rlacd.io.robots.mjcf_model import mujoco_reads, read_model
-from rlacd.io.robots.plan import Plan, Sources
+from rlacd.io.robots.mjcf_model import mujoco_reads
+from rlacd.io.robots.read import kind_of, left_behind, opened, planned, robot_of_file, robot_of_stage
 from rlacd.io.robots.references import References
-from rlacd.io.robots.rewritten import Rewritten, RewrittenLink, grouped, warnings_of
-from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, edited, parse
-from rlacd.io.robots.urdf import plan_urdf
+from rlacd.io.robots.rewritten import Rewritten, rewritten, warnings_of
+from rlacd.io.robots.spans import edited
 from rlacd.io.write import file_stem, write_file
 from rlacd.io.write.encode import encode_plain_obj, hull_name
 from rlacd.io.write.folder import check_names, write_folder
@@ -34,14 +29,6 @@ from rlacd.io.write.target import check_file, check_folder, check_name, mesh_fol
 from rlacd.options.fields import checked, path_like, read, shown
 from rlacd.options.output import OutputOptions
 from rlacd.options.robots import PairKind, Per, RobotOptions
-
-ENDINGS = {".urdf": "urdf", ".xml": "mjcf"}
-ROOTS = {"urdf": "robot", "mjcf": "mujoco"}
-
-
-def is_robot(path: str | os.PathLike[str]) -> bool:
-    """Tell by its ending whether a file describes a robot."""
-    return Path(path).suffix.lower() in ENDINGS
 
 
 def rewrite_robot(
@@ -115,55 +102,49 @@ def rewrite_robot(
     if keep_input:
         raise OptionError("keep_input (--keep-input) is for USD stages: URDF and MJCF keep their other files.")
     packages, began = checked(OutputOptions, "package_dirs", package_dirs) or (), time.perf_counter()
-    kind, root, folder = _opened(source, place)
+    kind = kind_of(source)
+    _check_place(source, place, [source.suffix.lower()])
+    check_folder(folder := mesh_folder(place, kind))
+    root = opened(source, kind)
     _check_matrix(source, place, asked)
-    plan, warnings = _plan(root, kind, References(source, packages), place, folder, apart=asked.per == "mesh")
+    plan, warnings = planned(root, kind, References(source, packages), place, folder, apart=asked.per == "mesh")
     if not plan.bodies:
         write_file(place, root.file.data)
         said = [f"{source} has no collision mesh, so this is a copy.", *warnings]
         return Rewritten(place, folder, [], said, time.perf_counter() - began, 0.0)
-    results = decompose_bodies(plan.bodies, options, asked)
-    motion = partial(motion_of, kind, source, plan.bodies, asked, options.get("seed") or 0)
-    clear = checked_links(plan.bodies, results, motion, options, asked)
-    results, stem = clear.results, file_stem(place.stem)
-    files, names = _hull_files(stem, results)
+    done = decomposed_robot(description := robot_of_file(kind, source, plan), options, asked)
+    stem = file_stem(place.stem)
+    files, names = _hull_files(stem, done.results)
     copies = _copies(stem, plan.bodies) if kind == "mjcf" else {}
     files |= {name: encode_plain_obj(Triangles(mesh.vertices, mesh.faces)) for mesh, name in copies.items()}
-    edits, said = excludes(root, chosen(clear.pairs, asked.exclude))
+    edits, said = excludes(root, chosen(done.pairs, asked.exclude))
     data = edited(root, [*plan.edit(names, {mesh.path: name for mesh, name in copies.items()}), *edits])
     warnings += [warning for warning in plan.warnings if warning not in warnings]
-    warnings += [*warnings_of(results), *clear.warnings, *said]
     check_names(folder, stem, list(files))
     write_folder(folder, stem, files, then=lambda: write_file(place, data))
-    if asked.srdf is not None and (clear.samples or len(plan.bodies) < 2):
-        write_file(Path(asked.srdf), srdf_of(root.attributes.get("name", "robot"), clear.pairs))
-    made = [RewrittenLink.of(body, results, names) for body in plan.bodies]
-    seconds, size = time.perf_counter() - began, size_of(plan.bodies)
-    return Rewritten(place, folder, made, warnings, seconds, size, 1.0, clear.pairs, clear.samples)
+    if asked.srdf is not None and (done.samples or len(plan.bodies) < 2):
+        write_file(Path(asked.srdf), srdf_of(root.attributes.get("name", "robot"), done.pairs))
+    warnings += [*warnings_of(done.results), *done.warnings, *said]
+    return rewritten(description, done, names, (place, folder), warnings, began)
 
 
 def rewrite_stage(
-    stage: usd.Colliders, place: Path, options: Mapping[str, Any], robot: RobotOptions, *, keep_input: bool = False
+    stage: usd.Colliders, place: Path, options: Mapping[str, Any], asked: RobotOptions, *, keep_input: bool = False
 ) -> Rewritten:
     """Rewrite a USD stage that has been read, as `rewrite_robot` does."""
     began = time.perf_counter()
     _check_place(stage.source, place, usd.ENDINGS)
     check_options(options)
-    _check_matrix(stage.source, place, robot)
-    bodies, prims = usd.bodies_of(stage, apart=robot.per == "mesh")
-    results = decompose_bodies(bodies, options, robot)
-    fixed = {node["path"] for node in stage.nodes if not node["body"]}
-    clear = checked_links(bodies, results, lambda: (resting(bodies, fixed), []), options, robot, stage.metres)
-    results = clear.results
-    data, warnings, files = usd.encode_layer(stage, place, prims, results, flat=keep_input)
-    warnings += [*warnings_of(results), *clear.warnings, *_left_behind(files, stage.source.parent, place)]
-    names = {collider: [*map(hull_name, range(len(result)))] for collider, result in results.items()}
-    made = [RewrittenLink.of(body, results, names) for body in bodies]
-    if not made:
+    _check_matrix(stage.source, place, asked)
+    robot, prims = robot_of_stage(stage, apart=asked.per == "mesh")
+    done = decomposed_robot(robot, options, asked)
+    data, warnings, files = usd.encode_layer(stage, place, prims, done.results, flat=keep_input)
+    warnings += [*warnings_of(done.results), *done.warnings, *left_behind(files, stage.source.parent, place)]
+    names = {collider: [*map(hull_name, range(len(result)))] for collider, result in done.results.items()}
+    if not robot.bodies:
         warnings.append(f"{stage.source} has no mesh that collides, so the layer changes nothing.")
     write_file(place, data)
-    seconds, size = time.perf_counter() - began, size_of(bodies)
-    return Rewritten(place, place, made, warnings, seconds, size, stage.metres, clear.pairs, clear.samples)
+    return rewritten(robot, done, names, (place, place), warnings, began)
 
 
 def _check_matrix(source: Path, place: Path, robot: RobotOptions) -> None:
@@ -189,51 +170,6 @@ def _check_place(source: Path, place: Path, endings: Sequence[str]) -> None:
     check_file(place)
 
 
-def _opened(source: Path, place: Path) -> tuple[str, Element, Path]:
-    """The kind of a robot file, its root, and the folder for its hulls, which is checked before any work."""
-    if not is_robot(source):
-        raise MeshFileError(f"{source} is not a robot file: its name has to end in {' or '.join(ENDINGS)}.")
-    _check_place(source, place, [source.suffix.lower()])
-    kind = ENDINGS[source.suffix.lower()]
-    folder = mesh_folder(place, kind)
-    check_folder(folder)
-    root = parse(source, read_named(source, LARGEST_DESCRIPTION))
-    if root.tag != ROOTS[kind]:
-        raise MeshFileError(f"{source} is not {kind.upper()}: it starts with <{root.tag}>, not <{ROOTS[kind]}>.")
-    return kind, root, folder
-
-
-def _plan(
-    root: Element, kind: str, references: References, place: Path, folder: Path, *, apart: bool
-) -> tuple[Plan, list[str]]:
-    source, said = root.file.folder, list[tuple[str, str, float]]()
-    load = cache(lambda path: _surface(path, said))
-    if kind == "urdf":
-        sources = Sources(references, load, lambda old, hull: _reference(old, hull, references, folder), apart)
-        plan = plan_urdf(root, sources)
-    else:
-        compiler = read_model(root, references, lambda path: read_named(path, LARGEST_DESCRIPTION))
-        within = os.path.relpath(source / compiler.mesh_folder, source)  # the same from the new file
-        target = os.path.relpath(folder.absolute(), Path(os.path.abspath(place.absolute().parent / within)))
-        plan = plan_mjcf(compiler, Sources(references, load, lambda _, hull: (Path(target) / hull).as_posix(), apart))
-    return plan, [*plan.warnings, *_left_behind(plan.relative, source, place), *grouped(said)]
-
-
-def _surface(path: Path, said: list[tuple[str, str, float]]) -> Surface:
-    """Read a mesh file, in the unit that a COLLADA file states: ROS, Gazebo and Bullet apply it.
-
-    Whether such a file whose y axis points up is turned differs between them, so that is a warning.
-    """
-    mesh = load_mesh(path)
-    said += [(path.name, warning, 0.0) for warning in mesh.warnings]
-    if path.suffix.lower() != ".dae":
-        return Surface(path, mesh.vertices, mesh.faces)
-    if mesh.up != "z":
-        turned = f"{mesh.up.upper()}_UP is declared, and some programs rotate such a file when they read it"
-        said.append((path.name, f"{turned}; hulls keep its coordinates.", 0.0))
-    return Surface(path, mesh.vertices * (mesh.metres or 1.0), mesh.faces)
-
-
 def _hull_files(
     stem: str, results: Mapping[Collider, Decomposition]
 ) -> tuple[dict[str, bytes], dict[Collider, list[str]]]:
@@ -257,25 +193,6 @@ def _copies(stem: str, bodies: Sequence[Body]) -> dict[Surface, str]:
     meshes = [mesh.surface for body in bodies for collider in body.colliders for mesh in collider.meshes]
     unread, taken = [mesh for mesh in dict.fromkeys(meshes) if not mujoco_reads(mesh.path)], set[str]()
     return {mesh: f"{stem}_{_stem(mesh.path.stem, taken)}_visual.obj" for mesh in unread}
-
-
-def _left_behind(files: Sequence[str], source: Path, place: Path) -> list[str]:
-    """Warn about other files that are named relative to a folder which the result does not lie in."""
-    if not files or os.path.realpath(place.absolute().parent) == os.path.realpath(source):
-        return []
-    said = f"{len(files)} other files, such as {files[0]}, are referred to relative to {source}"
-    lost = f"will not be found from {place.absolute().parent}: write the result beside the input, or copy them too"
-    return [f"{said} and {lost}."]
-
-
-def _reference(old: str, hull: str, references: References, folder: Path) -> str:
-    """Refer to a hull the way the mesh was: by its package if it lies in that package, else relative to the file."""
-    package = references.package_of(old)
-    target = Path(os.path.abspath(folder)) / hull
-    if package is not None and target.is_relative_to(package):
-        scheme, rest = old.split("://", 1)
-        return f"{scheme}://{rest.split('/', 1)[0]}/{target.relative_to(package).as_posix()}"
-    return f"{folder.name}/{hull}"
 
 
 def _stem(name: str, taken: set[str]) -> str:

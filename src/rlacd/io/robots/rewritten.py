@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,11 @@ import trimesh
 
 from rlacd.clear import LinkPair
 from rlacd.decomposition import Decomposition
-from rlacd.io.robots.bodies import Body, Collider
+from rlacd.errors import MeshError
+from rlacd.io.robots.bodies import Body, Collider, size_of
+from rlacd.io.robots.clearance import Checked, Robot
+from rlacd.io.robots.shown import shown
+from rlacd.view.robot import RobotResult
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +84,8 @@ class Rewritten:
         What each two of the links do at the joint positions that were looked at; empty if none were.
     samples
         How many those are.
+    as_result
+        Makes of it what the viewer and the report show.
     """
 
     path: Path
@@ -89,6 +97,7 @@ class Rewritten:
     metres: float = 1.0
     pairs: Sequence[LinkPair] = ()
     samples: int = 0
+    as_result: Callable[[], RobotResult] | None = None
 
     @property
     def complete(self) -> bool:
@@ -99,6 +108,20 @@ class Rewritten:
     def farthest(self) -> float | None:
         """How far hulls reach beyond the meshes, in the robot's unit; None where there was no time to measure."""
         return _most([link.farthest for link in self.links])
+
+    def save_report(self, path: str | os.PathLike[str]) -> Path:
+        """Write a page with a 3-D view of the links, whose joints can be moved; see `rlacd.Decomposition.save_report`.
+
+        Raises
+        ------
+        MeshError
+            No link has a collision mesh.
+        """
+        if self.as_result is None:
+            raise MeshError(f"{self.path} has no collision mesh, so there is nothing to show.")
+        from rlacd.view.report import save_report_page
+
+        return save_report_page(self.as_result(), path)
 
     def report(self) -> dict[str, Any]:
         """All measurements as plain values; lengths named ``_abs`` are in the robot's unit."""
@@ -126,6 +149,24 @@ class Rewritten:
             "pairs": [pair.as_plain() for pair in self.pairs],
             "warnings": self.warnings,
         }
+
+
+def rewritten(
+    robot: Robot,
+    done: Checked,
+    names: Mapping[Collider, Sequence[str]],
+    places: tuple[Path, Path],
+    warnings: list[str],
+    began: float,
+) -> Rewritten:
+    """What became of a robot that was written, with hulls of these names, to a file and a folder."""
+    links, seconds = [RewrittenLink.of(body, done.results, names) for body in robot.bodies], time.perf_counter() - began
+
+    def as_result() -> RobotResult:
+        return shown(robot, done, warnings, seconds)
+
+    size, show = size_of(robot.bodies), as_result if links else None
+    return Rewritten(*places, links, warnings, seconds, size, robot.metres, done.pairs, done.samples, show)
 
 
 def warnings_of(results: Mapping[Collider, Decomposition]) -> list[str]:

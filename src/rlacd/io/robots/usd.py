@@ -18,6 +18,7 @@ from rlacd.io.robots.bodies import Body, Collider, PlacedMesh, Surface
 from rlacd.io.robots.plan import colliders
 from rlacd.io.write.single_precision import required_hull
 from rlacd.io.write.usd import require_usd
+from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.poses import inverse, product, rounded
 
@@ -44,6 +45,8 @@ class Colliders:
         What of the stage is not rewritten, or changes with it.
     metres
         Its unit of length.
+    up
+        The axis that points up.
     """
 
     source: Path
@@ -51,6 +54,7 @@ class Colliders:
     blobs: Mapping[str, bytes]
     warnings: list[str]
     metres: float
+    up: Axis
 
 
 def read_colliders(stage: Path) -> Colliders:
@@ -65,7 +69,8 @@ def read_colliders(stage: Path) -> Colliders:
     """
     require_usd()
     answer = answer_of(SERVER, stage, "USD", {"path": str(stage)}, {})
-    return Colliders(stage, answer.values["nodes"], answer.blobs, answer.values["warnings"], answer.values["metres"])
+    said = (answer.values[name] for name in ("warnings", "metres", "up"))
+    return Colliders(stage, answer.values["nodes"], answer.blobs, *said)
 
 
 def colliders_of(mesh: Path) -> Colliders | None:

@@ -75,8 +75,8 @@ def rewrite(values: Values, blobs: Blobs) -> Answered:
         said = {"path": str(prim.GetPath()), "scale": _scale(prim), "kind": contacts.kind(prim)}
         nodes.append({**said, **_place(prim)})
         arrays |= {f"{index}.points": points.tobytes(), f"{index}.faces": faces.tobytes()}
-    metres = float(UsdGeom.GetStageMetersPerUnit(stage))
-    return {"nodes": nodes, "warnings": warnings, "metres": metres}, arrays
+    whole = {"metres": float(UsdGeom.GetStageMetersPerUnit(stage)), "up": str(UsdGeom.GetStageUpAxis(stage)).lower()}
+    return {"nodes": nodes, "warnings": warnings, **whole}, arrays
 
 
 def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:

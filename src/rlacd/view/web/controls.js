@@ -1,5 +1,5 @@
 // The controls that decompose anew: what they hold is what `rlacd.decompose` is asked for.
-import { hasOpenBodies } from "page/facts";
+import { hasFilledCavities, hasOpenBodies } from "page/facts";
 import { choice, make, measure } from "page/widgets";
 
 /** Lengths are shares of the longest side or of the frame; the slider moves by equal ratios. */
@@ -172,6 +172,20 @@ export class Controls {
       },
       "What becomes of bodies with openings.",
     );
+    this.cavities = choice(
+      "Closed cavities",
+      "cavities",
+      [
+        ["fill", "Fill", "Nothing can get in, so hulls may fill them. The mass leaves them out."],
+        ["keep", "Keep", "What is closed stays empty: a room to stand in, a ball that starts inside."],
+      ],
+      given.keep_cavities ? "keep" : "fill",
+      (value) => {
+        this.options.keep_cavities = value === "keep";
+        this.changed();
+      },
+      "What becomes of space that walls enclose.",
+    );
     this.hulls = this.#limit("max_hulls", "Hulls, at most", "No more hulls than this. The threshold may then be exceeded.");
     this.corners = this.#limit("max_vertices", "Vertices each", "Corners that each hull may have. Engines have limits, and every corner costs time in a contact.");
     this.element = make(
@@ -187,6 +201,7 @@ export class Controls {
       this.overlap.element,
       this.passages,
       this.open,
+      this.cavities,
       make("div", { class: "limits" }, this.hulls.element, this.corners.element),
     );
     this.#arrange();
@@ -201,7 +216,7 @@ export class Controls {
         ? { volume_tolerance: this.volume.value }
         : { threshold: this.threshold.value };
     const limits = { max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
-    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, keep_open: this.options.keep_open ?? null, open: this.options.open, ...limits };
+    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, keep_open: this.options.keep_open ?? null, open: this.options.open, keep_cavities: this.options.keep_cavities && criterion !== "navigable", ...limits };
   }
 
   /** Take another engine's limits. */
@@ -217,13 +232,15 @@ export class Controls {
     length.box.dispatchEvent(new Event("change"));
   }
 
-  /** Lengths are also told in the unit of what is shown; a mesh without open bodies offers no choice about them. */
+  /** Lengths are also told in the unit of what is shown; only what has open bodies or cavities offers a choice about them. */
   setScene(scene) {
     this.threshold.tell(scene, 1);
     this.radius.tell(scene, 2);
     this.tolerance.tell(scene, 2);
     this.overlap.tell(scene, 2);
+    this.criterion.querySelector("input[value=navigable]").disabled = Boolean(scene.robot); // a ball has one size for all
     this.open.hidden = this.options.open === "auto" && !hasOpenBodies(scene);
+    this.cavities.hidden = this.options.criterion === "navigable" || !(this.options.keep_cavities || hasFilledCavities(scene));
   }
 
   #arrange() {

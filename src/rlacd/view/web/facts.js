@@ -29,6 +29,7 @@ export const stageName = (stage) => STAGES[stage] ?? stage;
 export const HINTS = {
   hull: "A convex body: it has no dents. Physics engines collide these fast and reliably.",
   primitives: "Parts that are a box, a ball, a capsule or a cylinder, which models for simulators hold as such.",
+  links: "Bodies with collision meshes, each decomposed as a solid.",
   triangles: "Of all hulls together. Fewer are faster to collide.",
   concavity:
     "The farthest that a part's surface and its hull's lie apart, anywhere: how much room the worst dent has that a hull fills. The longest side is 2, as for the threshold.",
@@ -53,6 +54,7 @@ export function summary(scene, { draft = false } = {}) {
   const words = [
     term(plural(parts.length, "hull"), HINTS.hull),
     report.primitives && term(plural(parts.filter((part) => part.primitive).length, "primitive"), HINTS.primitives),
+    scene.robot && term(plural(scene.robot.links.length, "link"), HINTS.links),
     term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
     concavity && term(`concavity\u00a0${digits(concavity.max)}`, HINTS.concavity),
     distance && term(`distance\u00a0${digits(distance.max)}`, HINTS.concavity),
@@ -69,6 +71,9 @@ const repaired = (report, ...steps) => (report?.repair ?? []).filter(({ step }) 
 
 /** Whether repair had to decide what is inside. */
 export const hasOpenBodies = ({ report }) => repaired(report, "slab", "wrapped", "capped") > 0;
+
+/** Whether repair filled cavities and said so. */
+export const hasFilledCavities = ({ report }) => (report?.warnings ?? []).some((text) => text.includes("keep_cavities"));
 
 /** What repair made of open bodies, in a sentence, with its explanation. */
 export function notes({ report }) {

@@ -23,6 +23,8 @@ export class Link {
 
   command = (options) => post("command", options).then(({ command }) => command);
 
+  touching = (values) => post("touching", { values }).then(({ contacts }) => contacts);
+
   /** Look at another mesh: a file of the user's. */
   async open(file) {
     const answer = await fetch(`open?${new URLSearchParams({ name: file.name })}`, {

@@ -2,6 +2,10 @@
 import { HINTS } from "page/facts";
 import { column, make } from "page/widgets";
 
+/** What a part is called: by its link, if it is of a robot. */
+export const partName = ({ link, primitive }, index, { robot }) =>
+  `${robot ? robot.links[link].name : (primitive ?? "hull")} ${String(index).padStart(3, "0")}`;
+
 export class PartList {
   constructor({ onHover, onPick }) {
     this.onHover = onHover;
@@ -31,6 +35,7 @@ export class PartList {
     this.limit = navigable ? null : (volume?.tolerance ?? scene.report?.options?.threshold);
     this.data = scene.parts.map((part, index) => ({
       index,
+      name: scene.robot ? partName(part, index, scene) : String(index).padStart(3, "0"),
       color: part.color,
       faces: part.faces.length ? Math.round(atob(part.faces).length / 12) : 0,
       primitive: part.primitive,
@@ -87,7 +92,7 @@ export class PartList {
     const row = make(
       "tr",
       { "aria-selected": "false", "data-part": part.index },
-      make("td", {}, swatch, String(part.index).padStart(3, "0")),
+      make("td", { title: part.name }, swatch, part.name),
       make("td", {}, part.primitive ?? String(part.faces)),
       make("td", {}, `${column(100 * part.share)}\u00a0%`),
       make("td", { class: "error" }, part.error == null ? "–" : this.asShare ? `${column(100 * part.error)}\u00a0%` : column(part.error), this.limit ? make("span", { class: "track" }, gauge) : null),

@@ -3,9 +3,10 @@ import { Controls } from "page/controls";
 import { fitTable, notes, optionTable, repairTable, searchTable, stageName, summary, timeTable, warnings } from "page/facts";
 import { roundLength } from "page/ground";
 import { showHints } from "page/hints";
+import { Joints } from "page/joints";
 import { bindKeys, helpText } from "page/keys";
 import { Link } from "page/link";
-import { PartList } from "page/list";
+import { PartList, partName } from "page/list";
 import { HEAT_COLORS, Stage } from "page/stage";
 import { choice, make, measure, plural, toggle } from "page/widgets";
 
@@ -21,6 +22,14 @@ let picked = null;
 
 // --- what is seen ---
 
+const joints = new Joints({
+  onMove: (matrices, far) => {
+    stage?.move(matrices);
+    if (far) stage?.fit();
+  },
+  onTouch: (links) => stage?.touch(links),
+  ask: config.live ? (values) => link.touching(values) : null,
+});
 const list = new PartList({ onHover: (index) => highlight(index), onPick: (index) => pick(index) });
 let stage = null;
 try {
@@ -40,7 +49,7 @@ function highlight(index, { scroll = false, x, y } = {}) {
   tip.hidden = index === null || x === undefined || !shown;
   if (tip.hidden) return;
   const part = shown.parts[index];
-  tip.textContent = `${part.primitive ?? "hull"} ${String(index).padStart(3, "0")}${part.error == null ? "" : ` · ${measure(part.error, shown)}`}`;
+  tip.textContent = `${partName(part, index, shown)}${part.error == null ? "" : ` · ${measure(part.error, shown)}`}`;
   const frame = at("stage").getBoundingClientRect();
   tip.style.left = `${x - frame.left + 14}px`;
   tip.style.top = `${y - frame.top + 14}px`;
@@ -61,6 +70,7 @@ function show(scene, { draft = false } = {}) {
   heatOf = null;
   stage?.load(scene, { frame: other });
   list.load(scene);
+  joints.load(scene);
   at("name").textContent = scene.name;
   at("summary").replaceChildren(...summary(scene, { draft }));
   at("notes").replaceChildren(...notes(scene));
@@ -69,6 +79,7 @@ function show(scene, { draft = false } = {}) {
   controls?.setScene(scene);
   at("parts-count").textContent = scene.report ? scene.parts.length : "";
   document.body.classList.toggle("bare", !scene.report);
+  document.body.classList.toggle("robot", Boolean(scene.robot));
   if (scene.report) tell(scene);
   look.balls.hidden = !scene.balls;
   for (const button of document.querySelectorAll("[data-format^=balls]")) button.hidden = !scene.balls;
@@ -209,7 +220,7 @@ function downloadSection() {
   );
   const note = make("small", { id: "preset-note" });
   const rows = [...groups].map(([group, offers]) =>
-    make("div", { class: "row" }, make("h3", {}, group), make("div", { class: "buttons" }, ...offers.map(downloadButton))),
+    make("div", { class: "row", "data-group": group }, make("h3", {}, group), make("div", { class: "buttons" }, ...offers.map(downloadButton))),
   );
   return make(
     "section",
@@ -260,6 +271,7 @@ async function copyCommand() {
 }
 
 at("panel").append(
+  joints.element,
   ...[controls?.element].filter(Boolean),
   make("section", { id: "list" }, make("h2", {}, "Parts ", make("span", { id: "parts-count", class: "count" })), list.element),
   ...[downloads].filter(Boolean),

@@ -8,6 +8,7 @@ const CREASE = 18; // degrees between facets from which their edge is drawn
 const HEAT = ["#eef1f4", "#fde3a7", "#f9b45e", "#e8703a", "#b92b42", "#641a4e"].map((hex) => new Color(hex));
 export const HEAT_COLORS = ["#eef1f4", "#fde3a7", "#f9b45e", "#e8703a", "#b92b42", "#641a4e"];
 const WALL = new Color("#c3c9d1");
+const TOUCHING = new Color("#e5231b");
 const [X, Y, Z, BACK] = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1), new Vector3(0, 0, -1)];
 
 export class Stage {
@@ -23,7 +24,8 @@ export class Stage {
     this.lights = this.#light();
     this.root = new Group(); // turned so that the input's up is up
     this.scene.add(this.root);
-    this.input = null;
+    this.links = []; // of a robot: what moves as one
+    this.inputs = [];
     this.parts = [];
     this.heat = null;
     this.balls = null;
@@ -38,10 +40,12 @@ export class Stage {
   /** Show another decomposition, or an input without hulls; the camera stays where it is unless told to frame it. */
   load(scene, { frame = false } = {}) {
     this.#empty();
-    this.input = scene.input && this.#addLayers(scene.input, "#9aa3ae");
+    this.links = (scene.robot?.links ?? []).map(() => new Group());
+    for (const link of this.links) link.matrixAutoUpdate = false;
+    if (this.links.length) this.root.add(...this.links);
+    this.inputs = scene.input.map((mesh, link) => this.#addInput(mesh, link));
     this.parts = scene.parts.map((part, index) => this.#addPart(part, index));
-    const boxes = this.parts.length ? this.parts.map((part) => part.box) : [this.#inputBox()];
-    this.middle = boxes.reduce((all, box) => all.union(box), new Box3()).getCenter(new Vector3());
+    this.middle = this.#boxes().reduce((all, box) => all.union(box), new Box3()).getCenter(new Vector3());
     this.balls = scene.balls && this.#addBalls(scene.balls);
     this.grid = makeGrid(scene.scale);
     this.scene.add(this.grid);
@@ -66,8 +70,8 @@ export class Stage {
   #ground() {
     if (!this.grid) return;
     this.root.updateMatrixWorld(true);
-    const rest = this.parts.map((part) => part.box).concat(this.input ? [this.#inputBox()] : []);
-    const points = rest.flatMap(cornersOf).map((corner) => this.root.localToWorld(corner));
+    const all = [...this.parts.map((part) => part.box), ...this.inputs.map(boxOf)];
+    const points = all.flatMap(cornersOf).map((corner) => this.root.localToWorld(corner));
     if (points.length === 0) return;
     const box = new Box3().setFromPoints(points);
     const middle = box.getCenter(new Vector3());
@@ -75,11 +79,22 @@ export class Stage {
     this.draw();
   }
 
-  #inputBox() {
-    const geometry = this.input?.body.geometry;
-    if (!geometry) return new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
-    if (!geometry.boundingBox) geometry.computeBoundingBox();
-    return geometry.boundingBox;
+  /** Boxes at rest around the hulls, or around the input without any. */
+  #boxes() {
+    if (this.parts.length) return this.parts.map((part) => part.box);
+    return this.inputs.length ? this.inputs.map(boxOf) : [new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1))];
+  }
+
+  /** Put the links of a robot where matrices say. */
+  move(matrices) {
+    matrices.forEach((matrix, link) => this.links[link].matrix.copy(matrix));
+    this.draw();
+  }
+
+  /** Show some links of a robot in red. */
+  touch(links) {
+    for (const { layers, link } of this.parts) layers.paint(links.has(link) ? TOUCHING : layers.color);
+    this.draw();
   }
 
   loadHeat(heat) {
@@ -117,7 +132,7 @@ export class Stage {
     this.root.updateMatrixWorld(true);
     const corners = this.parts.length
       ? this.parts.flatMap((part) => cornersOf(part.box).map((corner) => part.group.localToWorld(corner)))
-      : cornersOf(this.#inputBox()).map((corner) => this.root.localToWorld(corner));
+      : this.#boxes().flatMap((box) => cornersOf(box).map((corner) => this.root.localToWorld(corner)));
     if (corners.length) this.camera.frame(corners, { again });
     this.draw();
   }
@@ -125,7 +140,7 @@ export class Stage {
   /** Bring every object in line with `look`. */
   refresh() {
     const { input, hulls, edges, heat, balls, grid, pull } = this.look;
-    if (this.input) this.input.show(this.parts.length ? input : "solid");
+    for (const each of this.inputs) each.show(this.parts.length ? input : "solid");
     if (this.grid) this.grid.visible = grid && pull === 0;
     this.parts.forEach((part, index) => {
       const alone = this.picked !== null;
@@ -170,9 +185,9 @@ export class Stage {
     return lamps;
   }
 
-  #addLayers(mesh, color) {
-    const layers = new Layers(geometryOf(mesh), new Color(color));
-    this.root.add(layers);
+  #addInput(mesh, link) {
+    const layers = new Layers(geometryOf(mesh), new Color("#9aa3ae"));
+    (this.links[link] ?? this.root).add(layers);
     return layers;
   }
 
@@ -188,9 +203,9 @@ export class Stage {
     );
     edges.renderOrder = 4;
     group.add(layers, edges);
-    this.root.add(group);
+    (this.links[part.link] ?? this.root).add(group);
     geometry.computeBoundingBox();
-    return { group, layers, edges, line, centre: geometry.boundingBox.getCenter(new Vector3()), box: geometry.boundingBox };
+    return { group, layers, edges, line, link: part.link, centre: geometry.boundingBox.getCenter(new Vector3()), box: geometry.boundingBox };
   }
 
   #addBalls({ centres, radii }) {
@@ -210,7 +225,7 @@ export class Stage {
   }
 
   #empty() {
-    for (const thing of [this.input, this.balls, this.grid, ...this.parts.map((part) => part.group)]) {
+    for (const thing of [...this.inputs, this.balls, this.grid, ...this.parts.map((part) => part.group), ...this.links]) {
       if (!thing) continue;
       thing.traverse((node) => {
         node.geometry?.dispose();
@@ -218,8 +233,8 @@ export class Stage {
       });
       thing.removeFromParent();
     }
-    this.heat = this.balls = this.input = this.grid = null;
-    this.parts = [];
+    this.heat = this.balls = this.grid = null;
+    this.inputs = this.parts = this.links = [];
   }
 
   #resize() {
@@ -291,6 +306,10 @@ class Layers extends Group {
     this.veil.material.opacity = mode === "glass" ? 0.45 : 0.13;
   }
 
+  paint(color) {
+    for (const { material } of [this.body, this.veil]) material.color.copy(color);
+  }
+
   glow(on) {
     for (const { material } of [this.body, this.veil]) {
       material.emissive.copy(this.color).multiplyScalar(on ? 0.45 : 0);
@@ -303,6 +322,11 @@ function geometryOf({ vertices, faces }) {
   geometry.setAttribute("position", new BufferAttribute(floats(vertices), 3));
   geometry.setIndex(new BufferAttribute(indices(faces), 1));
   return geometry;
+}
+
+function boxOf({ body: { geometry } }) {
+  if (!geometry.boundingBox) geometry.computeBoundingBox();
+  return geometry.boundingBox;
 }
 
 function cornersOf({ min, max }) {

@@ -1,0 +1,209 @@
+#include "solid/filling.hpp"
+
+#include <algorithm>
+#include <queue>
+
+#include "convex/hull.hpp"
+#include "convex/polygon.hpp"
+#include "core/mesh_measures.hpp"
+#include "core/stop.hpp"
+#include "solid/caps.hpp"
+#include "solid/pieces.hpp"
+
+namespace rlacd {
+namespace {
+
+constexpr std::size_t kMaybe = 40;  // corners; with more than this it pays to test some of them first
+
+constexpr double kInside = 0.5;
+constexpr double kBeyond = 1 + 1e-9;
+
+// Limits on the cells examined: this many besides the facets, down to this share of the threshold. Most pairs of hulls
+// are never united, so less is spent on each.
+constexpr int kMostCells = 400, kMostCellsOfPair = 64;
+constexpr double kSmall = 0.2;
+
+// Points of a cell may be farther out than its middle by its radius, but hardly ever are by more than this share of it.
+constexpr double kFarther = 0.25;
+
+// A distance below this share of the threshold need not be known more exactly.
+constexpr double kNear = 0.5;
+
+// The region deeper than t under all planes. Most objects are outside it, and mostly because of the same plane as those
+// before them.
+class Depths {
+ public:
+  Depths(const ConvexPlanes& planes, double t) : planes_(planes), t_(t) {}
+
+  bool holds(Vec3 p) {
+    if (planes_.depth(last_, p) <= t_) return false;
+    const std::int32_t plane = planes_.first_within(p, t_);
+    if (plane >= 0) last_ = plane;
+    return plane < 0;
+  }
+
+  // Whether a box certainly has no point in the region.
+  bool misses(const Box& box) {
+    const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
+    const auto is_off = [&](std::int32_t plane) {
+      return planes_.depth(plane, middle) + reach_along(planes_.normal(plane), half) <= t_;
+    };
+    if (is_off(last_)) return true;
+    const std::int32_t plane = planes_.nearest(middle).plane;
+    if (!is_off(plane)) return false;
+    last_ = plane;
+    return true;
+  }
+
+  // Whether some point of a triangle is in the region.
+  bool meets(Vec3 a, Vec3 b, Vec3 c) {
+    if (std::max({planes_.depth(last_, a), planes_.depth(last_, b), planes_.depth(last_, c)}) <= t_) return false;
+    polygon_.assign({a, b, c});
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      const auto plane = static_cast<std::int32_t>(i);
+      const auto height = [&](Vec3 p) { return t_ - planes_.depth(plane, p); };
+      const Lies lies = split(polygon_, height, deeper_, rest_);
+      if (lies == Lies::kAbove) {
+        last_ = plane;
+        return false;
+      }
+      if (lies == Lies::kAcross) polygon_.swap(deeper_);
+    }
+    Vec3 middle{0, 0, 0};
+    for (const Vec3 corner : polygon_) middle = middle + (1.0 / static_cast<double>(polygon_.size())) * corner;
+    return planes_.nearest(middle).depth > t_;
+  }
+
+ private:
+  const ConvexPlanes& planes_;
+  const double t_;
+  std::int32_t last_ = 0;  // the plane that excluded the last object
+  Polygon polygon_, deeper_, rest_;
+};
+
+struct Cell {
+  Corners corner;
+  Vec3 middle;
+  double radius;
+  std::int32_t hint;                                      // the slot of a nearby face of the solid
+  double most = std::numeric_limits<double>::infinity();  // how far a point of the cell outside the solid may well be
+
+  Cell(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
+    radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
+  }
+  bool operator<(const Cell& other) const { return most < other.most; }
+};
+
+}  // namespace
+
+Feasibility Filling::feasibility(const Mesh& hull, double threshold) const {
+  if (comes_deeper(hull, threshold)) return Feasibility::kNever;
+  return is_missed(hull, hull.faces, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe;
+}
+
+HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)), box(Box::of(all)) {
+  if (all.size() <= kMaybe) {
+    some = all;
+    return;
+  }
+  std::vector<std::size_t> chosen;
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z) {
+        const Vec3 towards = {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
+        const auto farthest = std::max_element(all.begin(), all.end(),
+                                               [towards](Vec3 p, Vec3 q) { return dot(towards, p) < dot(towards, q); });
+        chosen.push_back(static_cast<std::size_t>(farthest - all.begin()));
+      }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  for (const std::size_t i : chosen) some.push_back(all[i]);
+}
+
+Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCorners& second, double threshold) const {
+  const bool are_all = first.some.size() == first.all.size() && second.some.size() == second.all.size();
+  Mesh hull = hull_mesh(joined(first.some, second.some));
+  if (!hull.faces.empty() && comes_deeper(hull, threshold)) return {0, Feasibility::kNever};
+  if (!are_all) hull = hull_mesh(joined(first.all, second.all));
+  std::vector<char> is_new(hull.faces.size(), 1);
+  for (const std::vector<Vec3>* own : {&first.all, &second.all}) {
+    std::vector<char> is_own(hull.vertices.size());
+    std::transform(hull.vertices.begin(), hull.vertices.end(), is_own.begin(),
+                   [own](Vec3 p) { return std::find(own->begin(), own->end(), p) != own->end(); });
+    for (std::size_t f = 0; f < hull.faces.size(); ++f) {
+      const auto [a, b, c] = hull.faces[f];
+      if (is_own[a] && is_own[b] && is_own[c]) is_new[f] = 0;
+    }
+  }
+  std::vector<Triangle> facets;
+  for (std::size_t f = 0; f < hull.faces.size(); ++f)
+    if (is_new[f]) facets.push_back(hull.faces[f]);
+  const double volume = mesh_volume(hull);
+  if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Feasibility::kNo};
+  if (!are_all && comes_deeper(hull, threshold)) return {volume, Feasibility::kNever};
+  return {volume, is_missed(hull, facets, threshold, kMostCellsOfPair) ? Feasibility::kNo : Feasibility::kMaybe};
+}
+
+bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
+  const ConvexPlanes planes(hull);
+  Depths depths(planes, threshold);
+  Box inner = Box::of(hull.vertices);
+  inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
+  inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
+  const auto may_come = [&](const Box& box) {
+    poll_stop();
+    return box.meets(inner) && !depths.misses(box);
+  };
+  return surface_.bvh().any_of(may_come, [&](std::int32_t slot) {
+    const Corners t = corners_of(solid_, solid_.faces[surface_.bvh().face(slot)]);
+    return std::any_of(t.begin(), t.end(), [&](Vec3 corner) { return inner.holds(corner) && depths.holds(corner); }) ||
+           depths.meets(t[0], t[1], t[2]);
+  });
+}
+
+bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {
+  std::priority_queue<Cell> open;
+  // Whether the middle of a cell is missed; the cell stays open if another point of it may well be.
+  const auto look_at = [&](Cell cell) {
+    poll_stop();
+    if (cell.radius < kSmall * threshold) return false;
+    const double enough = std::max(kNear * threshold, threshold - cell.radius), within = kBeyond * threshold;
+    const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);
+    const double distance = std::sqrt(hit.distance2);  // `within` if nothing is nearer
+    const bool is_far = distance > threshold;
+    if (is_far && surface_.winding().of_closed(cell.middle) < kInside) return true;
+    // On the way from a middle inside the solid to a point outside, the surface comes no sooner than its distance.
+    cell.most = kFarther * cell.radius + (is_far ? -distance : distance);
+    cell.hint = hit.slot;
+    if (cell.most > threshold) open.push(cell);
+    return false;
+  };
+  for (const auto& [a, b, c] : facets)
+    if (look_at(Cell(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
+  for (int looked = 0; looked < most && !open.empty(); looked += 2) {
+    const Cell cell = open.top();
+    open.pop();
+    // Across the longest side, so that cells stay well shaped.
+    const int from = longest_side(cell.corner);
+    const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
+    const Vec3 between = 0.5 * (p + q);
+    if (look_at(Cell(p, between, tip, cell.hint)) || look_at(Cell(between, q, tip, cell.hint))) return true;
+  }
+  return false;
+}
+
+ClippedSolid Filling::clipped(const Mesh& hull) const {
+  ClippedSolid out;
+  std::optional<ConvexClip> clip = clip_to_convex(solid_, surface_, hull);
+  if (clip) {
+    CapArea area;
+    for (const ConvexClip::Section& section : clip->sections)
+      add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal, area);
+    if (area.folded > kFolded * area.all) clip.reset();
+  }
+  out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull);
+  out.volume = std::fmax(0, mesh_volume(out.mesh));
+  return out;
+}
+
+}  // namespace rlacd

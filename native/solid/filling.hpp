@@ -1,0 +1,79 @@
+// Whether a solid's share of a convex hull can be close enough to the hull: quick rejections before any boolean.
+//
+// In:  a closed solid, convex hulls of parts of it, a distance t.
+// Out: a verdict on the Hausdorff distance between the surfaces of a hull and of the solid's share of it. It exceeds t
+//      if the solid's surface comes deeper than t inside the hull, as it then does in every larger hull; and if a point
+//      of the hull's surface lies outside the solid and farther than t from it.
+// How: faces of the solid are clipped to the points deeper than t. Facets of the hull are subdivided, those with the
+//      largest probable miss first, until each is decided by the distance at its middle and a share of its radius, is
+//      small, or the limit on cells is reached. For the joint hull of two hulls, a few corners mostly suffice to see
+//      that the solid comes too deep, and facets it shares with one of them need not be examined.
+#pragma once
+
+#include "convex/convex_planes.hpp"
+#include "solid/convex_clip.hpp"
+#include "surface/surface.hpp"
+
+namespace rlacd {
+
+// Hulls grow by at most `grain` more than they must. A hull whose box is farther from a triangle than `reach` takes it
+// only if all are.
+std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
+                                         double grain, int threads);
+
+std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const Mesh& hull, double depth);
+
+enum class Feasibility : std::int32_t {
+  kMaybe = 0,
+  kNo = 1,     // not for this hull
+  kNever = 2,  // nor for any hull that contains it
+};
+
+// The corners of a hull, a few of them that span most of it, and its box.
+struct HullCorners {
+  explicit HullCorners(std::vector<Vec3> corners);
+
+  std::vector<Vec3> all, some;
+  Box box;
+};
+
+struct ClippedSolid {
+  Mesh mesh;
+  double volume = 0;
+};
+
+class Filling {
+ public:
+  explicit Filling(const Mesh& solid, int threads = 1) : solid_(solid), surface_(solid, threads) {}
+
+  const Surface& surface() const { return surface_; }
+  Feasibility feasibility(const Mesh& hull, double threshold) const;
+  // The same for the joint hull of two hulls that are close enough to their own shares of the solid, and its volume
+  // unless the verdict is kNever.
+  struct Joint {
+    double volume;
+    Feasibility feasibility;
+  };
+  Joint joint_feasibility(const HullCorners& first, const HullCorners& second, double threshold) const;
+  // Whether the verdict is kNever: much faster than the full verdict.
+  bool comes_deeper(const Mesh& hull, double threshold) const;
+
+  // All that the solid fills of a convex hull, closed by caps on its facets.
+  ClippedSolid clipped(const Mesh& hull) const;
+  std::vector<HalfSpace> grown(const Mesh& hull, double depth) const {
+    return grow(solid_, surface_.bvh(), hull, depth);
+  }
+  std::vector<std::vector<Vec3>> uncovered(const std::vector<Mesh>& hulls, double reach, double grain,
+                                           int threads) const {
+    return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain, threads);
+  }
+
+ private:
+  // Examines at most this many cells besides the facets themselves.
+  bool is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const;
+
+  Mesh solid_;
+  Surface surface_;
+};
+
+}  // namespace rlacd

@@ -1,0 +1,44 @@
+// Pieces of a solid: what a cut or a search for connected bodies leaves, each with its volume and its hull.
+//
+// Input:  a closed oriented triangle mesh.
+// Output: its sides below and above a plane, its connected pieces, or what it fills of a convex polytope; closed.
+// Algorithm: cut by the plane and capped; bodies, with each cavity in the smallest shell around it.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "core/geometry.hpp"
+
+namespace rlacd {
+
+struct Piece {
+  Mesh mesh, hull;
+  double volume, hull_volume;
+};
+
+// Nothing if the volume is not above the least, or the mesh is flat.
+std::optional<Piece> piece_of(Mesh mesh, double least);
+
+std::array<std::optional<Piece>, 2> cut(const Mesh& mesh, Vec3 normal, double offset, double least);
+
+struct HullAround {
+  const std::vector<Vec3>* corners;
+  double volume;
+};
+
+// The sides below and above a plane at a share of a piece's length across the direction between the middles of the two
+// hulls around that would grow the least by all of it; none if there are no two such hulls apart. Around a round hole
+// the plane follows the hole, which no axis does.
+std::array<std::optional<Piece>, 2> halve(const Mesh& piece, const std::vector<Vec3>& corners,
+                                          const std::vector<HullAround>& around, double share, double least);
+
+// Nothing if all is one piece.
+std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least);
+
+// What is below all facet planes of a hull, cut by one after the other: slower than convex_clip.hpp, but always closed.
+// Empty if the solid crosses itself so often that cuts multiply its faces.
+Mesh inside_all(Mesh mesh, const Mesh& hull);
+
+}  // namespace rlacd

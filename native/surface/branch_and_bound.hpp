@@ -1,0 +1,252 @@
+// The greatest value, over a surface, of a function that is a minimum of convex functions; certified.
+//
+// In:  triangles, and a *field*: f(x) = min over witnesses w of f_w(x), every f_w convex and 1-Lipschitz. Distance to a
+//      set of convex objects (triangles, hulls) is such a function; so is depth under a set of planes.
+//        Sample at(Vec3 p, int32 hint, double enough)  a witness with f_w(p) = f(p), or any with f_w(p) <= enough
+//        double from(int32 witness, Vec3 p)            f_w(p)
+//        double quick_upper(corners)                   a cheap upper bound over a triangle, or infinity
+//        void settled(corners, witness)                is called with the single witness that closed a triangle
+// Out: an interval that holds the maximum, narrow enough for the goal; in waves, also where it is reached.
+// How: branch and bound over the triangles, halved at their longest edge.
+//      Lower bound: f at the corners.
+//      Upper bound over a triangle: for weights l_w >= 0 that add up to 1, f <= sum l_w f_w, which is convex, so its
+//      maximum over the triangle is at a corner. The bound is the least such number over every single witness and every
+//      pair of the witnesses of the corners. A single witness closes a cell that lies in its own territory; a pair
+//      closes one across the ridge between two, where single witnesses would need cells as small as the tolerance.
+//      f_w is 1-Lipschitz, so the bound exceeds f at a corner by no more than the cell's size: halving always ends.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "core/geometry.hpp"
+#include "core/parallel.hpp"
+#include "core/stop.hpp"
+
+namespace rlacd {
+
+struct Interval {
+  double lower = 0, upper = 0;
+};
+
+struct Sample {
+  double value = 0;
+  std::int32_t witness = -1;
+};
+
+struct Cell {
+  Corners corner;
+  std::array<Sample, 3> sample;
+  double upper = std::numeric_limits<double>::infinity();
+};
+
+struct Goal {
+  double tolerance;                                       // stop once the interval is this narrow
+  double pass = 0;                                        // values certainly no larger than this need not be resolved
+  double fail = std::numeric_limits<double>::infinity();  // stop once the maximum is certainly larger
+};
+
+// Cells examined before giving up with the interval reached so far; far above what real surfaces need.
+constexpr std::size_t kMostCells = std::size_t{1} << 22;
+
+// A witness within this share of the relevant distance is as good as the best one, and found sooner.
+constexpr double kEnough = 0.5;
+
+// min over l in [0, 1] of max over j of l a[j] + (1 - l) b[j]: the upper envelope of three lines is least at an end or
+// where two of them cross.
+inline double best_mixture(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  double best = std::min(std::max({a[0], a[1], a[2]}), std::max({b[0], b[1], b[2]}));
+  for (int j = 0; j < 3; ++j) {
+    const int k = j == 2 ? 0 : j + 1;
+    const double slope = (a[j] - b[j]) - (a[k] - b[k]);
+    if (slope == 0) continue;  // the lines are parallel
+    const double l = (b[k] - b[j]) / slope;
+    if (!(l > 0 && l < 1)) continue;
+    double worst = 0;
+    for (int i = 0; i < 3; ++i) worst = std::max(worst, l * a[i] + (1 - l) * b[i]);
+    best = std::min(best, worst);
+  }
+  return best;
+}
+
+template <class Field>
+double upper_bound(const Field& field, const Corners& corner, const std::int32_t* witnesses, int count) {
+  std::array<double, 3> row[4];
+  std::int32_t known[4];
+  int rows = 0;
+  for (int i = 0; i < count; ++i) {
+    if (std::find(known, known + rows, witnesses[i]) != known + rows) continue;
+    known[rows] = witnesses[i];
+    for (int j = 0; j < 3; ++j) row[rows][j] = field.from(witnesses[i], corner[j]);
+    ++rows;
+  }
+  if (rows == 1) return std::max({row[0][0], row[0][1], row[0][2]});
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < rows; ++i)
+    for (int k = i + 1; k < rows; ++k) best = std::min(best, best_mixture(row[i], row[k]));
+  return best;
+}
+
+template <class Field>
+double upper_bound(const Field& field, const Cell& cell) {
+  const std::int32_t witnesses[3] = {cell.sample[0].witness, cell.sample[1].witness, cell.sample[2].witness};
+  return upper_bound(field, cell.corner, witnesses, 3);
+}
+
+// The two halves of a cell, cut at the middle of its longest edge; corner 0 of both is the new point.
+template <class Field>
+std::array<Cell, 2> bisect(const Field& field, const Cell& cell, double enough) {
+  const int from = longest_side(cell.corner), to = (from + 1) % 3, across = (from + 2) % 3;
+  const Vec3 middle = 0.5 * (cell.corner[from] + cell.corner[to]);
+  const Sample sample = field.at(middle, cell.sample[from].witness, enough);
+  std::array<Cell, 2> halves;
+  for (int side = 0; side < 2; ++side) {
+    const int kept = side == 0 ? from : to;
+    halves[side].corner = {middle, cell.corner[across], cell.corner[kept]};
+    halves[side].sample = {sample, cell.sample[across], cell.sample[kept]};
+    halves[side].upper = std::min(cell.upper, upper_bound(field, halves[side]));
+  }
+  return halves;
+}
+
+// One thread, the cell with the greatest upper bound first.
+template <class Field>
+Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
+  Interval found;
+  double dropped = 0;  // greatest upper bound among the cells not examined further
+  const auto needed = [&] { return std::max(goal.pass, found.lower + goal.tolerance); };
+  const auto enough = [&] { return kEnough * std::max(goal.pass, found.lower); };
+  const auto learn = [&](const Sample& sample, double exact_above) {
+    if (sample.value > exact_above) found.lower = std::max(found.lower, sample.value);
+  };
+  const auto lower_first = [](const Cell& a, const Cell& b) { return a.upper < b.upper; };
+
+  std::vector<Sample> at_vertex(mesh.vertices.size());
+  std::vector<Cell> heap;
+  for (const Triangle& face : mesh.faces) {
+    poll_stop();
+    Cell cell;
+    cell.corner = corners_of(mesh, face);
+    cell.upper = field.quick_upper(cell.corner);
+    if (cell.upper <= needed()) {
+      dropped = std::max(dropped, cell.upper);
+      continue;
+    }
+    const double exact_above = enough();
+    const Vec3 centre = (1.0 / 3.0) * (cell.corner[0] + cell.corner[1] + cell.corner[2]);
+    const Sample centred = field.at(centre, -1, exact_above);
+    learn(centred, exact_above);
+    cell.upper = std::min(cell.upper, upper_bound(field, cell.corner, &centred.witness, 1));
+    if (cell.upper <= needed()) {
+      field.settled(cell.corner, centred.witness);
+    } else {
+      std::int32_t witnesses[4] = {centred.witness};
+      for (int i = 0; i < 3; ++i) {
+        Sample& sample = at_vertex[face[i]];
+        if (sample.witness < 0) {
+          sample = field.at(cell.corner[i], centred.witness, exact_above);
+          learn(sample, exact_above);
+        }
+        cell.sample[i] = sample;
+        witnesses[i + 1] = sample.witness;
+      }
+      cell.upper = std::min(cell.upper, upper_bound(field, cell.corner, witnesses, 4));
+    }
+    if (found.lower > goal.fail) return {found.lower, std::numeric_limits<double>::infinity()};
+    if (cell.upper <= needed())
+      dropped = std::max(dropped, cell.upper);
+    else
+      heap.push_back(cell);
+  }
+
+  std::make_heap(heap.begin(), heap.end(), lower_first);
+  for (std::size_t looked_at = 0; !heap.empty() && looked_at < kMostCells; ++looked_at) {
+    poll_stop();
+    if (heap.front().upper <= needed()) break;
+    std::pop_heap(heap.begin(), heap.end(), lower_first);
+    const Cell cell = heap.back();
+    heap.pop_back();
+    const double exact_above = enough();
+    for (const Cell& half : bisect(field, cell, exact_above)) {
+      learn(half.sample[0], exact_above);
+      if (half.upper <= needed()) {
+        dropped = std::max(dropped, half.upper);
+      } else {
+        heap.push_back(half);
+        std::push_heap(heap.begin(), heap.end(), lower_first);
+      }
+    }
+    if (found.lower > goal.fail) return {found.lower, std::numeric_limits<double>::infinity()};
+  }
+  found.upper = std::max({found.lower, dropped, heap.empty() ? 0.0 : heap.front().upper});
+  return found;
+}
+
+// An interval around the greatest value, and where its lower end is reached; undefined where no value is above 0.
+struct Greatest : Interval {
+  Vec3 at{};
+};
+
+// Multi-threaded: all open cells are halved at once, wave after wave. A wave depends only on the waves before it, so
+// the interval does not depend on the number of threads, nor does the place.
+template <class Field>
+Greatest maximize_in_waves(const Field& field, const Mesh& mesh, const Goal& goal, int threads) {
+  constexpr std::size_t kChunk = 128;
+  const auto for_each = [&](std::size_t count, const auto& task) {
+    parallel_for(count, count <= 3 * kChunk ? 1 : threads, task, kChunk);
+  };
+
+  Greatest found;
+  const auto learn = [&](const Sample& sample, Vec3 at, double exact_above) {
+    if (sample.value > exact_above && sample.value > found.lower) found.lower = sample.value, found.at = at;
+  };
+  double dropped = 0;
+  std::vector<Sample> at_vertex(mesh.vertices.size());
+  std::vector<char> is_corner(mesh.vertices.size(), 0);
+  for (const Triangle& face : mesh.faces)
+    for (const std::int32_t corner : face) is_corner[corner] = 1;
+  // A few corners first: they show what distance matters, so that most of the others need no exact answer.
+  for (const std::size_t stride : {std::size_t{kChunk}, std::size_t{1}}) {
+    const double exact_above = kEnough * found.lower;
+    for_each((at_vertex.size() + stride - 1) / stride, [&](std::size_t i) {
+      if (is_corner[i * stride]) at_vertex[i * stride] = field.at(mesh.vertices[i * stride], -1, exact_above);
+    });
+    for (std::size_t i = 0; i < at_vertex.size(); ++i) learn(at_vertex[i], mesh.vertices[i], exact_above);
+  }
+
+  std::vector<Cell> cells(mesh.faces.size()), halves;
+  for_each(cells.size(), [&](std::size_t f) {
+    cells[f].corner = corners_of(mesh, mesh.faces[f]);
+    for (int i = 0; i < 3; ++i) cells[f].sample[i] = at_vertex[mesh.faces[f][i]];
+    cells[f].upper = upper_bound(field, cells[f]);
+  });
+
+  const auto drop = [&](std::vector<Cell>& open) {
+    const auto settled = [&](const Cell& cell) {
+      if (cell.upper > std::max(goal.pass, found.lower + goal.tolerance)) return false;
+      dropped = std::max(dropped, cell.upper);
+      return true;
+    };
+    open.erase(std::remove_if(open.begin(), open.end(), settled), open.end());
+  };
+  drop(cells);
+  for (std::size_t looked_at = 0; !cells.empty() && looked_at < kMostCells; looked_at += cells.size()) {
+    const double exact_above = kEnough * found.lower;
+    halves.resize(2 * cells.size());
+    for_each(cells.size(), [&](std::size_t c) {
+      auto pair = bisect(field, cells[c], exact_above);
+      halves[2 * c] = pair[0];
+      halves[2 * c + 1] = pair[1];
+    });
+    for (std::size_t c = 0; c < halves.size(); c += 2) learn(halves[c].sample[0], halves[c].corner[0], exact_above);
+    cells.swap(halves);
+    drop(cells);
+  }
+  found.upper = std::max(found.lower, dropped);
+  for (const Cell& cell : cells) found.upper = std::max(found.upper, cell.upper);
+  return found;
+}
+
+}  // namespace rlacd
