@@ -20,6 +20,7 @@ _NAMES = {
     "run": "Progress",
     "solid.component": "Component Plane",
     "solid.primitive": "Primitive",
+    "thresholds": "Choice Tradeoff tradeoff",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 __all__ = ["__version__", *_HOME]
@@ -34,4 +35,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

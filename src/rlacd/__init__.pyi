@@ -22,3 +22,6 @@ from rlacd.run import Progress as Progress
 from rlacd.solid.component import Component as Component
 from rlacd.solid.component import Plane as Plane
 from rlacd.solid.primitive import Primitive as Primitive
+from rlacd.thresholds import Choice as Choice
+from rlacd.thresholds import Tradeoff as Tradeoff
+from rlacd.thresholds import tradeoff as tradeoff

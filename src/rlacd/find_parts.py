@@ -6,7 +6,7 @@ Lift and limit cut again what fails; no other stage looks back.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import NamedTuple
@@ -24,6 +24,7 @@ from rlacd.proxy.model import Model
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.search import SearchContext, SearchSummary, at_least, cost, eliminate_parts, search
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover
 from rlacd.solid.hull import NO_SIDES, Hull
@@ -65,21 +66,14 @@ class Reached(NamedTuple):
 def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     """Decompose a mesh until done or stopped."""
     try:
-        with run.stage("repair"):
-            solid = _repaired(source, options, run)
-        options = options.at_scale(solid.frame.scale)
-        goal = LimitedCriterion.prepare(options, solid, run)
-        root = Component(solid.shape, run.threads)
-        sides = resting_sides(root) if any(options.hull_limits) else NO_SIDES
+        solid, options, goal, root, sides = _prepared(source, options, run)
     except Stopped:
         run.note_stop()
         return covered(source, options, run)
     if options.max_hulls == 1:
         pieces = drop_slivers(root.pieces(), run)
         return Reached(solid, options, goal, pieces if len(pieces) == 1 else [root], None, root)
-    model = Model.of(root, solid.pieces, goal, run)
-    solid.pieces.clear()
-    decomposer = _Decomposer.of(model, goal, options, run)
+    decomposer = _Decomposer.of(_model(solid, root, goal, run), goal, options, run)
     parts, goal, found = decomposer.decompose(goal)
     limited, most = LimitedCriterion(goal, options.hull_limits, sides=sides), options.max_hulls
     if most is not None and not decomposer.keeps(most, parts):
@@ -88,6 +82,46 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
         with run.stage("limit"):
             parts = cut_to_limits(parts, limited, root, options, run)
     return Reached(solid, options, goal, parts, found, root)
+
+
+def find_parts_under(source: InputMesh, options: Options, factors: Sequence[float], run: Run) -> Iterator[Reached]:
+    """Decompose a mesh under its goal scaled by each factor, on one tree of cuts, until one part is left.
+
+    Factors ascend from 1. Those that there is no time for are left out.
+    """
+    try:
+        solid, options, goal, root, sides = _prepared(source, options, run)
+        decomposer = _Decomposer.of(_model(solid, root, goal, run), goal, options, run)
+    except Stopped:
+        run.note_stop()
+        return
+    for factor in factors:
+        parts, reached, found = decomposer.decompose(goal.scaled(factor))
+        if any(options.hull_limits):
+            limited = LimitedCriterion(reached, options.hull_limits, sides=sides)
+            with run.stage("limit"):
+                parts = cut_to_limits(parts, limited, root, options, run)
+        if run.stopped_by is not None:
+            return
+        yield Reached(solid, options, reached, parts, found, root)
+        if len(parts) <= 1:
+            return
+
+
+def _prepared(source: InputMesh, options: Options, run: Run) -> tuple[Solid, Options, Criterion, Component, FloatArray]:
+    """The solid, the options and the goal in its frame, what is cut, and the sides that limited hulls keep."""
+    with run.stage("repair"):
+        solid = _repaired(source, options, run)
+    options = options.at_scale(solid.frame.scale)
+    goal = LimitedCriterion.prepare(options, solid, run)
+    root = Component(solid.shape, run.threads)
+    return solid, options, goal, root, resting_sides(root) if any(options.hull_limits) else NO_SIDES
+
+
+def _model(solid: Solid, root: Component, goal: Criterion, run: Run) -> Model:
+    model = Model.of(root, solid.pieces, goal, run)
+    solid.pieces.clear()
+    return model
 
 
 def covered(source: InputMesh, options: Options, run: Run) -> Reached:

@@ -22,7 +22,7 @@ from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes, give, leave, say
 from rlacd.options.keywords import meant
 from rlacd.plain_json import printable
 
-COMMANDS = ("decompose", "info", "view", "batch", "train")
+COMMANDS = ("decompose", "tradeoff", "info", "view", "batch", "train")
 COMPLETE = "_RLACD_COMPLETE"
 """The variable by which a shell asks for completions."""
 

@@ -80,7 +80,7 @@ def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
     with run.stage("finish"):
         limits = reached.options.hull_limits
         parts, seams = run.if_in_time(
-            lambda: _cleaned(reached, run), lambda: ([limit_roughly(part, limits) for part in reached.parts], None)
+            lambda: cleaned_parts(reached, run), lambda: ([limit_roughly(part, limits) for part in reached.parts], None)
         )
         with run.shielded():
             hulls = run.map(lambda part: in_input(part.hull, solid.frame, limits), parts)
@@ -113,7 +113,7 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
     return None if all(new is old for new, old in zip(grown, reached.parts, strict=True)) else grown
 
 
-def _cleaned(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
+def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
     """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     options, goal, limits = reached.options, reached.goal, reached.options.hull_limits
     sides = NO_SIDES if reached.root is None else resting_sides(reached.root)

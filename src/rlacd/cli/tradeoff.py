@@ -1,0 +1,74 @@
+"""The command `rlacd tradeoff`: how many hulls a mesh takes at several thresholds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rlacd.cli.commands import Argument, Command, Option, options_of
+from rlacd.cli.decompose import IN_METRES, ROBOTS
+from rlacd.cli.exit_codes import ExitCode, give, say
+from rlacd.cli.lean import import_trimesh
+from rlacd.cli.options import decompose_options
+from rlacd.cli.pipes import refuse_stdin
+from rlacd.errors import OptionError
+from rlacd.options import Options
+from rlacd.options.output import OutputOptions
+from rlacd.plain_json import to_json
+
+TAKEN = (
+    *("threshold", "criterion", "max_hulls", "threshold_abs", "volume_tolerance", "volume_of", "max_vertices"),
+    *("max_faces", "preset", "detail", "merge", "policy", "open", "unit", "scale", "quality", "seed", "threads"),
+    "timeout",
+)
+
+
+def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None, **how: Any) -> None:
+    """Show how many hulls each of ten thresholds leads to.
+
+    \b
+    Examples:
+      rlacd tradeoff chair.glb
+      rlacd tradeoff chair.glb --picture curve.png
+      rlacd tradeoff chair.glb --max-hulls 16
+      rlacd tradeoff bracket.step -t 0.2mm
+
+    --threshold is the finest to try, 0.02 by default; the coarsest is 25 times that. A star marks the knee, beyond
+    which a finer threshold costs ever more hulls, or the finest with at most --max-hulls. The hulls are those of
+    --quality fast: a search finds fewer.
+    """
+    refuse_stdin(mesh)
+    if mesh.suffix.lower() in ROBOTS:
+        raise OptionError(f"{mesh} is a robot; give one of the meshes that it refers to.")
+    import_trimesh(mesh)
+    if picture is not None:
+        from rlacd.view.picture import check_picture
+
+        check_picture(picture)
+    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
+    from rlacd.cli.terminal import watching, writing
+    from rlacd.thresholds import tradeoff
+
+    with watching(quiet=bool(quiet)) as watch:
+        found = tradeoff(mesh, **options, progress=watch)
+    give(to_json(found.as_plain()) if as_json else f"{found}\n")
+    if found.pick is None and found.choices:
+        say("no threshold tried leads to so few hulls; rlacd decompose --max-hulls finds the tightest.")
+    if picture is not None and found.choices:
+        with writing("picture", picture, quiet=bool(quiet)):
+            found.picture(picture)
+    if not found.complete:
+        raise SystemExit(ExitCode.STOPPED_EARLY)
+
+
+COMMAND = Command(
+    "tradeoff",
+    _tradeoff,
+    [
+        Argument("mesh", "IN", "The mesh, as for decompose; not a robot."),
+        Option("as_json", "--json", is_flag=True, default=False, help="Print JSON instead of a table."),
+        *options_of(OutputOptions, only=("picture", "quiet")),
+        *options_of(Options, only=TAKEN),
+    ],
+    first=("as_json", "picture", "quiet", *TAKEN[:3], "preset", "timeout"),
+)

@@ -1,0 +1,185 @@
+"""Which threshold? How many hulls an object takes at each of several, from one tree of cuts."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from manifold3d import Manifold, OpType
+from numpy.typing import ArrayLike
+
+from rlacd._native import mesh_volume
+from rlacd.decompose_mesh import MeshLike, in_metres
+from rlacd.errors import OptionError
+from rlacd.find_parts import Reached, find_parts_under
+from rlacd.finish.finish import cleaned_parts
+from rlacd.io.read.load import load_mesh
+from rlacd.options import FAST, Options
+from rlacd.options.fields import about, check_callback
+from rlacd.run import ProgressCallback, Run
+from rlacd.solid.distance import hull_distances
+from rlacd.solid.manifold import to_manifold
+
+FACTORS = (1, 1.25, 1.5, 2, 2.5, 4, 6, 10, 15, 25)
+"""Times the finest threshold."""
+
+FINEST = 0.4
+"""Share of the usual threshold that the finest is where none is given: 0.02, for 0.02 to 0.5."""
+
+
+class Choice(NamedTuple):
+    """What one threshold leads to.
+
+    Attributes
+    ----------
+    threshold : float
+        As `rlacd.decompose` takes it; with the criterion ``volume``, its `volume_tolerance`.
+    hulls, triangles : int
+    farthest : float
+        How far the hulls reach beyond the input: where the longest side is 2, or in the input's unit if the threshold
+        is.
+    added : float
+        The volume of all hulls together, less that of the solid, as a share of that.
+    """
+
+    threshold: float
+    hulls: int
+    triangles: int
+    farthest: float
+    added: float
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """Hulls against tightness; printing it gives a table.
+
+    Attributes
+    ----------
+    name : str
+        Of the object.
+    option : str
+        What the thresholds are given as: ``threshold``, ``threshold_abs`` or ``volume_tolerance``.
+    choices : list of Choice
+        The finest first; one with a single hull ends them.
+    pick : int or None
+        The choice to take: the finest with at most `max_hulls`, if that was given; else the knee of the curve, beyond
+        which a finer threshold costs ever more hulls. None without choices.
+    complete : bool
+        False if there was no time for coarser thresholds.
+    """
+
+    name: str
+    option: str
+    choices: list[Choice]
+    pick: int | None
+    complete: bool
+
+    def as_plain(self) -> dict[str, Any]:
+        """Everything as values that ``json`` can write."""
+        return asdict(self) | {"choices": [choice._asdict() for choice in self.choices]}
+
+    def picture(self, path: str | os.PathLike[str]) -> Path:
+        """Draw the curve as a PNG file (extra ``view``); raises as `rlacd.Decomposition.picture` does."""
+        from rlacd.view.curve import draw_curve
+
+        points = [(choice.threshold, choice.hulls) for choice in self.choices]
+        return draw_curve(path, self.name, self.option, points, self.pick)
+
+    def __str__(self) -> str:
+        head = ("", self.option, "hulls", "triangles", "farthest", "volume added")
+        lines = [
+            ("*" if i == self.pick else "", f"{c.threshold:.4g}", c.hulls, c.triangles, f"{c.farthest:.4g}", _share(c))
+            for i, c in enumerate(self.choices)
+        ]
+        return "\n".join("{:1} {:>16} {:>6} {:>10} {:>9} {:>13}".format(*line) for line in (head, *lines))
+
+
+def _share(choice: Choice) -> str:
+    return f"{100 * choice.added:.3g} %"
+
+
+def tradeoff(
+    mesh: MeshLike,
+    faces: ArrayLike | None = None,
+    *,
+    file_type: str | None = None,
+    max_hulls: int | None = None,
+    progress: ProgressCallback | None = None,
+    **options: Any,
+) -> Tradeoff:
+    """Find out how many hulls a mesh takes at each of ten thresholds.
+
+    They share the repair and the cuts, so it takes up to five times as long as one decomposition. There is no search:
+    as with the quality ``fast``, unless `quality` says otherwise.
+
+    Parameters
+    ----------
+    mesh, faces, file_type, progress
+        As for `rlacd.decompose`.
+    max_hulls : int, optional
+        Pick the finest threshold with at most so many hulls, instead of the knee.
+    **options
+        As for `rlacd.decompose`. `threshold`, `threshold_abs` or `volume_tolerance` is the finest to try; the coarsest
+        is 25 times that.
+
+    Returns
+    -------
+    Tradeoff
+
+    Raises
+    ------
+    MeshError
+        The input cannot be read or contains nothing to decompose.
+    OptionError
+        An option has the wrong type or is out of range, or the criterion is navigable space, which has no threshold.
+    """
+    chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options})
+    name = "threshold_abs" if chosen.threshold_abs is not None else chosen.numbers[0]
+    if name == "radius" or chosen.per_node:
+        raise OptionError("thresholds are compared for a whole mesh, by concavity, distance or volume.")
+    if options.get(name) is None:
+        usual = about(Options, name).kind.read(getattr(chosen, name))
+        chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options, name: FINEST * usual})
+    finest = getattr(chosen, name)
+    check_callback("progress", progress, "a `rlacd.Progress`")
+    choices: list[Choice] = []
+    with Run(chosen.threads, chosen.timeout, progress, chosen.seed) as run:
+        with run.stage("load"):
+            source = in_metres(load_mesh(mesh, faces, file_type), chosen)
+        for factor, reached in zip(FACTORS, find_parts_under(source, chosen, FACTORS, run), strict=False):
+            unit = 1.0 if chosen.threshold_abs is None else reached.solid.frame.scale
+            choices.append(_choice(finest * factor, reached, unit, run))
+        complete = run.stopped_by is None
+    return Tradeoff(Path(source.name).stem, name, choices, _pick(choices, max_hulls), complete)
+
+
+def _choice(threshold: float, reached: Reached, unit: float, run: Run) -> Choice:
+    solid = reached.solid
+    with run.shielded():
+        hulls = [part.hull for part in cleaned_parts(reached, run)[0]]
+        over = hull_distances(hulls, *solid.surface, threads=run.threads, surface=solid.index).over[1]
+        union = Manifold.batch_boolean([to_manifold(hull.vertices, hull.faces) for hull in hulls], OpType.Add)
+        own = abs(float(mesh_volume(*solid.mesh)))
+    added = max(union.volume() / own - 1, 0.0) if own > 0 else math.inf
+    return Choice(threshold, len(hulls), sum(len(hull.faces) for hull in hulls), over / unit, added)
+
+
+def _pick(choices: Sequence[Choice], most: int | None) -> int | None:
+    """The finest with at most so many hulls, or the knee: the point farthest below the line between the ends.
+
+    The threshold counts by its logarithm; both axes are scaled to the same length (Satopää et al., "Finding a
+    'Kneedle' in a Haystack", 2011).
+    """
+    if most is not None:
+        return next((i for i, choice in enumerate(choices) if choice.hulls <= most), None)
+    if len(choices) < 3 or choices[0].hulls == choices[-1].hulls:
+        return len(choices) - 1 if choices else None
+    x = np.log([choice.threshold for choice in choices])
+    y = np.array([choice.hulls for choice in choices], dtype=np.float64)
+    below = (y[0] - y) / (y[0] - y[-1]) - (x - x[0]) / (x[-1] - x[0])
+    return int(below.argmax())
