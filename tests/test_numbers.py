@@ -31,7 +31,6 @@ from rlacd.planes.sweep import SLIVER
 from rlacd.pool import ProcessLimits
 from rlacd.pool.on_ray import MACHINES
 from rlacd.repair import distance, holes, state, wraps
-from rlacd.search.neighbourhood import CLUSTER
 from rlacd.search.search import LEAST_WORK, MOST_WORK, PATIENCE, TIMES_FIRST_PASS
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
@@ -70,7 +69,6 @@ LIMITS = {
         f"more than {MANY_COMPONENTS:,} pieces",
         f"at most {DENSE:,} triangles",
         f"if a {ORDINALS[1 / grow.CROSSING]} of the parts",
-        f"clusters of {WORDS[CLUSTER]}",
     ],
     "docs/repair.md": [
         f"within {state._WELDS[0] * 1e5:g}·10⁻⁵ (else {state._WELDS[1] * 1e4:g}·10⁻⁴)",
