@@ -89,7 +89,7 @@ def passage_balls(
     balls = _shrunk(points, normals, surface, (least / GROWTH, most), threads)
     if wanted is not None:
         balls = balls.some(wanted(balls))
-    balls = _pushed(_one_a_cell(balls, 2 * spacing), surface, threads)
+    balls = _pushed(_one_a_cell(balls, 2 * spacing), spacing, surface, threads)
     balls = balls.some((balls.radii >= least) & (balls.radii <= most))
     return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5), spacing)
 
@@ -144,12 +144,12 @@ def _shrunk(
     return Balls(points[is_held] + radius[is_held, None] * normals[is_held], radius[is_held])
 
 
-def _pushed(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
-    """The balls that are held, in the best place near theirs."""
+def _pushed(balls: Balls, spacing: float, surface: _native.Surface, threads: int) -> Balls:
+    """The balls that are held, in the best place near theirs; one of those that meet there."""
     for step in STEPS:
         size = step * balls.radii
         balls, ways = _pushed_by(size, PUSHES, balls.centres, surface, threads)
-        balls = balls.some(np.sqrt(dots(ways, ways)) <= STRAY * PUSHES * size)
+        balls = _one_a_cell(balls.some(np.sqrt(dots(ways, ways)) <= STRAY * PUSHES * size), spacing)
     size = STEPS[-1] * balls.radii
     balls, ways = _pushed_by(size, MORE, balls.centres, surface, threads)
     return balls.some(np.sqrt(dots(ways, ways)) <= LARGEST_DRIFT * MORE * size)
