@@ -1,4 +1,4 @@
-"""The environment (the paper's 3.1): components, valid cuts, rewards; splitting and criterion are those of `rlacd.cut`."""
+"""The environment (the paper's 3.1): components, valid cuts, rewards. Splitting and criterion are `rlacd.cut`'s."""
 
 from __future__ import annotations
 
