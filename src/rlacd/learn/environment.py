@@ -1,7 +1,4 @@
-"""The environment (the paper's 3.1): a solid's unfinished components, the valid cuts, and the reward of each.
-
-The components, planes, splitting and criterion are those of `rlacd.decompose` (see `rlacd.cut`).
-"""
+"""The environment (the paper's 3.1): components, valid cuts, rewards. Splitting and criterion are `rlacd.cut`'s."""
 
 from __future__ import annotations
 
