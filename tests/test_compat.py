@@ -60,7 +60,7 @@ def test_options_of_coacd_that_mean_something_are_obeyed() -> None:
     ball = trimesh.creation.icosphere(subdivisions=3)
     mesh = our_coacd.Mesh(ball.vertices, ball.faces)
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", UnusedOptionWarning)
         ((vertices, _),) = our_coacd.run_coacd(mesh, decimate=True, max_ch_vertex=40, threshold=0.2)
         assert len(vertices) <= 40
         four = our_coacd.Mesh(table().vertices, table().faces)
@@ -81,7 +81,7 @@ def test_options_without_meaning_are_reported_once_each() -> None:
     assert sorted(str(warning.message).split()[3].rstrip(":") for warning in said) == sorted(given)
     assert {warning.filename for warning in said} == {__file__}, "it points to the caller's line"
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", UnusedOptionWarning)
         our_coacd.run_coacd(mesh, **given)
 
 

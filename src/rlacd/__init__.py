@@ -11,7 +11,7 @@ _NAMES = {
     "decompose_mesh": "decompose",
     "decomposition": "Decomposition",
     "errors": "RlacdError MeshError MeshFileError MeshDataError EmptyMeshError OptionError OutputError "
-    "MissingExtraError ImplausibleBodyWarning",
+    "MissingExtraError DecompositionWarning ImplausibleBodyWarning",
     "io.robots": "Rewritten rewrite_robot",
     "options.navigable": "NavigableSpace",
     "options.presets": "PRESETS Preset",

@@ -1,6 +1,7 @@
 from rlacd._version import __version__ as __version__
 from rlacd.decompose_mesh import decompose as decompose
 from rlacd.decomposition import Decomposition as Decomposition
+from rlacd.errors import DecompositionWarning as DecompositionWarning
 from rlacd.errors import EmptyMeshError as EmptyMeshError
 from rlacd.errors import ImplausibleBodyWarning as ImplausibleBodyWarning
 from rlacd.errors import MeshDataError as MeshDataError

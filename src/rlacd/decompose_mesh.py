@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MissingExtraError, OptionError
+from rlacd.errors import DecompositionWarning, MissingExtraError, OptionError
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report, missed
@@ -222,6 +223,11 @@ def decompose(
         The input cannot be read or contains nothing to decompose.
     OptionError
         An option has the wrong type or is out of range; raised before any work is done.
+
+    Warns
+    -----
+    DecompositionWarning
+        What ``report["warnings"]`` says, once a call.
     """
     given = locals()
     options = Options.of({name: given[name] for name in OPTION_NAMES})
@@ -246,6 +252,9 @@ def decompose(
         "deviation_abs": source.deviation,
         "seconds": {**run.seconds, "total": run.elapsed},
     }
+    if report["warnings"]:
+        said = f"{report['name']}: {' '.join(report['warnings'])}"
+        warnings.warn(said, DecompositionWarning, stacklevel=3)  # past the function that suggests names of options
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
 
@@ -310,7 +319,7 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
             hull.metadata |= whose | {"body": None if body is None else body + bodies}
         bodies += len(one.report["repair"])
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
-    report["options"] |= {name: getattr(options, name) for name in ("threshold", "threshold_abs")}
+    report["options"] = options.as_plain()
     if report["hausdorff"]["under"] is not None:
         found = [hull for part in done for h in part.hulls if (hull := Hull.of(frame.to_frame(h.vertices))) is not None]
         left_out = missed(frame.to_frame(source.specks), found, frame, run)

@@ -32,7 +32,8 @@ class Decomposition(Result):
         ``version`` : str
             The version of rlacd that made the result.
         ``options`` : dict
-            Every option as it was used, defaults filled in.
+            Every option that had an effect, defaults filled in: ``decompose(mesh, **report["options"])`` repeats the
+            run.
         ``complete`` : bool
             False when the work was stopped early; the hulls are valid and cover the solid all the same, but some
             may exceed the threshold.
@@ -50,9 +51,9 @@ class Decomposition(Result):
             With the option `avoid`: the names of meshes that the input itself has ``crossed``, and those that hulls
             have ``entered`` all the same.
         ``concavity``, ``distance`` : dict
-            With the criterion of that name: ``per_part`` lists that of each hull's part in the order of ``hulls``;
-            ``max`` is the worst. Both are None where there was no time to measure them; so are the distances below.
-            ``warnings`` says so.
+            With the criterion of that name: the ``threshold``; ``per_part`` lists upper bounds of that of each hull's
+            part in the order of ``hulls``; ``max`` is the worst. Both are None where there was no time to measure them;
+            so are the distances below. ``warnings`` says so.
         ``volume`` : dict
             Instead of ``concavity`` with the criterion ``volume``: ``tolerance``, ``relative_to``, and ``per_part`` and
             ``max``, the shares of volume that the hulls add.
@@ -61,8 +62,8 @@ class Decomposition(Result):
             ``shrunk`` and ``dropped``, how many had to give way to parts that no cut could keep off them, and ``most``,
             by how much; ``intrusion``: how deep the hulls reach into the final balls, like ``concavity``.
         ``hausdorff`` : dict
-            ``over``: how far the hulls' surface reaches from the input's surface. ``under``: how far the input's
-            surface lies from the hulls' surface.
+            ``over``: how far the hulls' surface reaches from the input's. ``under``: how far the input's surface lies
+            outside the hulls. Both to 1 %, or upper bounds where they are at most 0.001.
         ``passages`` : list of dict or None
             Holes, slots and mouths that the hulls narrow by over a tenth, the most narrowed first: around ``at_abs`` a
             ball of ``radius_abs`` fits in the input, one of ``left_abs`` between the hulls.
@@ -166,6 +167,9 @@ class Decomposition(Result):
 
         more = {"one_mesh": one_mesh, "keep_input": keep_input, "scene": scene}
         return save(self, path, file_format=file_format, density=density, mass=mass, up=up, **more)
+
+    export = save
+    """The same, by the name that it has in trimesh."""
 
     def save_balls(self, path: str | os.PathLike[str]) -> Path:
         """Write the balls that no hull touches.

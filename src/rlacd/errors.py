@@ -50,6 +50,10 @@ class WeightsError(RlacdError, ValueError):
     """A file with a learned policy's weights is missing, damaged, or made for something else."""
 
 
+class DecompositionWarning(UserWarning):
+    """What falls short in a result, or had no effect: the sentences in ``report["warnings"]``."""
+
+
 class ImplausibleBodyWarning(UserWarning):
     """A simulator's file describes a body whose size or mass suggests another unit, or a hollow shell."""
 

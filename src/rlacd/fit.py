@@ -44,7 +44,7 @@ class Fit(NamedTuple):
         for name in _LENGTHS:
             if name in report:
                 found = report[name]
-                return cls(name, found.get("per_part"), found["max"], report.get("options", {}).get("threshold"))
+                return cls(name, found.get("per_part"), found["max"], found.get("threshold"))
         if "volume" in report:
             found = report["volume"]
             return cls("added_volume", found["per_part"], found["max"], found["tolerance"])

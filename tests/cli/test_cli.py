@@ -66,7 +66,7 @@ class StandIn:
             "stopped_by": None if complete else "cancel",
             "parts": 1,
             "options": {"threshold": 0.05},
-            "concavity": {"per_part": [0.01], "max": 0.01},
+            "concavity": {"threshold": 0.05, "per_part": [0.01], "max": 0.01},
             "hausdorff": {"over": 0.02, "under": float("nan")},
             "seconds": {"total": 0.3},
             "warnings": ["one body was open"],
@@ -102,7 +102,7 @@ def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path,
     ],
 )
 def test_lengths_are_said_in_the_unit_that_was_given(mesh: Path, stand_in: StandIn, typed: str, said: str) -> None:
-    stand_in.report = {"options": {"threshold": 0.05}, "concavity": {"max": 0.0498}, "scale": 10.0}
+    stand_in.report = {"options": {"threshold": 0.05}, "concavity": {"threshold": 0.05, "max": 0.0498}, "scale": 10.0}
     stand_in.report["hausdorff"] = {"over": 0.2, "under": 0.0}
     glb = trimesh.load(mesh).export(mesh.with_suffix(".glb")) and mesh.with_suffix(".glb")
     assert said in rlacd("decompose", glb, "--threshold", typed).stderr

@@ -27,7 +27,7 @@ def towers(scale: float = 1.0, shift: float = 0.0) -> Decomposition:
     """Four boxes in a row, none of which hides another."""
     boxes = [trimesh.creation.box((0.6, 0.6, 1.0 + 0.3 * i)).vertices + np.array([1.2 * i, 0.0, 0.0]) for i in range(4)]
     hulls = [moved(hull_of(box), scale, [shift, shift, shift]) for box in boxes]
-    report = {"name": "towers", "complete": True, "concavity": {"max": 0.04}, "options": {"threshold": 0.05}}
+    report = {"name": "towers", "complete": True, "concavity": {"threshold": 0.05, "max": 0.04}}
     return Decomposition(hulls, report, trimesh.util.concatenate(hulls))
 
 

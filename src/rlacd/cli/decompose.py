@@ -81,15 +81,15 @@ def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str
     import_trimesh(mesh)
     if STDIO in (asked.report, asked.output):
         give("")  # before any work
-    wanted = _named(mesh, asked, how.get("preset"))
+    in_metres = mesh.suffix.lower() in IN_METRES
+    options = decompose_options(how, metres=in_metres or how.get("unit") is not None)
+    wanted = _named(mesh, asked, options.get("preset"))
     stage = _stage(mesh, wanted)
     robot = mesh.suffix.lower() in ROBOTS or stage is not None
     _check_output(mesh, wanted)
     _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted, robots)
-    if wanted.balls is not None and how.get("criterion") != "navigable":
+    if wanted.balls is not None and isinstance(options.get("criterion", ""), str):
         raise OptionError("--balls needs --criterion navigable.")
-    in_metres = mesh.suffix.lower() in IN_METRES
-    options = decompose_options(how, metres=in_metres or how.get("unit") is not None)
     run = partial(_rewrite, stage, RobotOptions(**link_lengths(robots, in_metres))) if robot else _write
     return run(mesh, wanted, options, unit_given(how))
 

@@ -10,6 +10,7 @@ import os
 import shlex
 import sys
 import threading
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from click.shell_completion import get_completion_class
 from rlacd._version import __version__
 from rlacd.cli.commands import help_option
 from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes, give, leave, say
+from rlacd.errors import DecompositionWarning
 from rlacd.options.keywords import meant
 from rlacd.plain_json import printable
 
@@ -100,6 +102,7 @@ def main() -> None:
     """Run the command line."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # JSON is UTF-8, and file names hold more than a code page of Windows
         sys.stdout.reconfigure(encoding="utf-8")
+    warnings.simplefilter("ignore", DecompositionWarning)  # commands print them themselves
     # Little of what a command allocates can be freed before it ends, so look for that rarely.
     gc.set_threshold(100_000, 50, 50)
     try:

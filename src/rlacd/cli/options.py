@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import click
 
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
-from rlacd.options import OPTION_NAMES, Options, with_criterion
+from rlacd.options import LENGTHS, OPTION_NAMES, RUN, Options, with_criterion
 from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, stated
 from rlacd.options.names import UNITS
 from rlacd.options.navigable import NavigableSpace
@@ -18,6 +22,8 @@ if TYPE_CHECKING:
     from rlacd.pool import Pool, ProcessLimits
 
 _ABSOLUTE = {*OPTION_NAMES, *(field.name for field in dataclasses.fields(NavigableSpace))}
+
+LIKE = "The options and the seed of an earlier run, from the file that --report wrote; other options override them."
 
 _LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
 
@@ -63,7 +69,8 @@ class PoolOptions:
 def how() -> list[Option]:
     """Make the options that control the decomposition."""
     own = [name for name in OPTION_NAMES if name != "volume_tolerance"]  # --tolerance of navigable space stands for it
-    return options_of(Options, only=own) + options_of(NavigableSpace)
+    like = Option("like", "--like", type=click.Path(path_type=Path), metavar="REPORT.json", panel=RUN, help=LIKE)
+    return [like, *options_of(Options, only=own), *options_of(NavigableSpace)]
 
 
 def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[str, Any]:
@@ -87,12 +94,26 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
         Options contradict each other or are malformed.
     """
     given = lengths(chosen(given), metres)
+    before = _of_report(given.pop("like")) if "like" in given else {}
     if "seeds" in given:
         given["seeds"] = [_numbers("--seed-point", words, 3) for words in given["seeds"]]
     if "closed_planes" in given:
         planes = [_numbers("--closed-plane", words, 4) for words in given["closed_planes"]]
         given["closed_planes"] = [(plane[:3], plane[3]) for plane in planes]
-    return with_criterion(given)
+    given = with_criterion(given)
+    for name in LENGTHS:
+        if name in given or f"{name}_abs" in given:
+            before = {key: value for key, value in before.items() if key not in (name, f"{name}_abs")}
+    return before | given
+
+
+def _of_report(path: Path) -> dict[str, Any]:
+    """Read the options that a report lists."""
+    try:
+        options = json.loads(path.read_text(encoding="utf-8"))["options"]
+        return {name: value for name, value in dict(options).items() if value is not None}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise OptionError(f"--like {path} is no report of a decomposition as JSON ({type(error).__name__}).") from error
 
 
 def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:

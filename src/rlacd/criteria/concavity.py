@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -165,13 +165,15 @@ class Distance(Criterion):
         """The error of each part, and how many exceed the threshold."""
         if errors is None:
             sentence = f"There was no time to measure the {self.name} of the parts."
-            return CriterionSummary({self.name: {"per_part": None, "max": None}}, (sentence,))
+            return CriterionSummary({self.name: self._entry(None, None)}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
         worst, threshold = told_apart(max(errors) / self.unit, self.threshold / self.unit)
         exceed = f"{len(exceeding)} of {len(errors)} parts exceed the {self.name} {threshold}"
         warning = f"{exceed}; the worst has at most {worst}."
-        entries = {self.name: {"per_part": list(errors), "max": max(errors)}}
-        return CriterionSummary(entries, (warning,) if exceeding else ())
+        return CriterionSummary({self.name: self._entry(list(errors), max(errors))}, (warning,) if exceeding else ())
+
+    def _entry(self, errors: list[float] | None, worst: float | None) -> dict[str, Any]:
+        return {"threshold": self.threshold, "per_part": errors, "max": worst}
 
     def error(self, part: Part) -> float:
         """Upper end of what `measure` finds; at most the threshold if the part certainly meets it."""

@@ -227,8 +227,14 @@ def _joint_fit(each: Sequence[tuple[str, dict[str, Any], float]]) -> dict[str, A
         assert fit is not None
         known = None if errors is None or fit.per_part is None else fit.per_part
         errors = None if known is None or errors is None else [*errors, *(e * fit.unit(factor) for e in known)]
-    key = fits[0][0].key if fits[0][0] is not None else ""
-    return {key: each[0][1][key] | {"per_part": errors, "max": None if errors is None else max(errors)}}
+    first = fits[0][0]
+    assert first is not None
+    found = {"per_part": errors, "max": None if errors is None else max(errors)}
+    if first.is_length:
+        found["threshold"] = max(
+            fit.limit * factor for fit, factor in fits if fit is not None and fit.limit is not None
+        )
+    return {first.key: each[0][1][first.key] | found}
 
 
 def _farthest(lengths: Sequence[tuple[float | None, float]]) -> float | None:

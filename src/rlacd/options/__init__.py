@@ -370,10 +370,15 @@ class Options:
         return self.keep_cavities or (isinstance(self.criterion, NavigableSpace) and self.criterion.sees_cavities)
 
     def as_plain(self) -> dict[str, Any]:
-        """Everything as plain values, the criterion by its name or its own options, a policy by its name."""
+        """All that has an effect as plain values, of which `of` makes the same options again, but for objects.
+
+        The criterion is its name or its own options; a policy and meshes to avoid are their names.
+        """
         plain = dataclasses.asdict(dataclasses.replace(self, policy="greedy", avoid=()))
         own = {"policy": policy_name(self.first_policy), "primitives": [*plain["primitives"]]}
-        return plain | own | {"avoid": [mesh_name(mesh) for mesh in self.avoid]}
+        plain |= own | {"avoid": [mesh_name(mesh) for mesh in self.avoid]}
+        idle = {name for name, _ in self._overridden()}
+        return {name: value for name, value in plain.items() if name not in idle}
 
     def at_scale(self, scale: float) -> Options:
         """Get the same options with lengths as bare numbers, where a unit of the input is `scale` units of the frame.

@@ -17,10 +17,11 @@ import signal
 import struct
 import sys
 import threading
+import warnings
 from pathlib import Path
 from typing import IO
 
-from rlacd.errors import RlacdError
+from rlacd.errors import DecompositionWarning, RlacdError
 from rlacd.pool import Blobs, MakeServer, Shared, Values
 
 READY = {"ready": True}
@@ -79,6 +80,7 @@ def find_server(name: str) -> MakeServer:
 
 def main() -> None:
     """Answer requests until the other end is closed."""
+    warnings.simplefilter("ignore", DecompositionWarning)  # answers hold them
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C stops
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer

@@ -32,7 +32,7 @@ export class PartList {
     const all = scene.parts.reduce((sum, part) => sum + part.volume, 0) || 1;
     const volume = scene.report?.volume;
     this.asShare = Boolean(volume);
-    this.limit = navigable ? null : (volume?.tolerance ?? scene.report?.options?.threshold);
+    this.limit = navigable ? null : (volume?.tolerance ?? (scene.report?.concavity ?? scene.report?.distance)?.threshold);
     this.data = scene.parts.map((part, index) => ({
       index,
       name: scene.robot ? partName(part, index, scene) : String(index).padStart(3, "0"),

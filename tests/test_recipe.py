@@ -1,0 +1,79 @@
+"""A report repeats its run, what it warns of is a Python warning too, and hulls are exported as in trimesh."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+import rlacd
+from rlacd.cli.main import app
+from rlacd.plain_json import to_json
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"threshold_abs": 0.1, "seed": 3, "quality": "fast", "overlap_abs": 0.01},
+        {"criterion": "volume", "volume_tolerance": 0.2, "merge": False, "policy": "navacd"},
+        {"criterion": rlacd.NavigableSpace(radius_abs=0.2, reachable_only=False), "keep_cavities": True},
+        {"preset": "unreal", "max_hulls": 3, "primitives": True},
+    ],
+)
+def test_a_report_is_the_recipe_of_its_run(given: dict[str, Any], tmp_path: Path) -> None:
+    pipe = trimesh.creation.annulus(0.8, 1.0, 0.3, sections=16)
+    pipe.export(tmp_path / "pipe.obj")
+    first = rlacd.decompose(tmp_path / "pipe.obj", threads=1, **given)
+    (tmp_path / "report.json").write_text(to_json(first.report))
+    options = json.loads(to_json(first.report))["options"]
+    again = rlacd.decompose(tmp_path / "pipe.obj", **options)
+    assert again.report["options"] == first.report["options"]
+    assert [h.vertices.tobytes() for h in again] == [h.vertices.tobytes() for h in first]
+    first.save(tmp_path / "first.ply")
+    words = [str(tmp_path / "pipe.obj"), "-o", str(tmp_path / "again.ply"), "--like", str(tmp_path / "report.json")]
+    assert CliRunner().invoke(app, ["decompose", *words]).exit_code == 0
+    assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "first.ply").read_bytes()
+
+
+def test_options_override_those_of_a_report_and_no_report_is_refused(tmp_path: Path) -> None:
+    trimesh.creation.box().export(tmp_path / "box.obj")
+    report, words = tmp_path / "report.json", ["decompose", str(tmp_path / "box.obj"), "-o", str(tmp_path / "box.ply")]
+    report.write_text(json.dumps({"options": {"threshold_abs": 0.1, "seed": 3}}))
+    run = CliRunner().invoke(app, [*words, "--like", str(report), "-t", "0.2", "--report", "-"])
+    assert run.exit_code == 0, run.stderr
+    options = json.loads(run.stdout)["options"]
+    assert (options["threshold"], options.get("threshold_abs"), options["seed"]) == (0.2, None, 3)
+    report.write_text("[]")
+    run = CliRunner().invoke(app, [*words, "--like", str(report)])
+    assert run.exit_code == 2
+    assert "is no report of a decomposition" in run.stderr
+
+
+def test_what_the_report_warns_of_is_a_python_warning_too(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    with pytest.warns(rlacd.DecompositionWarning, match="mesh: per_node had no effect") as heard:
+        found = rlacd.decompose(box, per_node=True)
+    assert len(heard) == 1
+    assert all(sentence in str(heard[0].message) for sentence in found.report["warnings"])
+    assert heard[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rlacd.decompose(box)
+    box.export(tmp_path / "box.obj")
+    words = [sys.executable, "-m", "rlacd", "decompose", str(tmp_path / "box.obj"), "--per-node"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stderr
+    assert "per_node had no effect" in said
+    assert "DecompositionWarning" not in said
+
+
+def test_hulls_are_exported_by_the_name_that_trimesh_has(tmp_path: Path) -> None:
+    found = rlacd.decompose(trimesh.creation.box())
+    assert found.export(tmp_path / "a.obj").read_bytes() == found.save(tmp_path / "b.obj").read_bytes()
