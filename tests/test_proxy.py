@@ -126,7 +126,7 @@ def test_limits_hold_and_are_met_by_the_threshold() -> None:
     result = rlacd.decompose(ring(), quality="fast", max_vertices=32)
     assert max(len(hull.vertices) for hull in result) <= 32
     worst = result.report["concavity"]["max"]
-    assert worst <= 0.053  # with few corners a part may exceed the threshold rather than take twice the parts, and says so
+    assert worst <= 0.053  # a part may exceed rather than take twice the parts, and says so
     assert (worst > 0.05) == any("out by up to" in warning for warning in result.report["warnings"])
     few = rlacd.decompose(ring(), quality="fast", max_hulls=3)
     assert len(few) <= 3
