@@ -172,6 +172,16 @@ def test_bad_meshes_are_refused() -> None:
         _native.cut(corner * np.nan, np.array([(0, 1, 2)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5, 0.0)
 
 
+def test_a_surface_that_is_not_closed_keeps_all_its_points_on_both_sides() -> None:
+    box = trimesh.creation.box((1, 1, 1))
+    vertices, opened = np.array(box.vertices), np.array(box.faces[1:], dtype=np.int32)
+    for axis in np.eye(3):
+        for side, sign in zip(_native.cut(vertices, opened, *axis.tolist(), 0.1, -1.0), (1, -1), strict=True):
+            assert side is not None
+            corners = vertices[sign * (vertices @ axis - 0.1) < 0]
+            assert (np.abs(side[0][:, None] - corners).sum(axis=2).min(axis=0) == 0).all()
+
+
 def blob(seed: int) -> trimesh.Trimesh:
     """The hull of random points."""
     random = np.random.default_rng(seed)

@@ -95,8 +95,8 @@ class Cutter {
     for (Edge& e : boundary) std::swap(e[0], e[1]);
     std::optional<Loops> loops =
         loops_of(std::move(boundary), [&](const Edge& before, const Edge& e) { return angle_inside(before, e, up); });
-    RLACD_ASSERT(loops);  // the boundary of a closed surface's side: as many edges leave as arrive
-    return std::move(*loops);
+    // Without loops the surface was not closed: its side stays open, with all its points.
+    return loops ? std::move(*loops) : Loops{};
   }
 
   // Angle between an edge and the one before it, on the inside of the loop; in (0, 2 pi].
