@@ -27,7 +27,7 @@ common third part."""
 PAIRS_AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the run."""
 
-BESIDE = 0.05
+FIRST_REACH = 0.05
 """Where few hulls are asked for, parts within this (the longest side is 2) are united before all others."""
 
 
@@ -324,7 +324,7 @@ def united_in_turn(
     alive, origin = numbered.parts, list(range(len(parts)))
     try:
         errors = dict(zip(alive, run.map(criterion.error, parts), strict=True))
-        reach = BESIDE
+        reach = FIRST_REACH
         queue = _bounded_pairs(numbered, list(alive), reach, criterion, run)
         while True:
             yield [alive[i] for i in sorted(alive, key=origin.__getitem__)], max(errors.values())
