@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import time
@@ -163,10 +164,8 @@ def rewritten(
     """What became of a robot that was written, with hulls of these names, to a file and a folder."""
     links, seconds = [RewrittenLink.of(body, done.results, names) for body in robot.bodies], time.perf_counter() - began
 
-    def as_result() -> RobotResult:
-        return shown(robot, done, warnings, seconds)
-
-    size, show = size_of(robot.bodies), as_result if links else None
+    size = size_of(robot.bodies)
+    show = functools.partial(shown, robot, done, warnings, seconds) if links else None
     return Rewritten(*places, links, warnings, seconds, size, robot.metres, done.pairs, done.samples, show)
 
 
