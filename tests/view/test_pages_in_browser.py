@@ -410,6 +410,8 @@ def test_figures_are_those_of_the_command_and_all_stays_in_the_frame(seen: Watch
     listed = page.locator("#parts tbody td:nth-child(4)").all_inner_texts()
     assert float(figure) == pytest.approx(float(said[1]), rel=0.006) == pytest.approx(max(map(float, listed)), rel=0.06)
     page.set_viewport_size({"width": 900, "height": 1000})  # the sides are nearest
+    page.wait_for_function("innerWidth === 900")
+    settle(page)
     page.locator("#explode").focus()
     page.keyboard.press("End")
     page.locator("#explode").blur()
