@@ -154,6 +154,33 @@ def test_what_is_left_of_each_hole_is_measured() -> None:
     assert result.report["warnings"][-1].endswith("; --keep-open, or a smaller tolerance, keeps more open.")
 
 
+def lugs(gap: float) -> Manifold:
+    """Two plates on one axis, each with a hole 10 wide."""
+    lug = Manifold.cube((40, 30, 10), True) - Manifold.cylinder(20, 5, 5, 48, True)
+    return lug + lug.translate((0, 0, 10 + gap))
+
+
+def slotted() -> Manifold:
+    """A block with a slot of 190 x 4 right through between two rows of holes."""
+    holes = [(10 + 10 * i, y) for i in range(19) for y in (8, 32)]
+    one = Manifold.cylinder(40, 3, 3, 48, True)
+    holed = box((0, 0, 0), (200, 40, 10)) - Manifold.compose([one.translate((x, y, 0)) for x, y in holes])
+    return holed - box((5, 18, -1), (195, 22, 11))
+
+
+@pytest.mark.promise("passages")
+@pytest.mark.parametrize(
+    ("solid", "threshold", "listed"),
+    [(lugs(6), 0.2, 2), (lugs(40), 0.1, 2), (slotted(), 0.02, 39), (slotted(), 0.05, 39)],
+    ids=["near lugs", "lugs", "the slot's ends close", "all closes"],
+)
+def test_each_passage_is_listed_once_however_long_and_holes_on_one_axis_are_two(
+    solid: Manifold, threshold: float, listed: int
+) -> None:
+    report = rlacd.decompose(trimesh_of(solid), threshold=threshold, quality="fast", threads=1).report
+    assert len(report["passages"]) == listed
+
+
 @pytest.mark.promise("passages")
 def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     block = box((0, 0, 0), (100, 40, 30)) - box((5, 19.5, 10), (95, 20.5, 40))

@@ -247,7 +247,7 @@ def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name
     report = rlacd.decompose(noisy_copy(corpus, name)[1] if name in CROSSING else corpus / name, quality="fast").report
     under = report["hausdorff"]["under"]
     if name == ACROSS_A_GAP:
-        assert under <= DEFAULT_GAP / math.sqrt(3)
+        assert under <= 0.006  # up to DEFAULT_GAP / √3 is possible, 0.0052 is what happens
         assert any(
             f"up to {under:.4g} (longest side = 2) outside the hulls" in warning for warning in report["warnings"]
         )

@@ -99,6 +99,13 @@ def test_what_has_no_area_gets_the_hull_of_its_points(points, faces):
     assert np.ptp(vertices, axis=0).max() <= np.ptp(inside, axis=0).max() + 4 * HALF_THICKNESS
 
 
+def test_the_hull_of_edges_is_said_to_leave_out_points():
+    points = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    solid = solid_of((points, np.array([[0, 1, 2], [3, 3, 3]])))
+    assert "convex hull of all edges" in solid.warnings[-1]
+    assert solid.frame.to_input(solid.left_out).tolist() == [[0, 1, 0]]
+
+
 def with_leaves(count):
     """Small triangles in a ball, some of them far from all others."""
     random = np.random.default_rng(3)

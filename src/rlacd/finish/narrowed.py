@@ -39,8 +39,10 @@ MOST_NAMED = 3
 BETWEEN = 0.02
 """Share of its radius that a passage kept open may lose more: its walls are kept off balls that are apart."""
 
+WIDER = 1.05
+"""What is so many times as wide is no longer the same passage, such as the room between two holes on one axis."""
+
 _NEIGHBOURS = 8
-_ON_THE_WAY = np.linspace(0, 1, 9)[1:-1, None]
 
 
 class Narrowed(NamedTuple):
@@ -52,7 +54,7 @@ class Narrowed(NamedTuple):
         One entry each: around ``at_abs``, a ball of ``radius_abs`` fits in the input, one of ``left_abs`` between the
         hulls.
     is_every
-        Whether these are all: no triangle and no ball was left out.
+        Whether these are all: no triangle and no ball was left out, and none widens, where it may be several.
     by_limits
         Whether a limit on hulls undid what cutting had kept open.
     """
@@ -75,17 +77,18 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> 
 
     balls = passage_balls(solid, surface, (NARROWEST, most), DENSITY, threads, lose)
     is_every = len(solid[1]) <= FACES and len(balls) <= MOST_BALLS
-    # Wide and narrow ones apart: neither hides what is left of the other.
-    wide = (balls.radii[:, None] >= _wide(reached)).sum(axis=1)
-    covered = union.distance(balls.centres, threads) / balls.radii
-    kept = np.lexsort([covered, -wide])[:MOST_BALLS]
-    balls, wide, covered = balls.some(kept), wide[kept], covered[kept]
-    order = np.argsort(covered, kind="stable")
-    passage = _passages(balls, wide, surface, threads)[order]
-    worst = order[np.sort(np.unique(passage, return_index=True)[1])]  # of each passage
-    worst = worst[covered[worst] < 1 - LEAST_LOSS]
-    left = np.where(covered[worst] > ROUNDING, covered[worst], 0.0) * balls.radii[worst]
-    places, lengths = frame.to_input(balls.centres[worst]), np.stack([balls.radii[worst], left]) / frame.scale
+    left = union.distance(balls.centres, threads)
+    left = np.where(left > ROUNDING * balls.radii, left, 0.0)
+    order = np.lexsort([left / balls.radii, -_told(reached, balls.radii, left)])[:MOST_BALLS]
+    balls, left = balls.some(order), left[order]
+    passage = _passages(balls, surface, threads)
+    widest = np.zeros(len(balls))
+    np.maximum.at(widest, passage, balls.radii)
+    is_every &= bool((widest[passage] <= WIDER * balls.radii).all())
+    worst = np.unique(passage, return_index=True)[1]
+    worst = worst[left[worst] < (1 - LEAST_LOSS) * balls.radii[worst]]
+    worst = worst[np.argsort(left[worst] / balls.radii[worst], kind="stable")]
+    places, lengths = frame.to_input(balls.centres[worst]), np.stack([balls.radii[worst], left[worst]]) / frame.scale
     entries = [
         {"at_abs": at, "radius_abs": radius, "left_abs": rest}
         for at, radius, rest in zip(places.tolist(), *lengths.tolist(), strict=True)
@@ -100,51 +103,55 @@ def _by_limits(reached: Reached, union: _native.HullUnion, threads: int) -> bool
     return bool((union.distance(goal.kept.centres, threads) < goal.kept.radii - ROUNDING).any())
 
 
-def _wide(reached: Reached) -> list[float]:
-    """Radii in the frame from which passages are warned of, and from which they were to stay open."""
-    return [reached.options.threshold, least_kept(reached.options, reached.solid.frame.scale)]
+def _told(reached: Reached, radii: FloatArray, left: FloatArray) -> NDArray[np.int64]:
+    """What to warn of: 2 where less is left than asked for, 1 where others wider than the tolerance lose over half."""
+    options, scale = reached.options, reached.solid.frame.scale
+    asked = (options.keep_open or 0.0) * radii + (options.keep_open_abs or 0.0) * scale - BETWEEN * radii
+    is_asked = radii >= least_kept(options, scale)
+    is_wide = ~is_asked & (radii >= options.threshold)
+    return 2 * (is_asked & (left < asked)) + (is_wide & (left < MOSTLY * radii))
 
 
-def _passages(balls: Balls, kind: NDArray[np.intp], surface: _native.Surface, threads: int) -> NDArray[np.int64]:
-    """The number of the passage in which each ball stands: between near ones of a kind, half of the larger can go."""
-    each = np.arange(len(balls))
-    passage, joined = each.astype(np.int64), np.empty((2, 0), dtype=np.int64)
+def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[np.int64]:
+    """The number of the passage in which each ball stands: those between which there is a way are in one."""
     ways = balls.centres[:, None] - balls.centres
-    squares = np.where(kind[:, None] == kind, dots(ways, ways), np.inf)
-    while True:  # near ones of other passages, until none meet
-        away = np.where(passage[:, None] == passage, np.inf, squares)
-        near = np.argsort(away, axis=1, kind="stable")[:, :_NEIGHBOURS]
-        pairs = np.stack([np.repeat(each, near.shape[1]), near.ravel()])
-        pairs = pairs[:, np.isfinite(away[pairs[0], pairs[1]])]
-        meet = _have_a_way(balls, pairs, np.sqrt(squares[pairs[0], pairs[1]]), surface, threads)
+    squares = dots(ways, ways)
+    near = np.argsort(squares, axis=1, kind="stable")[:, 1 : 1 + _NEIGHBOURS]
+    pairs = np.stack([np.repeat(np.arange(len(balls)), near.shape[1]), near.ravel()])
+    joined = pairs[:, _have_a_way(balls, pairs, surface, threads)]
+    while True:  # then those of any two passages that are nearest, until none meet
+        passage = _native.components(len(balls), *joined)[1]
+        pairs = np.array(np.nonzero(passage[:, None] < passage))
+        pairs = pairs[:, np.argsort(squares[pairs[0], pairs[1]], kind="stable")]
+        pairs = pairs[:, np.unique(passage[pairs[0]] * len(balls) + passage[pairs[1]], return_index=True)[1]]
+        meet = _have_a_way(balls, pairs, surface, threads)
         if not meet.any():
             return passage
         joined = np.concatenate([joined, pairs[:, meet]], axis=1)
-        passage = _native.components(len(balls), *joined)[1]
 
 
-def _have_a_way(
-    balls: Balls, pairs: NDArray[np.intp], lengths: FloatArray, surface: _native.Surface, threads: int
-) -> BoolArray:
-    # With so much room at both ends and in every eighth of the way, nothing stands in it between them either.
-    room, (first, second) = lengths / 16, pairs
-    ends = np.sort(balls.radii[pairs], axis=0)
-    needed = np.where(ends[0] > room, np.maximum(ends[1] / 2, room), np.inf)
-    start, end = balls.centres[first, None], balls.centres[second, None]
-    ways = np.ascontiguousarray((start + _ON_THE_WAY * (end - start)).reshape(-1, 3))
-    free: BoolArray = surface.distance(ways, threads).reshape(-1, len(_ON_THE_WAY)).min(axis=1) > needed
-    return free
+def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface, threads: int) -> BoolArray:
+    """Between which pairs a ball goes straight that is half the larger, and always in its passage."""
+    larger, starts = balls.radii[pairs].max(axis=0), balls.centres[pairs[0]]
+    ways = balls.centres[pairs[1]] - starts
+    lengths, gone = np.sqrt(dots(ways, ways)), np.zeros(len(larger))
+    goes = gone < lengths
+    active = np.flatnonzero(goes)
+    while len(active):
+        at = starts[active] + (gone[active] / lengths[active])[:, None] * ways[active]
+        room = surface.distance(at, threads)
+        goes[active] = (room > larger[active] / 2) & (room < WIDER * larger[active])
+        gone[active] += larger[active] / 4
+        active = active[goes[active] & (gone[active] < lengths[active])]
+    return goes
 
 
 def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]:
     """Warn of passages that keep less than asked for, and of others wider than the tolerance that lose over half."""
-    options, scale, asked, others = reached.options, reached.solid.frame.scale, [], []
-    for at, radius, left in (one.values() for one in found.passages):
-        if radius * scale >= least_kept(options, scale):
-            if left < (options.keep_open or 0.0) * radius + (options.keep_open_abs or 0.0) - BETWEEN * radius:
-                asked.append((at, radius, left))
-        elif radius * scale >= options.threshold and left < MOSTLY * radius:
-            others.append((at, radius, left))
+    options, scale = reached.options, reached.solid.frame.scale
+    lost = [(at, radius, left) for at, radius, left in (one.values() for one in found.passages)]
+    told = _told(reached, *(scale * np.array([one[i] for one in lost]) for i in (1, 2)))
+    asked, others = ([one for one, why in zip(lost, told, strict=True) if why == kind] for kind in (2, 1))
     by_limits = "limits on the hulls leave no other way" if found.by_limits else ""
     reason = "the work was stopped before" if is_stopped else by_limits
     cure = (

@@ -188,7 +188,8 @@ def _repaired(
     faces = faces[~_is_inside(vertices, faces, detached, threads)]
     surface = (vertices, faces.astype(np.int32))
     if len(faces) == 0 or face_areas(vertices, faces).max() < NO_FILM:
-        said = "No face has an area, so the convex hull of all points is used instead."
+        what = "edges" if len(mesh.specks) else "points"
+        said = f"No face has an area, so the convex hull of all {what} is used instead."
         solid = hull_of_points(points)
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), (*mesh.warnings, said))
