@@ -335,9 +335,9 @@ def _clear_of_each_other(
     """Decompose nodes again whose hulls touch though they do not; returns what to say of those that still do."""
 
     def body(number: int) -> Body:
-        mesh, hulls = meshes[number], [(hull.vertices, hull.faces) for hull in done[number].hulls]
-        surface = mesh.vertices, mesh.faces.astype(np.int32)
-        return Body(names[number], surface, [(v, f.astype(np.int32)) for v, f in hulls])
+        mesh, hulls = meshes[number], done[number].hulls
+        surfaces = [Surface(hull.vertices, hull.faces) for hull in hulls]
+        return Body(names[number], Surface(mesh.vertices, mesh.faces), surfaces)
 
     def redo(number: int, obstacles: Sequence[Obstacle]) -> list[Surface]:
         own = replace(options[number], avoid=(*options[number].avoid, *obstacles))

@@ -11,7 +11,7 @@ import trimesh
 from click.testing import CliRunner
 
 import rlacd
-from rlacd.clear import Body, at_rest, check
+from rlacd.clear import Body, Surface, at_rest, check
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
 from tests.models import TABLE_VOLUME, inside, table
@@ -236,7 +236,7 @@ def test_bodies_that_do_not_touch_do_not_as_hulls_and_fixed_meshes_may(tmp_path:
     groups = [[hull.convex_hull for hull, path in hulls if f"/{name}" in path] for name in ("cabinet", "drawer")]
     assert all(groups)
     bodies = [
-        Body(name, (own[0].vertices, own[0].faces), [(h.vertices, h.faces) for h in own])
+        Body(name, Surface(own[0].vertices, own[0].faces), [Surface(h.vertices, h.faces) for h in own])
         for name, own in zip("ab", groups, strict=True)
     ]
     assert check(bodies, at_rest("ab")) == {}

@@ -16,7 +16,7 @@ import numpy as np
 
 from rlacd.clear.bodies import Body, Surface
 from rlacd.clear.motion import Motion
-from rlacd.clear.touching import TOUCH, Known, Offence, Shapes, Touching, check, size_of
+from rlacd.clear.touching import TOUCH, Offence, Touching, check, enters, gap, size_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import concatenated
 from rlacd.solid.obstacle import Obstacle
@@ -103,12 +103,11 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
         The extra ``clear`` is not installed.
     """
     bodies = list(bodies)
-    known = Known()
-    touching = check(bodies, motion, known=known)
+    touching = check(bodies, motion)
     first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
-        again = _wish(bodies, wrong, wishes, known)
+        again = _wish(bodies, wrong, wishes)
         if not again:
             break
         for body in sorted(again):
@@ -116,20 +115,19 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
             bodies[body] = bodies[body].with_hulls(redo(body, obstacles))
             wishes.renewed[body] += 1
         near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
-        renewed = check(bodies, motion, near, known)
+        renewed = check(bodies, motion, near)
         touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
     mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))
 
 
-def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes, known: Known) -> set[int]:
+def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:
     """Add what bodies are to stay out of, and return those to decompose again: not both of a pair at once."""
-    shapes = {i: Shapes(bodies[i], known) for pair in wrong for i in pair}
     again, fixed = set[int](), set[int]()
     for (i, j), found in sorted(wrong.items(), key=lambda one: (-one[1].offences[0].depth, one[0])):
         seen = [place.pose for place in _spread(found.offences)]
         poses = {i: seen, j: [inverse(pose) for pose in seen]}
-        ours, theirs = (any(shapes[a].enters(shapes[b], pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
+        ours, theirs = (any(enters(bodies[a], bodies[b].mesh, pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
         ways = [_Wish(i, j, False), _Wish(j, i, False)]
         if theirs:
             ways.reverse()
@@ -140,8 +138,8 @@ def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes
                 again.add(wish.body)
                 fixed.add(wish.other)
                 if wish.of_mesh:
-                    gap = min(shapes[i].gap(shapes[j], pose) for pose in seen)
-                    wishes.gaps[wish] = min(gap, wishes.gaps.get(wish, gap))
+                    least = min(gap(bodies[i].mesh, bodies[j].mesh, pose) for pose in seen)
+                    wishes.gaps[wish] = min(least, wishes.gaps.get(wish, least))
                 break
     return again
 
@@ -161,9 +159,9 @@ def _obstacle(bodies: Sequence[Body], wish: _Wish, wishes: _Wishes, motion: Moti
     """The other body at all places, seen from the one that stays out of it, as far as it comes near that."""
     own, other = bodies[wish.body], bodies[wish.other]
     if wish.of_mesh:
-        (vertices, faces), margin = other.mesh, wishes.gaps[wish] / 2
+        vertices, faces, margin = other.mesh.vertices, other.mesh.faces, wishes.gaps[wish] / 2
     else:
-        vertices, faces = concatenated([(v, f.astype(np.int32)) for v, f in other.hulls])
+        vertices, faces = concatenated([(hull.vertices, hull.faces) for hull in other.hulls])
         margin = OFF_HULLS * size_of(bodies, motion)
     lower, upper = own.box[0] - margin, own.box[1] + margin
     near = []

@@ -70,7 +70,7 @@ def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:
                 "always" if share == 1 else "sometimes" if share else "never"
             )
             meshes = float(touching.meshes.mean()) if touching else 0.0
-            depth = touching.offences[0].depth if touching and touching.offences else 0.0
+            depth = touching.depth if touching else 0.0
             names, is_kept = (first.name, bodies[j].name), (i, j) in cleared.mended
             joined, loose = (i, j) in motion.adjacent, motion.carrier[i] != motion.carrier[j]
             pairs.append(LinkPair(*names, joined and not loose, contact, share, meshes, depth, is_kept, loose))
