@@ -182,6 +182,15 @@ def test_a_surface_that_is_not_closed_keeps_all_its_points_on_both_sides() -> No
             assert (np.abs(side[0][:, None] - corners).sum(axis=2).min(axis=0) == 0).all()
 
 
+def test_a_rim_that_runs_an_edge_both_ways_leaves_both_sides_closed() -> None:
+    """Where a real solid overlaps itself and a sliver of it lies above the plane, straightening makes such a rim."""
+    case = np.load(Path(__file__).parent / "cases" / "edge_both_ways.npz")
+    assert is_closed(case["faces"])
+    for side in _native.cut(case["vertices"], case["faces"], *case["normal"].tolist(), float(case["offset"]), -1.0):
+        assert side is not None
+        assert is_closed(side[1])
+
+
 def blob(seed: int) -> trimesh.Trimesh:
     """The hull of random points."""
     random = np.random.default_rng(seed)

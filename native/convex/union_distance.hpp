@@ -24,9 +24,9 @@ namespace rlacd {
 
 class HullUnion {
  public:
-  HullUnion(std::vector<Mesh> hulls, int threads);
+  HullUnion(std::vector<std::shared_ptr<ConvexBody>> hulls, int threads);
 
-  // The union of some of the hulls, which are shared, not prepared again.
+  // The union of some of the hulls.
   HullUnion only(const std::vector<std::int32_t>& some) const;
 
   // The surface of the union as triangles. Cracks between hulls narrower than `gap` count as closed; next to inner
@@ -51,7 +51,7 @@ class HullUnion {
   // Which faces have all their corners in one of the hulls.
   std::vector<char> held_faces(const Mesh& surface, int threads) const;
 
-  std::vector<std::shared_ptr<const ConvexBody>> members_;
+  std::vector<std::shared_ptr<ConvexBody>> members_;
 };
 
 }  // namespace rlacd

@@ -58,16 +58,16 @@ class Kept:
 
     def is_entered(self, hull: Hull) -> bool:
         """Whether a hull comes nearer than the margin."""
-        return self.filling is not None and self.filling.comes_deeper(hull.vertices, hull.faces, ROUNDING - self.margin)
+        return self.filling is not None and self.filling.comes_deeper(hull.body, ROUNDING - self.margin)
 
     def depth(self, hull: Hull) -> float:
         """How deep it reaches into a hull, to `TOLERANCE`; 0 if it does not."""
-        if self.filling is None or not self.filling.comes_deeper(hull.vertices, hull.faces, TOLERANCE):
+        if self.filling is None or not self.filling.comes_deeper(hull.body, TOLERANCE):
             return 0.0
         low, high = TOLERANCE, 2.0
         while high - low > TOLERANCE:
             middle = (low + high) / 2
-            is_deeper = self.filling.comes_deeper(hull.vertices, hull.faces, middle)
+            is_deeper = self.filling.comes_deeper(hull.body, middle)
             low, high = (middle, high) if is_deeper else (low, middle)
         return high
 

@@ -89,17 +89,17 @@ class DistanceScreen(Screen):
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """Test the solid's corners and points of the hull."""
-        return Feasibility(filling.feasibility(hull.vertices, hull.faces, self.threshold))
+        return Feasibility(filling.feasibility(hull.body, self.threshold))
 
     def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[_native.HullCorners], pairs: IntArray, threads: int
+        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Test the solid's corners and points of the joint hulls."""
         return filling.joint_feasibilities(hulls, pairs, self.threshold, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether the solid's surface reaches deeper into the hull than the threshold."""
-        return filling.comes_deeper(hull.vertices, hull.faces, self.threshold)
+        return filling.comes_deeper(hull.body, self.threshold)
 
 
 @dataclass(frozen=True)
@@ -187,10 +187,8 @@ class Distance(Criterion):
 
         False if it is larger, or if it is within 0.1 % of the threshold and branch and bound cannot decide.
         """
-        hull = part.hull
-        return _native.meets_concavity(
-            part.vertices, part.faces, hull.vertices, hull.faces, *self._volumes(part), self.threshold, part.tree
-        )
+        volumes = self._volumes(part)
+        return _native.meets_concavity(part.vertices, part.faces, part.hull.body, *volumes, self.threshold, part.tree)
 
     def measure(self, part: Part, tolerance: float = 1e-3, floor: float = 0.0) -> ConcavityValue:
         """Measure the distance or concavity to within ``tolerance`` (same frame as the threshold).
@@ -200,10 +198,8 @@ class Distance(Criterion):
         """
         if not tolerance > 0:
             raise OptionError(f"The tolerance must be positive, not {tolerance}; 0.001 is usual.")
-        hull, (volume, hull_volume) = part.hull, self._volumes(part)
-        found = _native.concavity(
-            part.vertices, part.faces, hull.vertices, hull.faces, volume, hull_volume, tolerance, floor, part.tree
-        )
+        volumes = self._volumes(part)
+        found = _native.concavity(part.vertices, part.faces, part.hull.body, *volumes, tolerance, floor, part.tree)
         return ConcavityValue(*found)
 
     def _volumes(self, part: Part) -> tuple[float, float]:

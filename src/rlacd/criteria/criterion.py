@@ -148,7 +148,7 @@ class Screen:
         return Feasibility.NEVER
 
     def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[_native.HullCorners], pairs: IntArray, threads: int
+        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Volumes [P] of the joint hulls of pairs [P, 2] of hulls (undefined for `NEVER`), and the `feasibility` [P] of
         each, decided less thoroughly."""

@@ -166,9 +166,7 @@ class Navigable(Criterion):
                 )
             lengths, reachable = (radius, tolerance), space.reachable_only
             balls = Balls(
-                *_native.navigable_balls(
-                    surface, hull.vertices, hull.faces, *lengths, reachable, seeds, planes, pitch, threads
-                )
+                *_native.navigable_balls(surface, hull.body, *lengths, reachable, seeds, planes, pitch, threads)
             )
         return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
 
@@ -287,7 +285,7 @@ class Intrusions:
         if known is None:
             within = part.within
             candidates = None if within is None else self.of(within)[0]
-            known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, ROUNDING)
+            known = self._balls.intrusions(part.hull.body, candidates, ROUNDING)
             with self._lock:  # another thread may have done the same, with the same result
                 self._known[part] = known
         return known
@@ -295,7 +293,7 @@ class Intrusions:
     def any_beyond(self, part: Part, depth: float) -> bool:
         """Whether the part's hull reaches deeper than `depth` into any ball."""
         if part.within is None and self._recall(part) is None:  # a union: most fail, so stop at the first ball
-            first, _ = self._balls.intrusions(part.hull.vertices, part.hull.faces, None, depth, first=True)
+            first, _ = self._balls.intrusions(part.hull.body, None, depth, first=True)
             return len(first) > 0
         _, depths = self.of(part)
         return bool((depths > depth).any())

@@ -100,11 +100,7 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
     hulls = [part.hull for part in finished]
     points = np.concatenate(
         _native.Filling(*reached.solid.surface, run.threads).uncovered(
-            [hull.vertices for hull in hulls],
-            [hull.faces for hull in hulls],
-            COVERAGE_TOLERANCE,
-            GROWTH_TO_SPARE,
-            run.threads,
+            [hull.body for hull in hulls], COVERAGE_TOLERANCE, GROWTH_TO_SPARE, run.threads
         )
     )
     distance = hull_union(hulls, run.threads).distance(points, run.threads)

@@ -66,7 +66,7 @@ class _Seam(NamedTuple):
 
     def deepest(self, bodies: Sequence[_Body]) -> FloatArray:
         """How deep each place lies in the body that it lies deepest in [N]; 0 outside all."""
-        depths: FloatArray = np.max([body.sides.depths(self.places) for body in bodies], axis=0, initial=0.0)
+        depths: FloatArray = np.max([body.part.hull.body.depths(self.places) for body in bodies], axis=0, initial=0.0)
         return depths
 
 
@@ -96,7 +96,7 @@ def overlap_parts(
     """
     bodies = [_Body(part) for part in parts]
     tolerated = max((criterion.error(part) for part in parts if not criterion.is_met(part)), default=None)
-    boxes = _native.Boxes([part.hull.corners for part in parts])
+    boxes = _native.Boxes([part.hull.body for part in parts])
     pairs = boxes.pairs(range(len(parts)), TOLERANCE).tolist()
     near: list[set[int]] = [set() for _ in parts]
     for first, second in pairs:
@@ -155,7 +155,7 @@ def _changes(
     def grown(one: int, other: int, depth: float, touched: set[int]) -> tuple[float, tuple[int, Hull]] | None:
         body = bodies[one]
         sides = np.unique(np.concatenate([body.contact(bodies[place], overlap)[0] for place in sorted(touched)]))
-        layer = Hull.of(body.sides.layer(bodies[other].sides, sides, depth, TOLERANCE))
+        layer = Hull.of(body.part.hull.body.layer(bodies[other].part.hull.body, sides, depth, TOLERANCE))
         if layer is None:
             return None
         hull = Hull.around(body.part.hull, layer)
@@ -182,15 +182,14 @@ def _judged(part: Part, hull: Hull, solid: Component, criterion: Criterion, tole
 
 
 class _Body:
-    """A part with the flat sides of its hull, and where it touches others."""
+    """A part, and where its hull touches others."""
 
     def __init__(self, part: Part) -> None:
         self.part = part
-        self.sides = _native.FlushBody(part.hull.vertices, part.hull.faces)
         self._contacts: dict[_Body, tuple[IntArray, FloatArray]] = {}
 
     def contact(self, other: _Body, overlap: float) -> tuple[IntArray, FloatArray]:
         """Sides [S] under which a side of another body lies less deep than the overlap, and places on that [N, 3]."""
         if other not in self._contacts:
-            self._contacts[other] = self.sides.contact(other.sides, overlap, TOLERANCE)
+            self._contacts[other] = self.part.hull.body.contact(other.part.hull.body, overlap, TOLERANCE)
         return self._contacts[other]

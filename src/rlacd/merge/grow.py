@@ -68,7 +68,7 @@ def _regrown(merged: list[Part], criterion: Criterion, run: Run, solid: Componen
     if not run.work.pay(sum(work.growing(len(piece.hull.vertices), corners) for piece in pieces)):
         return merged
     depth = DEPTH * criterion.overhang
-    grown = run.map(lambda piece: solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth), pieces)
+    grown = run.map(lambda piece: solid.filling.grown(piece.hull.body, depth), pieces)
     chosen = _chosen(pieces, grown)
     if len(chosen) > WORTH * len(merged):
         return merged

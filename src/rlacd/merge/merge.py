@@ -108,7 +108,7 @@ class _Adjoining:
         vertices, volumes, filled = alive.sums(pairs)
         if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
             return []
-        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
+        hulls = _native.joint_hull_volumes(alive.bodies, pairs, self.run.threads)
         kept = ~screen.excludes(volumes, hulls)
         return _priced(pairs[kept], (hulls - filled)[kept])
 
@@ -141,7 +141,7 @@ class _Bridged(_Adjoining):
             vertices, _, filled = alive.sums(some)
             if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
                 break
-            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
+            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.bodies, some, run.threads)
             may = verdicts == Feasibility.MAYBE
             found += _priced(some[may], (volumes - filled)[may])
         return found
@@ -249,16 +249,17 @@ class Uniter:
             Index and volume. Empty if too little work is left.
         """
         screen = self.criterion.screen
-        corners = [part.hull.corners, *(other.hull.corners for other in others)]
-        pairs = Boxes(corners).pairs([0], screen.reach)
+        hulls = [part.hull, *(other.hull for other in others)]
+        bodies = [hull.body for hull in hulls]
+        pairs = Boxes(bodies).pairs([0], screen.reach)
         near = pairs[:, 1].tolist()
-        vertices = len(near) * len(corners[0]) + sum(len(corners[i]) for i in near)
+        vertices = sum(len(part.hull.vertices) + len(hulls[i].vertices) for i in near)
         if not self.account.pay(work.screening(vertices, len(near))):
             return []
         if not screen.looks_inside:
-            volumes = _native.joint_hull_volumes(corners, pairs, 1)
+            volumes = _native.joint_hull_volumes(bodies, pairs, 1)
             return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True)]
-        volumes, verdicts = screen.feasibilities(self.solid.filling, corners, pairs, 1)
+        volumes, verdicts = screen.feasibilities(self.solid.filling, bodies, pairs, 1)
         found = zip(near, volumes.tolist(), verdicts.tolist(), strict=True)
         return [(i - 1, volume) for i, volume, verdict in found if verdict == Feasibility.MAYBE]
 
@@ -354,7 +355,7 @@ def _bounded_pairs(
     alive: NumberedParts, new: Sequence[int], reach: float, criterion: Criterion, run: Run
 ) -> list[_BoundedPair]:
     pairs = alive.boxes.pairs(new, reach)
-    volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.corners, pairs, run.threads)
+    volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.bodies, pairs, run.threads)
     errors = map(criterion.screen.least_error, volumes.tolist(), hulls.tolist())
     queue = [_BoundedPair(error, i, j, False) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)

@@ -25,14 +25,14 @@ class NumberedParts:
     Attributes
     ----------
     parts : dict of int to Part
-    corners : list of HullCorners
-        Of the parts' hulls, by number, also of those that are gone.
+    bodies : list of ConvexBody
+        The parts' hulls, by number, also of those that are gone.
     boxes : Boxes
     """
 
     def __init__(self, parts: Sequence[Part], screen: Screen) -> None:
         self.parts: dict[int, Part] = {}
-        self.corners: list[_native.HullCorners] = []
+        self.bodies: list[_native.ConvexBody] = []
         self.boxes = _native.Boxes([])
         self._screen = screen
         self._summands = np.empty((3, 2 * len(parts)))  # unions of pairs never make more of them
@@ -41,13 +41,13 @@ class NumberedParts:
 
     def add(self, part: Part) -> int:
         """Add a part, and get its number."""
-        number, hull = len(self.corners), part.hull
+        number, hull = len(self.bodies), part.hull
         if number == self._summands.shape[1]:
             self._summands = np.concatenate([self._summands, np.empty((3, number + 1))], axis=1)
         self._summands[:, number] = len(hull.vertices), part.volume, self._screen.filled(part)
         self.parts[number] = part
-        self.corners.append(hull.corners)
-        self.boxes.add(number, hull.corners)
+        self.bodies.append(hull.body)
+        self.boxes.add(number, hull.body)
         return number
 
     def remove(self, numbers: Collection[int]) -> None:

@@ -150,8 +150,7 @@ class Lift:
     def _cover(self, lifted: Sequence[_Lifted], simple: bool = True) -> None:
         """Grow hulls where necessary to cover the solid's surface; those that need not grow stay the same."""
         points = self.solid.filling.uncovered(
-            [each.hull.vertices for each in lifted],
-            [each.hull.faces for each in lifted],
+            [each.hull.body for each in lifted],
             2 * self.proxy.deviation + SIMPLE_FIRST,
             GROWTH_TO_SPARE,
             self.run.threads,

@@ -275,14 +275,14 @@ class Component(Part):
 
         The smaller side comes first; an empty list if one would be empty.
         """
-        corners, volumes = [hull.corners for hull in hulls], [hull.volume for hull in hulls]
-        sides = _native.halve(self.vertices, self.faces, self.hull.corners, corners, volumes, share, NEGLIGIBLE_VOLUME)
+        around = [hull.body for hull in hulls]
+        sides = _native.halve(self.vertices, self.faces, self.hull.body, around, share, NEGLIGIBLE_VOLUME)
         halves = [Component.of(side, self) for side in sides if side is not None]
         return sorted(halves, key=lambda half: half.volume) if len(halves) == 2 else []
 
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
-        vertices, faces, volume = self.filling.clipped(hull.vertices, hull.faces)
+        vertices, faces, volume = self.filling.clipped(hull.body)
         part = Part(vertices, faces, volume, hull)
         part.tree = _native.TreeCache()
         return part

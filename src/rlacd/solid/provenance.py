@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from rlacd._native import HullUnion, poll_stop, sample_surface
+from rlacd._native import ConvexBody, HullUnion, poll_stop, sample_surface
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import Frame
@@ -45,7 +45,7 @@ def owners(
     frame = Frame.of(vertices)  # areas and squares of any finite coordinates fit in a double there
     points, labels = _spread(frame.to_frame(vertices), faces, label_of)
     shapes = [(frame.to_frame(hull.vertices), hull.faces.astype(np.int32)) for hull in hulls]
-    union = HullUnion([vertices for vertices, _ in shapes], [faces for _, faces in shapes])
+    union = HullUnion([ConvexBody(*shape) for shape in shapes])
     found = []
     for number, (corners, _) in enumerate(shapes):
         poll_stop()
