@@ -75,10 +75,11 @@ class Decomposition(Result):
         ``search`` : dict or None
             What the search of a quality level has done: ``level``, ``seconds``, when it saved the last part
             (``last_gain``, 0 if none), ``starts``, ``steps``, ``accepted``, ``work`` of the ``allowed``, and the
-            ``parts`` of the ``first_pass`` and at its end.
+            ``parts`` of the ``first_pass`` and at its end. None with the quality ``fast``, and where ``max_hulls`` asks
+            for far fewer.
         ``at_least`` : int or None
             No decomposition has fewer hulls if each stays within the threshold of the solid and they cover it to 0.001
-            (longest side 2). None with the quality ``fast``; 1 where the criterion bounds no distance.
+            (longest side 2). None without a search; 1 where the criterion bounds no distance.
         ``seconds`` : dict
             Wall time of each stage, and their ``total``.
         ``repair`` : list of dict

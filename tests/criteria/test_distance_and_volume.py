@@ -145,8 +145,10 @@ def test_a_tighter_share_takes_more_hulls_and_is_a_share_of_what_was_said() -> N
 
 
 def test_a_limit_on_hulls_may_exceed_the_share_and_says_by_how_much() -> None:
-    result = rlacd.decompose(torus(), criterion="volume", max_hulls=6, threads=1)
+    result = rlacd.decompose(torus(), criterion="volume", max_hulls=6, quality="best", threads=1)
     assert len(result) <= 6
+    assert result.report["search"] is None
+    assert any("Nothing was searched" in warning for warning in result.report["warnings"])
     assert result.report["volume"]["max"] > 0.01
     assert any("add more than 1 % of volume" in warning for warning in result.report["warnings"])
 

@@ -46,6 +46,11 @@ CAVITIES = {
         join(BOX, inverted(moved(cube(0.8), -0.5, 0, 0)), inverted(moved(cube(0.6), 0.4, 0.5, 0))),
         *(8, 2),
     ),
+    "against a wall": (
+        join(BOX, inverted(moved(cube(0.8), 0.6, 0.2, 0.1)), inverted(moved(cube(0.4), -0.6, 0, 0))),
+        8,
+        2,
+    ),
     "a cracked wall": (join(BOX, inverted(without(BALL, 7))), 8, 1),
     "side by side": (join(moved(BALL, -2, 0, 0), inverted(moved(BALL, 2, 0, 0))), 2 * BALL.volume, 0),
 }

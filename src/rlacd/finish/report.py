@@ -376,6 +376,8 @@ def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, reached: Reac
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
+    if options.quality == "best" and reached.found is None and options.max_hulls is not None and exceeds:
+        sentences.append(f"Nothing was searched: only uniting parts leads to as few hulls as {options.max_hulls}.")
     if apart is not None and apart.under > COVERAGE_TOLERANCE:
         sentences.append(
             f"Some of the input's surface lies up to {apart.under / unit:.4g} ({in_words}) outside the hulls, farthest "

@@ -27,6 +27,9 @@ common third part."""
 PAIRS_AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the run."""
 
+NEAR = 0.05
+"""Where few hulls are asked for, parts within this (the longest side is 2) are united before all others."""
+
 
 class _Pair(NamedTuple):
     cost: float  # volume of the joint hull minus what the criterion counts as filled for each part
@@ -322,7 +325,7 @@ def united_in_turn(
     alive, origin = numbered.parts, list(range(len(parts)))
     try:
         errors = dict(zip(alive, run.map(criterion.error, parts), strict=True))
-        reach = criterion.screen.reach
+        reach = NEAR
         queue = _bounded_pairs(numbered, list(alive), reach, criterion, run)
         while True:
             yield [alive[i] for i in sorted(alive, key=origin.__getitem__)], max(errors.values())

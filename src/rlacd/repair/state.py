@@ -15,7 +15,7 @@ from rlacd._native import face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import close_cracks
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
 from rlacd.repair.soup import Soup, no_faces
-from rlacd.repair.union import Cavities, hollowed, size_of, to_arrays, unite, unite_and_fill, volume_of
+from rlacd.repair.union import Cavities, emptied, hollowed, size_of, to_arrays, unite, unite_and_fill, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS, Frame
@@ -170,7 +170,10 @@ class State:
             return
         self.solid, self.cavities = unite_and_fill([part.shape for part in self.parts])
         if bounded is not closed or (rest and self.cavities.count):
-            self.cavities = unite_and_fill(bounded)[1]
+            whole = unite(closed) if rest else self.solid
+            filled, self.cavities = unite_and_fill(bounded)
+            if volume_of(whole) - volume_of(filled) > _CREVICES * volume_of(whole):
+                self.cavities = emptied(whole, bounded)
 
     def of_bodies(self, marked: BoolArray) -> Soup:
         """The faces of marked bodies."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.repair.soup import FLAT, MOST_UNITED
-from rlacd.solid.arrays import FloatArray, Int64Array, IntArray
+from rlacd.solid.arrays import FloatArray, Int64Array, IntArray, dots
 from rlacd.solid.component import concatenated
 from rlacd.solid.frame import thickened
 from rlacd.solid.manifold import require_time_for, to_manifold
@@ -31,6 +31,9 @@ _MESHES_UNITED = 5 * MOST_UNITED
 # triangle, are not united exactly: manifold3d takes about 6 microseconds for each, and unions of solids that cross
 # themselves have ever more of them.
 _MOST_CROSSINGS, _PER_TRIANGLE = 200_000, 5
+
+# Depth of the points that tell where a solid lies: far more than rounding, far less than a slab is thick.
+_HAIR = 1e-6
 
 
 class CrossingsError(Exception):
@@ -147,6 +150,14 @@ def unite_and_fill(solids: Sequence[Shape]) -> tuple[Shape, Cavities]:
     return _filled(_all_united(solids))
 
 
+def emptied(whole: Shape, bounded: Sequence[Shape]) -> Cavities:
+    """What is solid only in the whole, also where it opens to the outside, at a wall without thickness."""
+    vertices, faces = surface_of(as_manifold(whole) - as_manifold(_all_united(bounded)))
+    shells = _native.closed_bodies(vertices, faces)
+    assert shells is not None, "two faces of a manifold share an edge"
+    return Cavities(int((shells[1] > 0).sum()), (vertices, np.ascontiguousarray(faces[:, ::-1])))
+
+
 def _all_united(solids: Sequence[Shape]) -> Shape:
     if len(solids) == 1 and not isinstance(solids[0], Manifold):
         return solids[0]
@@ -198,10 +209,19 @@ def _around(solids: list[Manifold]) -> list[list[int]]:
         vertices, faces = to_arrays(solid)
         surface = _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
         candidates = np.flatnonzero(inner)
-        points = np.stack([to_arrays(solids[i])[0][0] for i in candidates])
+        points = np.stack([_point_in(solids[i]) for i in candidates])
         for i in candidates[surface.winding(points, is_closed=True) > 0]:
             around[i].append(j)
     return around
+
+
+def _point_in(solid: Manifold) -> FloatArray:
+    """A point a hair below the middle of the largest face: corners may touch what is around."""
+    vertices, faces = to_arrays(solid)
+    normals = _native.long_normals(vertices, faces)
+    largest = dots(normals, normals).argmax()
+    down = normals[largest] / -np.sqrt(dots(normals[largest], normals[largest]))
+    return np.asarray(vertices[faces[largest]].mean(axis=0) + _HAIR * down)
 
 
 def _filled(solid: Shape) -> tuple[Shape, Cavities]:
