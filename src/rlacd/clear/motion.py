@@ -80,7 +80,8 @@ class Motion:
     positions : float64 [S, J]
         Of the sampled joints, in radians or the unit of length.
     adjacent : frozenset of (int, int)
-        Links that one joint connects, or several without one of these links between; the lower number first.
+        Links that one joint connects, or several without one of these links between; the lower number first. A joint
+        that was looked at only at rest does not count: elsewhere they may be far from each other.
     warnings : tuple of str
         What a joint's range was taken to be, where the file does not say.
     fixed : frozenset of int
@@ -123,11 +124,18 @@ class Motion:
         return "at " + ", ".join(f"{joint.name} = {value:.4g}" for joint, value in moved)
 
 
-def at_rest(links: Sequence[str], fixed: Collection[str] = (), poses: Sequence[FloatArray] | None = None) -> Motion:
+def at_rest(
+    links: Sequence[str],
+    fixed: Collection[str] = (),
+    poses: Sequence[FloatArray] | None = None,
+    adjacent: Collection[tuple[int, int]] = (),
+) -> Motion:
     """Links that are looked at where they are, by default in one frame; those that are fixed may touch each other."""
     where = np.tile(np.eye(4), (1, len(links), 1, 1)) if poses is None else np.stack(poses)[None]
     places = frozenset(i for i, name in enumerate(links) if name in fixed)
-    return Motion(tuple(links), where, fixed=places, carrier=tuple(range(len(links))), carried=(-1,) * len(links))
+    carrier, carried = tuple(range(len(links))), (-1,) * len(links)
+    near = frozenset(adjacent)
+    return Motion(tuple(links), where, adjacent=near, fixed=places, carrier=carrier, carried=carried)
 
 
 class _Read(NamedTuple):
@@ -187,7 +195,7 @@ def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] |
         poses[:, chosen],
         tuple(joints),
         positions,
-        _adjacent(file.parents, chosen),
+        _adjacent({link: parent for link, parent in file.parents.items() if link not in held}, chosen),
         tuple(file.said),
         carrier=_last(file.parents, held, chosen),
         carried=_last(file.parents, last, chosen),

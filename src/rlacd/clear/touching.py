@@ -126,9 +126,7 @@ def _seen_from(first: FloatArray, second: FloatArray) -> FloatArray:
     return poses
 
 
-def _touching(
-    first: Body, second: Body, samples: Int64Array, poses: FloatArray, count: int, size: float
-) -> Touching:
+def _touching(first: Body, second: Body, samples: Int64Array, poses: FloatArray, count: int, size: float) -> Touching:
     """What two bodies do, looked at once for each way in which they are to each other."""
     rounded = np.round(poses / (SAME * np.array([1, 1, 1, size])))
     _, chosen, same = np.unique(rounded.reshape(len(poses), 16), axis=0, return_index=True, return_inverse=True)
