@@ -41,23 +41,12 @@ Redo = Callable[[int, Sequence[Obstacle], int], Sequence[Surface] | None]
 
 @dataclass(frozen=True)
 class Cleared:
-    """What became of bodies.
-
-    Attributes
-    ----------
-    bodies : list of Body
-    touching : dict
-        As `check` finds it for the new hulls.
-    mended : tuple of (int, int)
-        Pairs whose hulls touched though they did not, and no longer do.
-    given_up : frozenset of int
-        Bodies that would have taken too many hulls.
-    """
+    """What became of bodies."""
 
     bodies: list[Body]
-    touching: dict[tuple[int, int], Touching]
-    mended: tuple[tuple[int, int], ...] = ()
-    given_up: frozenset[int] = frozenset()
+    touching: dict[tuple[int, int], Touching]  # as `check` finds it for the new hulls
+    mended: tuple[tuple[int, int], ...] = ()  # pairs whose hulls touched though they did not, and no longer do
+    given_up: frozenset[int] = frozenset()  # bodies that would have taken too many hulls
 
 
 class _Wish(NamedTuple):
@@ -70,26 +59,12 @@ class _Wish(NamedTuple):
 
 @dataclass
 class _Wishes:
-    """What bodies are to stay out of, and where, seen from them.
+    """What bodies are to stay out of, and where, seen from them."""
 
-    Attributes
-    ----------
-    places : dict
-        Poses of the other body, by their digits.
-    gaps : dict
-        The least gap between the two there.
-    tried : set
-        Places with the hulls that the other body had: the same again would not help.
-    renewed : dict
-        How often a body was decomposed again.
-    given_up : set
-        Bodies that would have taken too many hulls.
-    """
-
-    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)
-    gaps: dict[_Wish, float] = field(default_factory=dict)
-    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)
-    renewed: Counter[int] = field(default_factory=Counter)
+    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)  # poses of the other, by their digits
+    gaps: dict[_Wish, float] = field(default_factory=dict)  # the least between the two there
+    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)  # the same again would not help
+    renewed: Counter[int] = field(default_factory=Counter)  # how often a body was decomposed again
     given_up: set[int] = field(default_factory=set)
 
     def add(self, wish: _Wish, poses: Sequence[FloatArray]) -> bool:

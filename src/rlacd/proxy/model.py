@@ -30,9 +30,6 @@ SIMPLE_FIRST = 2 * HALF_THICKNESS
 """The hulls of a proxy's parts are simplified within this first: they have to grow anyway. Grown hulls are simplified
 within half of it: noise gives them many corners."""
 
-MOST_PIECES = 16
-"""Pieces that a part is cut into, about, to stay out of meshes: those of links that turn inside each other are many."""
-
 MOST_CUTS = 2
 """How often a part is cut on the solid: hulls of its pieces may grow to cover the surface until they fail again."""
 
@@ -141,8 +138,7 @@ class Lift:
         """Cut a part of the solid; the second time with room for its pieces' hulls to grow."""
         part, tighter = failing.on_solid, 1 - failing.cuts * self.proxy.margin(self.goal)
         tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
-        most = math.inf if self.goal.avoided is None else MOST_PIECES
-        new = cut_and_merge(tree, self.goal.scaled(tighter), self.run, most=most).parts
+        new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
         cuts = failing.cuts + 1
         return [_Lifted(part.hull, part, True, cuts) for part in new] or [replace(failing, cuts=cuts)]
 

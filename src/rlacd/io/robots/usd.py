@@ -31,21 +31,13 @@ SERVER = "rlacd.io.robots.usd_layer:rewrite"
 class Stage(Robot):
     """A USD stage, by the schemas of UsdPhysics.
 
-    Attributes
-    ----------
-    nodes
-        For each mesh that collides its ``path``, its ``scale`` [3] and ``pose`` (4 rows of 4) on the stage, the path of
-        the rigid ``body`` it belongs to, if any, and its ``body_pose``; ``kind``, equal for those that may become one
-        solid, or None.
-    prims
-        The places there of the meshes of each collider.
-    joints
-        The two bodies that each joint connects.
+    A node is a mesh that collides: its ``path``, its ``scale`` [3] and ``pose`` (4 rows of 4) on the stage, the path of
+    the rigid ``body`` it belongs to, if any, and its ``body_pose``; ``kind``, equal for what may become one solid.
     """
 
     nodes: Sequence[Mapping[str, Any]]
-    prims: Mapping[Collider, Sequence[int]]
-    joints: Sequence[tuple[str, str]]
+    prims: Mapping[Collider, Sequence[int]]  # which nodes are its meshes
+    joints: Sequence[tuple[str, str]]  # the bodies that each connects
 
     def motion(self, samples: int, seed: int) -> Motion:
         """See `Robot`; a stage is looked at as it stands."""

@@ -259,11 +259,13 @@ def _filter(stage: Any, pairs: Sequence[tuple[str, str]], hulls: Mapping[Any, li
     """Let pairs of bodies not collide; of meshes without a body, their hulls."""
     from pxr import UsdPhysics
 
-    for one, other in pairs:
-        bodies = sorted(map(stage.GetPrimAtPath, (one, other)), key=lambda prim: prim.GetPath() in hulls)
-        api = UsdPhysics.FilteredPairsAPI.Apply(bodies[0])
-        for path in hulls.get(bodies[1].GetPath(), [bodies[1].GetPath()]):
-            api.CreateFilteredPairsRel().AddTarget(path)
+    for pair in pairs:
+        first, second = sorted(
+            map(stage.GetPrimAtPath, pair), key=lambda prim: not prim.HasAPI(UsdPhysics.RigidBodyAPI)
+        )
+        named = [second.GetPath()] if second.HasAPI(UsdPhysics.RigidBodyAPI) else hulls[second.GetPath()]
+        for path in named:
+            UsdPhysics.FilteredPairsAPI.Apply(first).CreateFilteredPairsRel().AddTarget(path)
 
 
 def _mass(points: Any, faces: Any, scale: list[float]) -> dict[str, Any]:
