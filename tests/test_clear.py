@@ -196,7 +196,7 @@ def test_without_the_extra_a_warning_says_that_nothing_was_checked(arm: Path, mo
 def test_what_is_not_for_a_kind_of_file_is_refused(arm: Path, tmp_path: Path) -> None:
     with pytest.raises(OptionError, match=r"srdf .* is for a URDF"):
         rlacd.rewrite_robot(arm, arm.with_name("out.xml"), srdf=tmp_path / "a.srdf")
-    with pytest.raises(OptionError, match=r"exclude .* is for MJCF"):
+    with pytest.raises(OptionError, match=r"exclude .* is for MJCF and USD"):
         rlacd.rewrite_robot(fork_and_lug().write(tmp_path), tmp_path / "out.urdf", exclude="always")
     with pytest.raises(OptionError, match="some of adjacent, always, never"):
         rlacd.rewrite_robot(arm, arm.with_name("out.xml"), exclude="sometimes")

@@ -339,11 +339,12 @@ def _clear_of_each_other(
         surfaces = [Surface(hull.vertices, hull.faces) for hull in hulls]
         return Body(names[number], Surface(mesh.vertices, mesh.faces), surfaces)
 
-    def redo(number: int, obstacles: Sequence[Obstacle]) -> list[Surface]:
+    def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
         own = replace(options[number], avoid=(*options[number].avoid, *obstacles))
         reached = find_parts(meshes[number], own, run)
-        if run.stopped_by is None:
-            done[number] = finish(reached, run)
+        if run.stopped_by is not None or len(reached.parts) > most:
+            return None
+        done[number] = finish(reached, run)
         return body(number).hulls
 
     bodies, rest = [body(number) for number in range(len(names))], at_rest(names)

@@ -173,9 +173,9 @@ def test_faces_that_are_holes_are_left_out(tmp_path: Path) -> None:
     mesh.CreateHoleIndicesAttr([12, 0])
     UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
     stage.Save()
-    colliders = read_stage(tmp_path / "box.usda")
-    for faces in (load_mesh(tmp_path / "box.usda").faces, np.frombuffer(colliders.blobs["0.faces"], np.int64)):
-        assert np.array_equal(faces.reshape(-1, 3), BOX.faces[1:])
+    (body,) = read_stage(tmp_path / "box.usda").bodies
+    for faces in (load_mesh(tmp_path / "box.usda").faces, body.mesh().faces):
+        assert np.array_equal(faces, BOX.faces[1:])
     mesh.GetHoleIndicesAttr().Set([13])
     stage.Save()
     with pytest.raises(MeshFileError, match="holes at /box"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -160,7 +161,7 @@ def test_the_server_tells_contacts_of_joint_positions_only(press: ViewServer) ->
 @pytest.mark.slow
 def test_the_report_of_a_robot_shows_the_worst_positions(robots: Path, browser: Any, tmp_path: Path) -> None:
     done = rlacd.rewrite_robot(robots / "press.urdf", tmp_path / "out.urdf", samples=60, quality="fast", threads=1)
-    report = done.save_report(tmp_path / "press.html")
+    report = pickle.loads(pickle.dumps(done)).save_report(tmp_path / "press.html")
     with open_page(browser) as watched:
         page = watched.page
         page.goto(report.as_uri())

@@ -31,26 +31,22 @@ MOST_OFFENCES = 24
 OFF_HULLS = 10 * TOUCH
 """How far hulls stay off those of other bodies, a share of the size of all: single precision moves them less."""
 
-Redo = Callable[[int, Sequence[Obstacle]], Sequence[Surface]]
-"""Decomposes the body of this number again, clear of obstacles in its frame."""
+MOST_GROWTH, SPARE = 3, 24
+"""Hulls of all bodies after mending: so many times those before, or so many more. Links that turn inside each other
+with a hundredth of the tolerance between them take sixty each, which costs more in every step than it is worth."""
+
+Redo = Callable[[int, Sequence[Obstacle], int], Sequence[Surface] | None]
+"""Decomposes the body of this number again, clear of obstacles in its frame; None if that takes more hulls."""
 
 
 @dataclass(frozen=True)
 class Cleared:
-    """What became of bodies.
-
-    Attributes
-    ----------
-    bodies : list of Body
-    touching : dict
-        As `check` finds it for the new hulls.
-    mended : tuple of (int, int)
-        Pairs whose hulls touched though they did not, and no longer do.
-    """
+    """What became of bodies."""
 
     bodies: list[Body]
-    touching: dict[tuple[int, int], Touching]
-    mended: tuple[tuple[int, int], ...] = ()
+    touching: dict[tuple[int, int], Touching]  # as `check` finds it for the new hulls
+    mended: tuple[tuple[int, int], ...] = ()  # pairs whose hulls touched though they did not, and no longer do
+    given_up: frozenset[int] = frozenset()  # bodies that would have taken too many hulls
 
 
 class _Wish(NamedTuple):
@@ -63,24 +59,13 @@ class _Wish(NamedTuple):
 
 @dataclass
 class _Wishes:
-    """What bodies are to stay out of, and where, seen from them.
+    """What bodies are to stay out of, and where, seen from them."""
 
-    Attributes
-    ----------
-    places : dict
-        Poses of the other body, by their digits.
-    gaps : dict
-        The least gap between the two there.
-    tried : set
-        Places with the hulls that the other body had: the same again would not help.
-    renewed : dict
-        How often a body was decomposed again.
-    """
-
-    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)
-    gaps: dict[_Wish, float] = field(default_factory=dict)
-    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)
-    renewed: Counter[int] = field(default_factory=Counter)
+    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)  # poses of the other, by their digits
+    gaps: dict[_Wish, float] = field(default_factory=dict)  # the least between the two there
+    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)  # the same again would not help
+    renewed: Counter[int] = field(default_factory=Counter)  # how often a body was decomposed again
+    given_up: set[int] = field(default_factory=set)
 
     def add(self, wish: _Wish, poses: Sequence[FloatArray]) -> bool:
         """Add places; returns whether any is new."""
@@ -105,6 +90,8 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
     bodies = list(bodies)
     touching = check(bodies, motion)
     first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
+    count = sum(len(body.hulls) for body in bodies)
+    most = max(MOST_GROWTH * count, count + SPARE)
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
         again = _wish(bodies, wrong, wishes)
@@ -112,13 +99,19 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
             break
         for body in sorted(again):
             obstacles = [_obstacle(bodies, wish, wishes, motion) for wish in wishes.places if wish.body == body]
-            bodies[body] = bodies[body].with_hulls(redo(body, obstacles))
+            others = sum(len(other.hulls) for other in bodies) - len(bodies[body].hulls)
+            hulls = redo(body, obstacles, most - others)
+            if hulls is None:
+                wishes.given_up.add(body)
+                continue
+            bodies[body] = bodies[body].with_hulls(hulls)
             wishes.renewed[body] += 1
+        again -= wishes.given_up
         near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
         renewed = check(bodies, motion, near)
         touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
     mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
-    return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))
+    return Cleared(bodies, dict(sorted(touching.items())), tuple(mended), frozenset(wishes.given_up))
 
 
 def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:
@@ -134,7 +127,9 @@ def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes
         if ours and theirs:
             ways.insert(0, _Wish(i, j, True))
         for wish in ways:
-            if wish.body not in fixed and wish.other not in again and wishes.add(wish, poses[wish.body]):
+            if wish.body in wishes.given_up or wish.body in fixed or wish.other in again:
+                continue
+            if wishes.add(wish, poses[wish.body]):
                 again.add(wish.body)
                 fixed.add(wish.other)
                 if wish.of_mesh:

@@ -68,42 +68,20 @@ class Joint:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where links are.
-
-    Attributes
-    ----------
-    links : tuple of str
-    poses : float64 [S, L, 4, 4]
-        From each link's frame to one that all share; the first sample is at rest.
-    joints : tuple of Joint
-        Those that move: first those that are sampled, then those that others drive.
-    positions : float64 [S, J]
-        Of the sampled joints, in radians or the unit of length.
-    adjacent : frozenset of (int, int)
-        Links that one joint connects, or several without one of these links between; the lower number first.
-    warnings : tuple of str
-        What a joint's range was taken to be, where the file does not say.
-    fixed : frozenset of int
-        Links that never move: of two of them, hulls may touch.
-    carrier : tuple of int
-        For each link, the number in the file of the last below it, or of itself, whose joint was looked at only at
-        rest; -1 if there is none.
-    carried : tuple of int
-        For each link, the joint that carries it; -1 if none does.
-    place : callable
-        Takes positions [J] and returns the poses of links [L, 4, 4]; None if nothing moves.
-    """
+    """Where links are."""
 
     links: tuple[str, ...]
-    poses: FloatArray
-    joints: tuple[Joint, ...] = ()
-    positions: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
+    poses: FloatArray  # [S, L, 4, 4], from each link's frame to one that all share; the first sample is at rest
+    joints: tuple[Joint, ...] = ()  # those that move: first those that are sampled, then those that others drive
+    positions: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))  # [S, J], of the sampled joints
+    # Links that one joint connects, or several without one of these links between, the lower number first; joints that
+    # were looked at only at rest do not count, since elsewhere links may be far from each other.
     adjacent: frozenset[tuple[int, int]] = frozenset()
-    warnings: tuple[str, ...] = ()
-    fixed: frozenset[int] = frozenset()
-    carrier: tuple[int, ...] = ()
-    carried: tuple[int, ...] = ()
-    place: Callable[[FloatArray], FloatArray] | None = None
+    warnings: tuple[str, ...] = ()  # what a joint's range was taken to be, where the file does not say
+    fixed: frozenset[int] = frozenset()  # links that never move: of two of them, hulls may touch
+    carrier: tuple[int, ...] = ()  # the last link below, or itself, whose joint was looked at only at rest; -1: none
+    carried: tuple[int, ...] = ()  # the joint that carries it; -1 if none does
+    place: Callable[[FloatArray], FloatArray] | None = None  # takes positions [J], returns poses [L, 4, 4]
 
     @property
     def sampled(self) -> tuple[Joint, ...]:
@@ -123,11 +101,18 @@ class Motion:
         return "at " + ", ".join(f"{joint.name} = {value:.4g}" for joint, value in moved)
 
 
-def at_rest(links: Sequence[str], fixed: Collection[str] = (), poses: Sequence[FloatArray] | None = None) -> Motion:
+def at_rest(
+    links: Sequence[str],
+    fixed: Collection[str] = (),
+    poses: Sequence[FloatArray] | None = None,
+    adjacent: Collection[tuple[int, int]] = (),
+) -> Motion:
     """Links that are looked at where they are, by default in one frame; those that are fixed may touch each other."""
     where = np.tile(np.eye(4), (1, len(links), 1, 1)) if poses is None else np.stack(poses)[None]
     places = frozenset(i for i, name in enumerate(links) if name in fixed)
-    return Motion(tuple(links), where, fixed=places, carrier=tuple(range(len(links))), carried=(-1,) * len(links))
+    carrier, carried = tuple(range(len(links))), (-1,) * len(links)
+    near = frozenset(adjacent)
+    return Motion(tuple(links), where, adjacent=near, fixed=places, carrier=carrier, carried=carried)
 
 
 class _Read(NamedTuple):
@@ -187,7 +172,7 @@ def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] |
         poses[:, chosen],
         tuple(joints),
         positions,
-        _adjacent(file.parents, chosen),
+        _adjacent({link: parent for link, parent in file.parents.items() if link not in held}, chosen),
         tuple(file.said),
         carrier=_last(file.parents, held, chosen),
         carried=_last(file.parents, last, chosen),

@@ -25,38 +25,20 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Offence:
-    """Hulls that touch though the bodies do not, at one place of one body seen from the other.
+    """Hulls that touch though the bodies do not, at one place of one body seen from the other."""
 
-    Attributes
-    ----------
-    sample : int
-        The first at which the bodies are so.
-    pose : float64 [4, 4]
-        From the second body's frame to the first's.
-    depth : float
-        How far the hulls would have to move apart.
-    """
-
-    sample: int
-    pose: FloatArray
-    depth: float
+    sample: int  # the first at which the bodies are so
+    pose: FloatArray  # [4, 4], from the second body's frame to the first's
+    depth: float  # how far the hulls would have to move apart
 
 
 @dataclass(frozen=True)
 class Touching:
-    """What two bodies do at all samples.
+    """What two bodies do at all samples."""
 
-    Attributes
-    ----------
-    hulls, meshes : bool [S]
-        Whether their hulls touch, and whether they themselves do.
-    offences : tuple of Offence
-        The deepest first.
-    """
-
-    hulls: BoolArray
-    meshes: BoolArray
-    offences: tuple[Offence, ...]
+    hulls: BoolArray  # [S], whether their hulls touch
+    meshes: BoolArray  # [S], whether they themselves do
+    offences: tuple[Offence, ...]  # the deepest first
 
     @property
     def is_wrong(self) -> bool:
@@ -72,20 +54,9 @@ class Touching:
 def check(
     bodies: Sequence[Body], motion: Motion, pairs: Collection[tuple[int, int]] | None = None
 ) -> dict[tuple[int, int], Touching]:
-    """Find the bodies whose hulls touch at some sample, by the numbers of the two, the lower first.
+    """Find the bodies, in the order of the motion's links, whose hulls touch at some sample; of some pairs, or of all.
 
-    Parameters
-    ----------
-    bodies : sequence of Body
-        In the order of the motion's links.
-    motion : Motion
-    pairs : collection of (int, int), optional
-        Look at no others.
-
-    Raises
-    ------
-    MissingExtraError
-        The extra ``clear`` is not installed.
+    Returns what they do by the numbers of the two, the lower first; raises MissingExtraError without the extra `clear`.
     """
     get_coal()
     filled = np.array([i for i, body in enumerate(bodies) if body.is_filled])

@@ -108,9 +108,13 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     if not all(result.report["complete"] for result in results.values()):
         return Checked(results, ["Links were not checked against each other: the work was stopped before."])
 
-    def redo(number: int, obstacles: Sequence[Obstacle]) -> list[Surface]:
-        results.update(_clear_of(obstacles, bodies[number], results, each[number]))
-        return _moving(bodies[number], results).hulls
+    def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
+        again = results | _clear_of(obstacles, bodies[number], results, each[number])
+        hulls = _moving(bodies[number], again).hulls
+        if len(hulls) > most:
+            return None
+        results.update(again)
+        return hulls
 
     try:
         motion, said = _motion(robot, asked.samples, options.get("seed") or 0)

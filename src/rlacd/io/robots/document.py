@@ -28,18 +28,10 @@ HullFiles = Mapping[Collider, Sequence[str]]
 
 @dataclass
 class Files:
-    """The files that a description refers to, each read once.
-
-    Attributes
-    ----------
-    references
-        Resolves their names.
-    said
-        Of meshes: the file's name and a sentence about it.
-    """
+    """The files that a description refers to, each read once."""
 
     references: References
-    said: list[tuple[str, str, float]] = field(default_factory=list)
+    said: list[tuple[str, str, float]] = field(default_factory=list)  # a file's name, a sentence about it, how bad
     _known: dict[Path, MeshFile] = field(default_factory=dict)
 
     def mesh(self, reference: str, folder: Path) -> MeshFile:
@@ -62,21 +54,11 @@ class Files:
 
 @dataclass(frozen=True, eq=False)
 class Document(Robot):
-    """A robot whose file is XML.
-
-    Attributes
-    ----------
-    root
-        Its root.
-    references
-        Resolves the files that it refers to.
-    others
-        Paths of other files that it names relative to its folder: they break if the result goes elsewhere.
-    """
+    """A robot whose file is XML."""
 
     root: Element
     references: References
-    others: list[str]
+    others: list[str]  # files that it names relative to its folder: they break if the result goes elsewhere
 
     kind = ""
 

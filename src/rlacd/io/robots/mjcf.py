@@ -50,21 +50,13 @@ LEAST_VOLUME = 1e-14
 
 @dataclass(frozen=True)
 class _Geom:
-    """A geom that collides as a mesh.
-
-    Attributes
-    ----------
-    attributes
-        Its own, completed by those of its classes.
-    is_seen, is_weighed
-        Whether it is the only one to show its mesh; whether the mass of its body follows from it.
-    """
+    """A geom that collides as a mesh."""
 
     element: Element
-    attributes: Mapping[str, str]
+    attributes: Mapping[str, str]  # its own, completed by those of its classes
     mesh: str
-    is_seen: bool
-    is_weighed: bool
+    is_seen: bool  # whether it is the only one to show its mesh
+    is_weighed: bool  # whether the mass of its body follows from it
 
     @property
     def is_kept(self) -> bool:

@@ -41,24 +41,12 @@ class MeshFile:
 
 @dataclass(frozen=True, eq=False)
 class PlacedMesh:
-    """A mesh where an element of the description puts it.
-
-    Attributes
-    ----------
-    file
-        Its triangles.
-    scale
-        The factors ``[3]`` on its coordinates, after `reference`; negative ones mirror.
-    to_body
-        Pose ``[4, 4]`` of the element in the frame of its body.
-    reference
-        Rigid transform ``[4, 4]`` of the file's coordinates before all else (``refpos``, ``refquat`` of MJCF).
-    """
+    """A mesh where an element of the description puts it."""
 
     file: MeshFile
-    scale: FloatArray
-    to_body: FloatArray
-    reference: FloatArray
+    scale: FloatArray  # [3], on its coordinates, after `reference`; negative factors mirror
+    to_body: FloatArray  # [4, 4], the pose of the element in the frame of its body
+    reference: FloatArray  # [4, 4], of its coordinates before all else (``refpos``, ``refquat`` of MJCF)
 
     @property
     def key(self) -> Hashable:
@@ -127,24 +115,12 @@ Results = Mapping[Collider, Decomposition]
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """What moves as one.
-
-    Attributes
-    ----------
-    name
-        As in the file.
-    pose
-        ``[4, 4]``, where it stands with all joints at zero.
-    colliders
-        Its solids; their meshes are those that are replaced.
-    is_world
-        Whether it belongs to no body, and never moves.
-    """
+    """What moves as one, by its name in the file."""
 
     name: str
-    pose: FloatArray
-    colliders: Sequence[Collider]
-    is_world: bool = False
+    pose: FloatArray  # [4, 4], with all joints at zero
+    colliders: Sequence[Collider]  # their meshes are those that are replaced
+    is_world: bool = False  # whether it belongs to no body, and never moves
 
     def mesh(self) -> trimesh.Trimesh:
         """All meshes that are replaced, in the body's frame."""
@@ -166,25 +142,12 @@ class Written(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Robot(ABC):
-    """A robot file that has been read.
-
-    Attributes
-    ----------
-    source : Path
-    bodies : list of Body
-        Those with meshes to decompose, in the order of the file.
-    warnings : list of str
-        What of it is left unchanged, and why.
-    metres : float
-        Its unit of length.
-    up : {"x", "y", "z"}
-        The axis that points up.
-    """
+    """A robot file that has been read."""
 
     source: Path
-    bodies: list[Body]
-    warnings: list[str]
-    metres: float
+    bodies: list[Body]  # those with meshes to decompose, in the order of the file
+    warnings: list[str]  # what of it is left unchanged, and why
+    metres: float  # its unit of length
     up: Axis
 
     @abstractmethod
@@ -224,10 +187,7 @@ class Robot(ABC):
 def colliders(body: str, uses: Sequence[tuple[Hashable | None, PlacedMesh, Found]]) -> dict[Collider, list[Found]]:
     """Join the meshes of a body that are of the same kind; those of the kind None, and clouds of points, stay apart.
 
-    Returns
-    -------
-    dict of Collider to list
-        What was found for its meshes, in their order.
+    Returns what was found for the meshes of each collider, in their order.
     """
     kinds: dict[Hashable, list[tuple[PlacedMesh, Found]]] = {}
     for index, (kind, placed, use) in enumerate(uses):

@@ -31,23 +31,19 @@ SERVER = "rlacd.io.robots.usd_layer:rewrite"
 class Stage(Robot):
     """A USD stage, by the schemas of UsdPhysics.
 
-    Attributes
-    ----------
-    nodes
-        For each mesh that collides its ``path``, its ``scale`` [3] and ``pose`` (4 rows of 4) on the stage, the path of
-        the rigid ``body`` it belongs to, if any, and its ``body_pose``; ``kind``, equal for those that may become one
-        solid, or None.
-    prims
-        The places there of the meshes of each collider.
+    A node is a mesh that collides: its ``path``, its ``scale`` [3] and ``pose`` (4 rows of 4) on the stage, the path of
+    the rigid ``body`` it belongs to, if any, and its ``body_pose``; ``kind``, equal for what may become one solid.
     """
 
     nodes: Sequence[Mapping[str, Any]]
-    prims: Mapping[Collider, Sequence[int]]
+    prims: Mapping[Collider, Sequence[int]]  # which nodes are its meshes
+    joints: Sequence[tuple[str, str]]  # the bodies that each connects
 
     def motion(self, samples: int, seed: int) -> Motion:
         """See `Robot`; a stage is looked at as it stands."""
-        fixed = [body.name for body in self.bodies if body.is_world]
-        return at_rest([body.name for body in self.bodies], fixed, [body.pose for body in self.bodies])
+        names, fixed = [body.name for body in self.bodies], [body.name for body in self.bodies if body.is_world]
+        places = [sorted(map(names.index, ends)) for ends in self.joints if {*ends} <= {*names}]
+        return at_rest(names, fixed, [body.pose for body in self.bodies], [(one, other) for one, other in places])
 
     def write(
         self, place: Path, results: Results, pairs: Sequence[LinkPair] | None, asked: RobotOptions, *, whole: bool
@@ -68,7 +64,8 @@ class Stage(Robot):
                 masses[self.nodes[index]["path"]] = result.report["mass"] if len(places) == 1 else _mass(placed)
         sublayer = None if whole else Path(os.path.relpath(self.source, place.absolute().parent)).as_posix()
         given = {"path": str(self.source), "sublayer": sublayer, "ending": place.suffix.lower().lstrip(".")}
-        how = {"masses": masses, "counts": counts, "leads": leads}
+        filtered = [(pair.first, pair.second) for pair in pairs or () if pair.kind in asked.exclude]
+        how = {"masses": masses, "counts": counts, "leads": leads, "filtered": filtered}
         answer = answer_of(SERVER, self.source, "USD", {**given, **how}, hulls)
         write_file(place, answer.blobs["layer"])
         names = {collider: [*map(hull_name, range(len(result)))] for collider, result in results.items()}
@@ -112,7 +109,7 @@ def read_stage(source: Path, *, apart: bool = False) -> Stage:
         bodies.append(Body(name, pose, [*joined], not first["body"]))
         prims |= joined
     warnings, metres, up = (answer.values[name] for name in ("warnings", "metres", "up"))
-    return Stage(source, bodies, warnings, metres, up, nodes, prims)
+    return Stage(source, bodies, warnings, metres, up, nodes, prims, answer.values["joints"])
 
 
 def _rigid(rows: Sequence[float]) -> FloatArray:
