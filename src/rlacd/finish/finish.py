@@ -120,7 +120,7 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
         shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
         if shaped is not part:
             return shaped
-        share = SHARE_OF_OVERHANG if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
+        share = SHARE_OF_DEVIATION if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
         near = within_reach(sides, part.hull, share * goal.overhang)
         part = kept_within(part, near, goal)
         return limit_part(
@@ -189,7 +189,7 @@ def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
     return hull if hull is not None and keeps(hull, limits) else plain_hull(points, limits)
 
 
-SHARE_OF_OVERHANG = 0.2
+SHARE_OF_DEVIATION = 0.2
 """A simple hull grows by at most this share of what the criterion allows beyond a part."""
 
 GROWTHS_TRIED = 3
@@ -204,7 +204,7 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
     """
     if not math.isfinite(criterion.overhang):
         return part
-    growth = SHARE_OF_OVERHANG * criterion.overhang
+    growth = SHARE_OF_DEVIATION * criterion.overhang
     for _ in range(GROWTHS_TRIED):
         simple = limited_part(part, limits, tolerance=growth, sides=sides)
         if simple is part:

@@ -40,7 +40,7 @@ BETWEEN = 0.02
 """Share of its radius that a passage kept open may lose more: its walls are kept off balls that are apart."""
 
 WIDER = 1.05
-"""What is so many times as wide is no longer the same passage, such as the room between two holes on one axis."""
+"""What is so many times as wide is no longer the same passage, such as the space between two holes on one axis."""
 
 _NEIGHBOURS = 8
 
@@ -139,8 +139,8 @@ def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface,
     active = np.flatnonzero(goes)
     while len(active):
         at = starts[active] + (gone[active] / lengths[active])[:, None] * ways[active]
-        room = surface.distance(at, threads)
-        goes[active] = (room > larger[active] / 2) & (room < WIDER * larger[active])
+        space = surface.distance(at, threads)
+        goes[active] = (space > larger[active] / 2) & (space < WIDER * larger[active])
         gone[active] += larger[active] / 4
         active = active[goes[active] & (gone[active] < lengths[active])]
     return goes

@@ -27,7 +27,7 @@ whichever is less, times this. On either side of a seam in a bent solid, neither
 
 @dataclass(frozen=True)
 class ShortSeam:
-    """A seam where the criterion left no room.
+    """A seam that the criterion keeps from overlapping enough.
 
     Attributes
     ----------

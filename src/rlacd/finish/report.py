@@ -82,16 +82,16 @@ def make_report(
     errors = None if is_cover else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
-    apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
+    distances = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
         weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
         entered = criterion.avoided and criterion.avoided.found(parts, solid.frame.scale)
-        missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
+        missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
-        warnings += _unmeasured(solid) if has_surface and apart is None else []
+        warnings += _unmeasured(solid) if has_surface and distances is None else []
         warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
-        warnings += too_narrow(apart.narrowed, reached, run.stopped_by is not None) if apart else []
+        warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
         warnings += warnings_of(entered, _why_entered(run)) if entered else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
@@ -106,8 +106,11 @@ def make_report(
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
             **({"avoid": entered} if entered else {}),
-            "hausdorff": {"over": apart and apart.over, "under": apart and max(apart.under, apart.left_out.distance)},
-            "passages": apart and apart.narrowed.passages,
+            "hausdorff": {
+                "over": distances and distances.over,
+                "under": distances and max(distances.under, distances.left_out.distance),
+            },
+            "passages": distances and distances.narrowed.passages,
             "scale": solid.frame.scale,
             "mass": mass_of(*concatenated(weighed), solid.frame).as_plain(),
             "repair": [{**vars(body)} for body in solid.bodies],
@@ -369,23 +372,24 @@ def _early_end(run: Run) -> list[str]:
     ]
 
 
-def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
+def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
     """What hulls fall short of; how far they reach out is known where the criterion has said so (`exceeds`)."""
     options, scale = reached.options, reached.solid.frame.scale
     unit, in_words = length_unit({"options": vars(options), "scale": scale})
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
-    if apart is not None and apart.under > COVERAGE_TOLERANCE:
+    if distances is not None and distances.under > COVERAGE_TOLERANCE:
         sentences.append(
-            f"Some of the input's surface lies up to {apart.under / unit:.4g} ({in_words}) outside the hulls, farthest "
-            f"near {apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
+            f"Some of the input's surface lies up to {distances.under / unit:.4g} ({in_words}) outside the hulls, "
+            f"farthest near {distances.under_at}: repair dropped what it could not make solid (see `deviation` in "
+            "`repair`)."
         )
-    sentences += apart.left_out.said if apart is not None else []
-    if apart is not None and not exceeds and apart.over > reached.goal.overhang + COVERAGE_TOLERANCE:
+    sentences += distances.left_out.said if distances is not None else []
+    if distances is not None and not exceeds and distances.over > reached.goal.overhang + COVERAGE_TOLERANCE:
         sentences.append(
-            f"The hulls reach {apart.over / unit:.4g} ({in_words}) beyond the input's surface, more than the "
-            f"threshold, farthest near {apart.over_at}: {_why_beyond(reached.solid, options)}."
+            f"The hulls reach {distances.over / unit:.4g} ({in_words}) beyond the input's surface, more than the "
+            f"threshold, farthest near {distances.over_at}: {_why_beyond(reached.solid, options)}."
         )
     return sentences
 

@@ -67,7 +67,7 @@ def merge_parts(
     return alive if solid is None else _Merging(alive, _Bridged(criterion, run, solid), run).united()
 
 
-def merge_lifted(
+def merge_transferred(
     parts: Sequence[Part],
     proxy: Component,
     rehearsal: Criterion,

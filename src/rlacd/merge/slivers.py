@@ -1,4 +1,4 @@
-"""Slivers: thin hulls shaved off by cuts, dropped if the other hulls stand in for them."""
+"""Slivers: thin hulls that cuts leave, dropped if the other hulls cover them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLIVER_LOSS = 2 * HALF_THICKNESS
 
 
 def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | None = None) -> list[Part]:
-    """Drop slivers and films that the other hulls stand in for; all others stay, such as those of thin solids.
+    """Drop slivers that the other hulls cover; all others stay, such as those of thin solids.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ SIMPLE: Literal["simple"] = "simple"
 FAST: Literal["fast"] = "fast"
 
 RESOLUTIONS = (20, 400)
-"""The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
+"""The grid that repair looks for voids on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
 onto the surface folds over itself; more than 400 would take over 4 GB."""
 
 GAPS = (0.005, 0.15)

@@ -45,7 +45,7 @@ class Learned:
     Parameters
     ----------
     sweeps : SweepCache, optional
-        Provides the 150 planes and those of concave edges.
+        Provides the 150 planes and those of reflex edges.
     scale : float, optional
         The criterion's length in the frame, if it has one.
     """
@@ -57,7 +57,7 @@ class Learned:
         self._greedy = Greedy("hull-sum", sweeps=self._sweeps)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
+        """Choose the plane to cut a component by; None if every candidate misses it or leaves a sliver."""
         excess = max(component.hull.volume - component.volume, 0.0)
         wide = SIMPLE * (self._scale or TYPICAL_LENGTH)
         if excess < wide * wide * wide:

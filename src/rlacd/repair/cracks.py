@@ -69,7 +69,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: Int64Array, tolerance: f
     Returns the faces ``[G, 3]``, split ones replaced by several, and ``[G]`` the old face each comes from.
     """
     edges = Edges.of(faces, len(vertices))
-    is_free = edges.valence == 1
+    is_free = edges.face_count == 1
     halfedge = np.flatnonzero(is_free[edges.of_halfedge])
     # One edge per face and round, so that the pieces of a face do not depend on each other.
     _, first = np.unique(halfedge // 3, return_index=True)
@@ -123,5 +123,5 @@ def _on_edges(
 
 def free_edges(faces: Int64Array, edges: Edges) -> Int64Array:
     """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them."""
-    face, corner = np.divmod(np.flatnonzero((edges.valence == 1)[edges.of_halfedge]), 3)
+    face, corner = np.divmod(np.flatnonzero((edges.face_count == 1)[edges.of_halfedge]), 3)
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)

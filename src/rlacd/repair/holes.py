@@ -192,7 +192,7 @@ class _Caps:
         no_cap = np.zeros(int(some.sum()), dtype=bool)
         kept = first_of_doubled(faces, len(soup.vertices))
         # Where more than two faces met before, which of them continue each other is a guess: caps did not cause that.
-        sure = whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2)
+        sure = whole & ~rims.flap & ~soup.at_edges(soup.edges.face_count > 2)
         before = ~whole & (False if soup.trusted is None else soup.trusted)
         trusted = np.concatenate([sure | before, ~no_cap])
         flap = np.concatenate([rims.flap, no_cap])[kept]
@@ -210,7 +210,7 @@ class _Caps:
             has_inside[one] = not is_tangle(SurfaceQuery(closed.vertices, outward))
         return has_inside
 
-    def by_room(self) -> BoolArray:
+    def by_hidden_caps(self) -> BoolArray:
         """Return ``[bodies]`` the bodies with caps that may lead where they do only because nothing can reach them."""
         hole = self._hole_of[self._on]
         far = np.flatnonzero((self._distance > self._gap) & ~self._is_reached)
@@ -230,7 +230,7 @@ class _Caps:
 
 def may_have_holes(state: State) -> bool:
     """Whether bodies have free edges, and may be closed."""
-    free = int((state.soup.edges.valence == 1).sum())
+    free = int((state.soup.edges.face_count == 1).sum())
     return 0 < free <= MOST_FREE_EDGES and state.wanted.open_bodies != "thin"
 
 
@@ -246,7 +246,7 @@ def close_holes(state: State) -> None:
     if (useful != chosen).any():
         closed, _ = caps.added(useful)
     state.note(caps.bodies_of(useful), "capped")
-    state.by_room |= useful & caps.by_room()
+    state.by_hidden_caps |= useful & caps.by_hidden_caps()
     state.holes = caps.described(useful)
     if useful.any():
         state.soup = closed

@@ -10,7 +10,7 @@ import numpy as np
 from rlacd._native import components, face_areas, long_normals, poll_stop
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.hull import TOLERANCE
-from rlacd.solid.topology import NO_FILM, Edges, Sides, has_marked, is_balanced, marked, sides_of
+from rlacd.solid.topology import NO_AREA, Edges, Sides, has_marked, is_balanced, marked, sides_of
 
 FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
@@ -57,8 +57,8 @@ class Soup:
         """Areas of the faces [F]."""
         return face_areas(self.vertices, self.faces)
 
-    def at_valence(self, marked: BoolArray) -> BoolArray:
-        """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
+    def at_edges(self, marked: BoolArray) -> BoolArray:
+        """Return ``[F]`` whether a face has a marked edge, given ``[E]`` marks."""
         return has_marked(marked, self.edges.of_halfedge.reshape(-1, 3))
 
     @cached_property
@@ -71,7 +71,7 @@ class Soup:
     def sheet_share(self, bodies: int, flap: BoolArray | bool = False) -> FloatArray:
         """Return ``[bodies]`` the share of the area of each body that has no inside and is no flap."""
         sheet = np.bincount(self.body, self.area * (self.sides.sheet & ~np.asarray(flap)), bodies)
-        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_FILM)
+        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
         return share
 
     def in_patches(self) -> Soup:
@@ -81,7 +81,7 @@ class Soup:
         others, or face both ways, no vertex would be left to give it thickness.
         """
         halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
-        halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
+        halfedge = halfedge[self.edges.face_count[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
         away = [across(self.vertices, self.faces, some) for some in halfedge.T]
         poll_stop()
         halfedge = halfedge[dots(*away) < _FOLD]
@@ -121,11 +121,11 @@ def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> S
     flap
         Faces ``[F]`` that need no inside.
     """
-    is_crowded = soup.edges.valence > 2
+    is_crowded = soup.edges.face_count > 2
     if not is_crowded.any():
         return soup
-    crowded = marked(soup.body[soup.at_valence(is_crowded)], bodies)
-    uneven = marked(soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))], bodies)
+    crowded = marked(soup.body[soup.at_edges(is_crowded)], bodies)
+    uneven = marked(soup.body[soup.at_edges(~is_balanced(soup.faces, soup.edges))], bodies)
     if not (crowded & ~uneven).any():
         return soup
     share = soup.sheet_share(bodies, flap)

@@ -32,7 +32,7 @@ _WELDS = (2e-5, 5e-4)
 _NAMED = 5
 
 # Share of the solid's volume that filled cavities have to have for a word: crevices where walls meet, up to hundreds in
-# a mesh, have up to 0.0005, rooms from 0.0024.
+# a mesh, have up to 0.0005, voids from 0.0024.
 _CREVICES = 1e-3
 
 
@@ -101,7 +101,7 @@ class State:
         Their union, but for cavities.
     cavities : Cavities
         Those of them that windings bound and that were filled.
-    by_room, is_tangled : bool [bodies]
+    by_hidden_caps, is_tangled : bool [bodies]
         Whether a body was capped only because nothing can reach the caps; was built from the place of its faces alone.
     holes : list of Hole
     warnings : list of str
@@ -124,7 +124,7 @@ class State:
         self.parts: list[Piece] = []
         self.solid: Shape = Manifold()
         self.cavities = Cavities()
-        self.by_room, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
+        self.by_hidden_caps, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
         self.holes: list[Hole] = []
         self.warnings: list[str] = []
         self._asked: tuple[Shape, SurfaceQuery] | None = None

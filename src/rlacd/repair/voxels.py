@@ -39,7 +39,7 @@ class Reach:
         ``[X, Y, Z]``, cells the ball can cover.
     occupied
         ``[X, Y, Z]``, cells of the surface.
-    room
+    void
         ``[X, Y, Z]``, label of every connected set of cells where the ball fits but which it cannot enter; 0 elsewhere.
     """
 
@@ -48,7 +48,7 @@ class Reach:
     radius: float
     reached: BoolArray
     occupied: BoolArray
-    room: Int64Array
+    void: Int64Array
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: Int64Array, radius: float, resolution: int) -> Reach:
@@ -61,8 +61,8 @@ class Reach:
         label = label_cells(~_grown(occupied, radius / pitch)).reshape(occupied.shape)
         outside = label == label[0, 0, 0]
         reached = _grown(outside, radius / pitch)
-        room = np.where(outside, 0, label)
-        return cls(origin, pitch, radius, reached, occupied, room)
+        void = np.where(outside, 0, label)
+        return cls(origin, pitch, radius, reached, occupied, void)
 
     def covers(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
@@ -71,34 +71,34 @@ class Reach:
     def _cells(self, points: FloatArray) -> Int64Array:
         """The cells ``[N, 3]`` of points, nearest ones for those off the grid."""
         cells = np.rint((points - self.origin) / self.pitch).astype(np.int64)
-        return np.clip(cells, 0, np.array(self.room.shape) - 1)
+        return np.clip(cells, 0, np.array(self.void.shape) - 1)
 
-    def rooms_outside(self, rooms: Int64Array, solid: SurfaceQuery) -> Int64Array:
-        """Return the cells ``[N]`` of some rooms that lie outside a solid: of every fourth one along each axis."""
-        cells = np.flatnonzero(np.isin(self.room, rooms))
-        at = np.stack(np.unravel_index(cells, self.room.shape), axis=1)
+    def voids_outside(self, voids: Int64Array, solid: SurfaceQuery) -> Int64Array:
+        """Return the cells ``[N]`` of some voids that lie outside a solid: of every fourth one along each axis."""
+        cells = np.flatnonzero(np.isin(self.void, voids))
+        at = np.stack(np.unravel_index(cells, self.void.shape), axis=1)
         some = at.sum(axis=1) % 4 == 0  # some in each layer of cells
         outside: Int64Array = cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
         return outside
 
-    def volumes(self, rooms: Int64Array) -> FloatArray:
-        """Return the volume of the cells of each of some rooms: where the ball's centre may be."""
-        return np.asarray(np.bincount(self.room.ravel())[rooms] * self.pitch**3)
+    def volumes(self, voids: Int64Array) -> FloatArray:
+        """Return the volume of the cells of each of some voids: where the ball's centre may be."""
+        return np.asarray(np.bincount(self.void.ravel())[voids] * self.pitch**3)
 
     def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
         """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
-        reached = self.reached.astype(self.room.dtype)
+        reached = self.reached.astype(self.void.dtype)
         return np.asarray(nearest_labels(reached, self._cells(points), depth / self.pitch + ROUNDING) == 0)
 
-    def rooms_near(self, points: FloatArray) -> Int64Array:
-        """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
-        return nearest_labels(self.room, self._cells(points), self.radius / self.pitch + 2 + ROUNDING)
+    def voids_near(self, points: FloatArray) -> Int64Array:
+        """Return ``[N]`` the label of a void whose walls may contain each point, 0 for none."""
+        return nearest_labels(self.void, self._cells(points), self.radius / self.pitch + 2 + ROUNDING)
 
     def around_cells(self, cells: Int64Array) -> BoolArray:
-        """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
-        mark = np.zeros(self.room.shape, dtype=bool)
+        """Return ``[X, Y, Z]`` the unreachable cells of voids at and between some cells, and of their walls there."""
+        mark = np.zeros(self.void.shape, dtype=bool)
         mark.ravel()[cells] = True
-        between = _grown(mark, 2) & (self.room > 0)
+        between = _grown(mark, 2) & (self.void > 0)
         return _grown(between, self.radius / self.pitch + 2) & ~self.reached
 
     def around_points(self, points: FloatArray) -> BoolArray:

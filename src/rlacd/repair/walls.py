@@ -71,7 +71,7 @@ def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup
 
     state.note(soup.body[solid[back] & wall], "reoriented")
     state.note(soup.body[~wall & ~sheet], "outer skin")
-    state.note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
+    state.note(soup.body[soup.at_edges(soup.edges.face_count > 2)], "outer skin")
     state.note(soup.body[sheet], "slab")
     poll_stop()
     mixed = np.bincount(soup.body[sheet], minlength=state.bodies) > 0
@@ -106,7 +106,7 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     built, turned inside out, and the union joins them.
     """
     vertices, faces, label = _skin(soup, keep, flat)
-    if not (soup.edges.valence > 2).any():
+    if not (soup.edges.face_count > 2).any():
         return vertices, faces, label
     sides, bodies = soup.sides, int(soup.body.max()) + 1
     pinched = marked(soup.body_of_side[label[on_repeated_edge(faces, len(vertices))]], bodies)
@@ -116,9 +116,9 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     if not pinched.any():
         return vertices, faces, label
     at = pinched[soup.body_of_side]
-    rooms = at & (sides.volume < -FLAT * sides.area)
-    vertices, faces, label = _skin(soup, (keep & ~at) | rooms, flat)
-    faces[rooms[label]] = faces[rooms[label]][:, ::-1]
+    insides = at & (sides.volume < -FLAT * sides.area)
+    vertices, faces, label = _skin(soup, (keep & ~at) | insides, flat)
+    faces[insides[label]] = faces[insides[label]][:, ::-1]
     return vertices, faces, label
 
 

@@ -125,7 +125,7 @@ def picture_bytes(
         ("pulled apart", _hull_bodies(decomposition, up, pull=0.55), None),
     ]
     if decomposition.balls is not None:
-        some = apart(decomposition.balls)
+        some = disjoint(decomposition.balls)
         spheres = Spheres(some.centres @ TO_Z_UP[up].T, some.radii, BALL_COLOR)
         panels.insert(2, ("some of the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
     columns, rows = (3, 1) if len(panels) == 3 else (2, 2)
@@ -152,7 +152,7 @@ def picture_bytes(
     return encoded.getvalue()
 
 
-def apart(balls: Balls) -> Balls:
+def disjoint(balls: Balls) -> Balls:
     """Choose balls that do not overlap, smallest first; all of them together would look like one cloud."""
     left, shown = np.argsort(balls.radii, kind="stable"), list[int]()
     while len(left):
