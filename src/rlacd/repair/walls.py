@@ -13,7 +13,7 @@ import numpy as np
 
 from rlacd._native import angles, components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
-from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
+from rlacd.repair.soup import FLAT, Soup, face_normals, on_repeated_edge
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
@@ -210,33 +210,26 @@ def _rims(
 def _fan_offsets(
     vertices: FloatArray, corners: Int64Array, back: BoolArray, thin: BoolArray, fan: Int64Array, number: int
 ) -> FloatArray:
-    """Direction ``[number, 3]`` that leaves every face of a fan at speed 1; zero for fans without a sheet."""
-    a, b, c = (vertices[corners[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
-    normal[back] *= -1
-    poll_stop()
-    weight = np.empty((len(corners), 3))
-    for i, (p, q, r) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
-        poll_stop()
-        along, across = q - p, r - p
-        weight[:, i] = angles(np.linalg.norm(np.cross(along, across), axis=1), dots(along, across))
-    poll_stop()
-    corner_normal = np.repeat(normal, 3, axis=0)
-    total = np.stack([np.bincount(fan, weight.ravel() * corner_normal[:, k], number) for k in range(3)], axis=1)
-    poll_stop()
+    """Return the way ``[number, 3]`` of each fan that leads 1 off all its faces; zero for fans without a sheet."""
+    normal = np.repeat(face_normals(vertices, corners) * np.where(back, -1, 1)[:, None], 3, axis=0)
+    angle = _corner_angles(vertices[corners])
+    total = np.stack([np.bincount(fan, angle * normal[:, k], number) for k in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean = np.where(length > 1e-6, total / np.maximum(length, np.finfo(float).tiny), 0.0)
     # The miter: far enough along the mean normal to be at distance 1 from the steepest face that has a direction.
-    cosine = np.where(weight.ravel() > 0, dots(corner_normal, mean[fan]), 1.0)
-    poll_stop()
     steepest = np.ones(number)
-    np.minimum.at(steepest, fan, cosine)
-    poll_stop()
+    np.minimum.at(steepest, fan, np.where(angle > 0, dots(normal, mean[fan]), 1.0))
     sees_sheet = np.bincount(fan, np.repeat(thin, 3), number) > 0
-    speed = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
-    offsets: FloatArray = mean * speed[:, None]
-    return offsets
+    far = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
+    return np.asarray(mean * far[:, None])
+
+
+def _corner_angles(points: FloatArray) -> FloatArray:
+    """Return ``[3 F]`` the angle at each corner of triangles ``[F, 3, 3]``."""
+    poll_stop()
+    along, across = (np.roll(points, -k, axis=1) - points for k in (1, 2))
+    sines = np.linalg.norm(np.cross(along, across), axis=2)
+    return np.asarray(angles(sines.ravel(), dots(along, across).ravel()))
 
 
 def _rim_caps(
