@@ -19,15 +19,15 @@ CUT_SLIVER = HALF_THICKNESS
 """No point of a sliver that is dropped is farther than this from the solid across its cut."""
 
 MANY_COMPONENTS = 1000
-"""With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
-and another into tens (research/learning.md). So a second one is tried, ..."""
+"""With more components than this, a second policy is tried: there are solids that one policy breaks into thousands of
+parts and another into tens (research/learning.md)."""
 
 FAR_FEWER = 1 / 2
-"""... and abandoned at this share of the components, or of the work done for them."""
+"""The second policy is abandoned at this share of the components, or of the work done for them."""
 
 
 class CutCache:
-    """Pieces and sides of components, each cut made once: several trees of cuts share their first levels."""
+    """Pieces and sides of components, computed once for all trees of cuts: they share their first levels."""
 
     def __init__(self) -> None:
         self._pieces: dict[Component, list[Component]] = {}
@@ -76,7 +76,7 @@ class CutTree:
     cache : CutCache, optional
         Cuts shared with other trees.
     second : Policy, optional
-        Takes over if it leaves far fewer components than thousands.
+        Takes over if it leaves far fewer components (`FAR_FEWER`).
     """
 
     def __init__(

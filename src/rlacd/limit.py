@@ -22,24 +22,24 @@ from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import NO_SIDES
 
 TIMES_PARTS = 2
-"""Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
+"""Cutting on for fewer corners leaves at most so many times the parts."""
 
 SHARE_OF_WORK, LEAST_SHARE = 0.3, 0.4e6
-"""Of the work done so far, that cutting on may take, and as much again to merge; at least so many units."""
+"""Share of the work done so far that cutting on may take, and merging as much again; at least so many units."""
 
 PIECES = 2
-"""Cutting on stops at so many times the pieces that may be added: merging leaves half of them."""
+"""Cutting on stops at so many times the parts that may be added: merging leaves half of them."""
 
 NEARLY_EQUAL = 1.02
-"""Errors are measured to a fiftieth of the threshold."""
+"""Errors within this factor are equal: they are measured to a fiftieth of the threshold."""
 
 
 def cut_to_limits(
     parts: list[Part], limited: LimitedCriterion, solid: Component, options: Options, run: Run
 ) -> list[Part]:
-    """Cut parts whose hulls do not meet the criterion only because of the limits.
+    """Cut on parts whose hulls fail the criterion only because of the limits.
 
-    First for hulls that stay in the sides on which the solid rests, then for the others: the criterion comes first.
+    First with hulls kept within the sides on which the solid rests, then without: the criterion comes first.
     """
     most = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf))
     for goal in (limited, replace(limited, sides=NO_SIDES)) if len(limited.sides) else (limited,):
@@ -102,12 +102,12 @@ def at_most(
     limited: LimitedCriterion,
     run: Run,
 ) -> list[Part]:
-    """Get the parts, at most so many, whose largest error is least.
+    """Get at most `most` parts whose largest error is least.
 
     Parameters
     ----------
     most : int
-        With a larger one, more of the same states are looked at, so the error is never larger.
+        A larger number allows more of the same states, so the error is never larger.
     decompositions : iterable of sequence of Part
         Under coarser and coarser goals. Their parts are united two at a time, and every state on the way counts.
     unite : callable

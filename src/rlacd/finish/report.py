@@ -38,19 +38,18 @@ NEARLY = RESOLVED
 """No point of the input should lie farther outside the hulls than this."""
 
 MOST_HOLES = 1000
-"""Holes that a report lists."""
+"""Most holes that a report lists."""
 
 
 class Missed(NamedTuple):
-    """Places that hulls do not hold: how far the farthest of them is, and a sentence if that is worth one."""
+    """Points outside the hulls: the farthest distance, and a sentence if it is worth one."""
 
     distance: float
     said: list[str]
 
 
 class _Distances(NamedTuple):
-    """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body; and
-    the passages that they narrow. What was left out is by itself."""
+    """How far hulls reach beyond the input and fall short of it, and where most; narrowed passages; input left out."""
 
     over: float
     under: float
@@ -71,11 +70,11 @@ def make_report(
     ----------
     reached : Reached
     parts : sequence of Part
-        Those that were reached, cleaned.
+        The cleaned parts.
     hulls : sequence of trimesh.Trimesh
-        Theirs, in the input's unit.
+        The hulls of the parts, in the input's unit.
     seams : Seams or None
-        What became of the seams, if hulls were to overlap.
+        The seams, if hulls were to overlap.
     """
     solid, options, criterion = reached.solid, reached.options, reached.goal
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
@@ -180,7 +179,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
     reports : sequence of (str, dict)
         Each node's name and report.
     scale : float
-        Frame units of the scene per unit of the input: its lengths are in that frame.
+        Frame units of the scene per unit of the input; joint lengths are in that frame.
     """
     each = [(name, report, scale / report["scale"]) for name, report in reports]
     first, counted = reports[0][1], ("parts", "faces", "vertices")
@@ -247,7 +246,7 @@ def _farthest(lengths: Sequence[tuple[float | None, float]]) -> float | None:
 
 
 def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Of all nodes; parts are numbered through."""
+    """Join the seams of all nodes, with parts numbered through."""
     seams = [report["overlap"] for report in reports]
     if any(one["seams"] is None for one in seams):
         return dict.fromkeys(seams[0])
@@ -261,7 +260,7 @@ def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _joint_avoid(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Of all nodes: a mesh that several enter is listed for each."""
+    """Join what hulls of all nodes enter: a mesh entered by several nodes is listed for each."""
     crossed = dict.fromkeys(name for one in each for name in one["crossed"])
     return {"crossed": [*crossed], "entered": [entry for one in each for entry in one["entered"]]}
 
@@ -289,7 +288,7 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
 
 
 def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) -> Missed:
-    """How far outside the hulls the corners ``[N, 3]`` lie that only faces with corners in one place have."""
+    """How far outside the hulls points ``[N, 3]`` lie that belong only to faces without an area."""
     if len(points) == 0:
         return Missed(0.0, [])
     distance = hull_union(hulls, run.threads).distance(np.ascontiguousarray(points), run.threads)
@@ -373,7 +372,7 @@ def _early_end(run: Run) -> list[str]:
 
 
 def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
-    """What hulls fall short of; how far they reach out is known where the criterion has said so (`exceeds`)."""
+    """Say what hulls miss, and how far they reach out unless the criterion has reported that (`exceeds`)."""
     options, scale = reached.options, reached.solid.frame.scale
     unit, in_words = length_unit({"options": vars(options), "scale": scale})
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
@@ -395,7 +394,7 @@ def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: 
 
 
 def _why_beyond(solid: Solid, options: Options) -> str:
-    """What repair did that moves hulls away from the surface, and what leaves it undone."""
+    """Name the repairs that move hulls away from the surface, and the options that avoid them."""
     filled = any(body.step in ("capped", "wrapped") for body in solid.bodies)
     if filled and options.open != "thin":
         return "repair closed openings (see `repair`), which --open thin leaves open"

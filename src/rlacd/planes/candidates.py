@@ -88,7 +88,7 @@ def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) 
 
 
 def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
-    """Those of `axis_and_principal` and of `concave_edge_planes`, one direction a plane."""
+    """The planes of `axis_and_principal` and `concave_edge_planes`, each with its own direction."""
     normals, offsets = _planes(component, per_axis, edges)
     return Candidates(normals, offsets[:, None])
 

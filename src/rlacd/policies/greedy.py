@@ -52,7 +52,7 @@ class Greedy:
     sweeps : SweepCache, optional
         Provides the planes, to share them with other policies.
     planes : callable, optional
-        Provides them in its place.
+        Provides the planes in place of `sweeps`.
     """
 
     def __init__(

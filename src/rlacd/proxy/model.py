@@ -1,7 +1,7 @@
 """What is cut in place of a solid: the solid itself, or a simpler copy of a dense one, whose parts are carried back.
 
-Every hull takes in what of the solid's surface it misses (`Filling.uncovered`), so that together the hulls cover the
-solid; its part is then the solid clipped to it. Each part is tested on the solid itself; one that fails is cut there.
+Hulls grow to take in the surface of the solid that they miss (`Filling.uncovered`), so that together they cover the
+solid. The part of a hull is the solid clipped to it; a part that fails the criterion is cut on the solid.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ SIMPLE_FIRST = 2 * HALF_THICKNESS
 within half of it: noise gives them many corners."""
 
 MOST_CUTS = 2
-"""How often a part is cut on the solid: hulls of its pieces may grow to cover the surface until they fail again."""
+"""Most cuts of a part on the solid: hulls of its pieces may grow to cover the surface until they fail again."""
 
 
 @dataclass
 class _Transferred:
-    """A part on its way to the solid.
+    """A part being transferred to the solid.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class _Transferred:
 
 @dataclass(frozen=True)
 class Transfer:
-    """Carries parts of a proxy to the solid.
+    """Transfers parts of a proxy to the solid.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Transfer:
     run: Run
 
     def __call__(self, parts: Sequence[Part], mend: bool = True) -> tuple[list[Part], float]:
-        """Get the parts of the solid, which cover it, and the factor of the goal that they meet: 1 if not mended.
+        """Get parts that cover the solid, and the factor of the goal that they meet: 1 if not mended.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class Transfer:
             return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)], 1.0
 
     def _covering(self, parts: Sequence[Part]) -> list[Hull]:
-        """Get hulls that cover the solid, without the time to simplify them."""
+        """Get hulls that cover the solid, when there is no time to simplify them."""
         moved = [_Transferred(part.hull) for part in parts]
         self._cover(moved, simple=False)
         return [each.hull for each in moved]
@@ -135,7 +135,7 @@ class Transfer:
         return [each.on_solid for each in moved], max([1.0, *(error / self.goal.overhang for error in errors)])
 
     def _cut_again(self, failing: _Transferred) -> list[_Transferred]:
-        """Cut a part of the solid; the second time with room for its pieces' hulls to grow."""
+        """Cut a part on the solid; the second time to a tighter goal, as the hulls of its pieces may grow."""
         part, tighter = failing.on_solid, 1 - failing.cuts * self.proxy.margin(self.goal)
         tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
         new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
@@ -179,7 +179,7 @@ class Transfer:
         return [i for i in asked if not moved[i].is_met]
 
     def _met(self, moved: _Transferred) -> Part | None:
-        """Its part if that meets the goal, if need be with the convex hull of the part in place of a simple one."""
+        """Its part of the solid if that meets the goal, with its simple hull or else its exact one."""
         part = moved.on_solid
         if self.goal.is_met(part):
             return part
@@ -218,7 +218,7 @@ class Model:
         return self.solid if self.proxy is None else self.proxy.component
 
     def tighter(self, goal: Criterion, factor: float = 1.0) -> Criterion:
-        """Get what parts of the model have to meet so that those of the solid meet the goal, scaled by a factor."""
+        """Get the tighter goal for parts of the model, so that those of the solid meet the goal, scaled by a factor."""
         if self.proxy is None:
             return goal if factor == 1.0 else goal.scaled(factor)
         return goal.alone.scaled(factor - self.proxy.margin(goal))
@@ -226,13 +226,13 @@ class Model:
     def lift(
         self, parts: list[Part], goal: Criterion, factor: float, policy: Policy, run: Run, *, merge: bool
     ) -> list[Part]:
-        """Carry parts of the model to the solid, where they meet the goal, scaled by a factor."""
+        """Transfer parts of the model to the solid, where they meet the goal, scaled by a factor."""
         assert self.proxy is not None
         scaled = goal if factor == 1.0 else goal.scaled(factor)
         with run.stage("lift"):
             transfer = Transfer(self.solid, self.proxy, scaled, policy, run)
             parts, worst = transfer(parts, mend=run.stopped_by is None)
-            if merge and run.stopped_by is None:  # the margin may have kept some apart, and fewer may fail no more
+            if merge and run.stopped_by is None:  # the margin may have kept some from merging
                 transfer = replace(transfer, goal=scaled.scaled(worst))
                 looser = transfer.goal.alone.scaled(1 + self.proxy.margin(goal))
                 parts = merge_transferred(parts, self.component, looser, transfer.confirmed, run)

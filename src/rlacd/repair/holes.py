@@ -30,15 +30,15 @@ from rlacd.solid.solid import Hole
 from rlacd.solid.topology import first_of_doubled, marked
 
 HOLE, HOLE_SHARE = 0.1, 0.02
-"""A nearly closed body, with holes of at most this share of its area, is closed with caps up to this far away: a scan
-with a few holes is meant as a solid, a cup is not. The caps are reported."""
+"""A body is closed if its caps lead at most this far away from the surface and have at most this share of its area: a
+scan with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
-# The same share for the ends of a bar: it is four times as long as wide if one is open.
+# The same share for the one open end of a bar, which is then four times as long as wide.
 _END = 3 * HOLE_SHARE
 # A ring of more edges than this is a mouth, not damage, if its corners lie on a circle to this accuracy.
 _RING, _ROUND = 6, 0.1
-# The volume per area of a tube is half the radius of a hole at its end, to this accuracy; that of a bottle, which is
-# wider than its neck, is more, and that of folded sheets less.
+# A tube's volume per area is half the radius of the hole at its end, to this accuracy; a bottle, wider than its neck,
+# has more, and folded sheets have less.
 _TUBE = 2 * _ROUND
 # Limits on the edges of damage and on its share of the area of its body.
 _DAMAGE_EDGES, _DAMAGE = 2 * _RING, 5 * HOLE_SHARE
@@ -112,7 +112,7 @@ class _Hole:
 
 
 class _Caps:
-    """The holes of a soup, their caps, and points of these."""
+    """The holes of a soup, the caps that would close them, and points spread over the caps."""
 
     def __init__(self, state: State, rims: Rims) -> None:
         soup, bodies = state.soup, state.bodies
@@ -136,20 +136,20 @@ class _Caps:
     def _looked_at(self) -> tuple[FloatArray, BoolArray]:
         """The distance ``[N]`` of each point from the surface, and whether the ball can reach it."""
         gap, points = self._gap, self._points
-        # Corners lie on the surface, and how far points are matters only beyond a certain distance.
+        # Only points far from their face's corners are measured: corners lie on the surface.
         corners = self._soup.vertices[self._faces[self._on]]
         beyond = (np.linalg.norm(points[:, None] - corners, axis=2) > min(gap, HOLE)).all(axis=1)
         distance = np.zeros(len(points))
         distance[beyond] = self._state.surface.distance(points[beyond])
         is_reached = distance > gap
-        # If cavities are kept, everything connected to them is open.
+        # Where cavities are kept, balls start in them too, and every point counts as reached.
         if is_reached.any() and not self._fill and not self._state.wanted.keep_cavities:
             is_reached[is_reached] = self._state.reach.covers(points[is_reached])
         return distance, is_reached
 
     @cached_property
     def _volume(self) -> FloatArray:
-        """The volume ``[bodies]`` that all caps together would enclose, by the windings found."""
+        """The volume ``[bodies]`` that each body would enclose with all its caps."""
         soup, rims, own = self._soup, self._rims, self._body_of_hole[self._hole_of]
         sign = np.where(rims.inverted, -1, 1) * ~rims.flap
         volume = np.bincount(self._body, sign * signed_tetrahedra(soup.vertices, soup.faces), self._bodies)
@@ -208,7 +208,7 @@ class _Caps:
         owners = np.concatenate([np.where(whole, self._body, soup.body), own[some]])
         no_cap = np.zeros(int(some.sum()), dtype=bool)
         kept = first_of_doubled(faces, len(soup.vertices))
-        # Where more than two faces met before, which of them continue each other is a guess: caps did not cause that.
+        # Where more than two faces met without caps, which of them continue each other is a guess.
         sure = whole & ~rims.flap & ~soup.at_edges(soup.edges.face_count > 2)
         before = ~whole & (False if soup.trusted is None else soup.trusted)
         trusted = np.concatenate([sure | before, ~no_cap])
@@ -233,12 +233,12 @@ class _Caps:
         return marked(np.array(hidden, dtype=np.int64), self._bodies)
 
     def bodies_of(self, chosen: BoolArray) -> Int64Array:
-        """The bodies that belong to chosen ones ``[bodies]``: all that share a hole."""
+        """The numbers of all bodies that share a hole with a chosen one ``[bodies]``."""
         return np.flatnonzero(chosen[self._joined])
 
     def described(self, chosen: BoolArray) -> list[Hole]:
         """The holes of chosen bodies ``[bodies]``, and those of bodies to which caps would give an inside."""
-        said = chosen | (self._volume > self._gap * self._area)  # with less it is a leaf or cloth
+        said = chosen | (self._volume > self._gap * self._area)  # less is a leaf or cloth
         return [one.described(bool(chosen[one.body]), self._soup.vertices) for one in self.holes if said[one.body]]
 
 

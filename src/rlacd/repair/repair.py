@@ -46,7 +46,7 @@ from rlacd.solid.solid import BodyRepair, Solid
 from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, marked
 
 CELLS_ACROSS = 1.5
-"""Least radius of a ball, in cells of the grid that it rolls on."""
+"""Least radius of a ball, in cells of its grid."""
 
 
 def _always(state: State) -> bool:
@@ -103,13 +103,13 @@ STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (may_have_voids, fill_voids),
     (may_have_slits, fill_slits),
 )
-"""What is done, in this order, and when."""
+"""Conditions and actions of a repair, in their order."""
 
 AT_LAST: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (_is_nothing, _take_hull),
     (_always, _keep_lost),
 )
-"""What is done then, even if the bodies cross too often to be united."""
+"""The last ones, also where bodies cross too often to be united."""
 
 
 def repair(
@@ -128,7 +128,7 @@ def repair(
     mesh
         The loaded mesh.
     resolution
-        Cells along the longest side of the grid on which enclosed voids are searched.
+        Cells along the longest side of the grid on which voids are searched.
     open_bodies
         ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else it
         is a shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are
@@ -152,7 +152,7 @@ def repair(
     EmptyMeshError
         There are no points.
     Stopped
-        There is no time left: `rlacd.solid.cover` needs next to none.
+        The run ended before the repair; `rlacd.solid.cover` takes next to no time.
     """
     poll_stop()
     points, corners = compacted(mesh.vertices, mesh.faces) if len(mesh.faces) else (mesh.vertices, mesh.faces)

@@ -4,12 +4,12 @@ caps for these.
 Input: a soup. Output: its flaps, loops of vertices around its holes, and triangles that close these without new
 vertices; nothing is decided or changed here.
 
-Faces are mated across edges: if two share an edge, with each other; if more do, those that continue each other best.
-Faces connected by mates form a patch, and all faces of a patch are wound alike, whatever the file says. A small patch
-attached to others by edges that those mate without it is a flap, as is a flat one of any size with one loop around it:
-its free edges bound no hole. At a vertex where several holes meet, a loop turns from a free edge to the next one across
-the hole, so loops never run around existing faces. An island that touches its hole's rim at a vertex joins that hole's
-loop, which visits the vertex twice.
+Two faces that share an edge are mates; where more share it, those that continue each other best. Faces connected by
+mates form a patch, and all faces of a patch are wound alike, whatever the file says. A flap is a small patch attached
+to others at edges that these mate without it, or a flat patch within one loop: its free edges bound no hole. At a
+vertex where several holes meet, a loop turns from a free edge to the next one across the hole, so loops never run
+around existing faces. An island that touches its hole's rim at a vertex joins that hole's loop, which visits the vertex
+twice.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def rims_of(soup: Soup) -> Rims:
     weighted[flap] = 0
     rim = np.flatnonzero((mate < 0) & np.repeat(~flap, 3))
     tail, follower = _continued(soup, mate, rim, inverted[rim // 3], weighted)
-    # Faces between bodies are open at free edges; a hole is free all around, or nearly.
+    # Most edges around a hole are free: a loop of edges that touch other bodies bounds none.
     free = soup.edges.face_count[soup.edges.of_halfedge[rim]] == 1
     loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -93,7 +93,7 @@ def _continued(
 ) -> tuple[Int64Array, Int64Array]:
     """Return the vertex ``[N]`` where each free halfedge begins, seen from outside, and the one that continues it.
 
-    Halfedges of faces that are wound the other way are to be swapped; normals ``[F, 3]`` are as long as areas.
+    `swap` marks halfedges of inverted faces; the normals ``[F, 3]`` are as long as areas.
     """
     corners, following = soup.faces.ravel(), rim - rim % 3 + _NEXT[rim % 3]
     tail, head = corners[rim], corners[following]

@@ -16,13 +16,13 @@ FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
 
 FLAPS = 0.05
-"""A solid may have a few faces sticking out of it, up to this share of its area, beside flaps."""
+"""Greatest share of a solid's area that faces sticking out of it may have, flaps not counted."""
 
 MOST_UNITED = 4000
-"""Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead."""
+"""Most meshes united: more are composed, since uniting takes time for each even if none overlap."""
 
-# Sheets of a body are thickened one by one if there are at most so many, and they are no layers: of a body with more
-# faces than are united, each lies in the boxes of more than so many sheets, on average. Layers take minutes to unite.
+# Most sheets of a body that are thickened one by one; and average number of sheets in whose boxes a face lies above
+# which a body of more than `MOST_UNITED` faces is layers, which would take minutes to unite.
 MOST_PATCHES, _LAYERS = 100, 1.5
 # Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
 _FOLD = 0.94
@@ -30,7 +30,7 @@ _FOLD = 0.94
 
 @dataclass(frozen=True)
 class Soup:
-    """Faces during the repair steps; `body` numbers the body of each, from the input to the end.
+    """Faces during repair; `body` ``[F]`` is the body of each, by numbers that stay the same throughout.
 
     The windings of `trusted` faces have been checked and corrected. `known_edges` are those of the faces, if they have
     been collected already.

@@ -19,8 +19,7 @@ from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.frame import ROUNDING
 
 DEFAULT_GAP = 0.03
-"""Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units, by
-default."""
+"""Default radius of the ball, and greatest distance of a cap from the input's surface, in the frame."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Reach:
     occupied
         ``[X, Y, Z]``, cells of the surface.
     void
-        ``[X, Y, Z]``, label of every connected set of cells where the ball fits but which it cannot enter; 0 elsewhere.
+        ``[X, Y, Z]``, label of each void: connected cells where the ball fits but which it cannot enter; 0 elsewhere.
     """
 
     origin: FloatArray
@@ -74,7 +73,7 @@ class Reach:
         return np.clip(cells, 0, np.array(self.void.shape) - 1)
 
     def voids_outside(self, voids: Int64Array, solid: SurfaceQuery) -> Int64Array:
-        """Return the cells ``[N]`` of some voids that lie outside a solid: of every fourth one along each axis."""
+        """Return cells ``[N]`` of `voids` that lie outside a solid, of one in four cells."""
         cells = np.flatnonzero(np.isin(self.void, voids))
         at = np.stack(np.unravel_index(cells, self.void.shape), axis=1)
         some = at.sum(axis=1) % 4 == 0  # some in each layer of cells
@@ -82,7 +81,7 @@ class Reach:
         return outside
 
     def volumes(self, voids: Int64Array) -> FloatArray:
-        """Return the volume of the cells of each of some voids: where the ball's centre may be."""
+        """Return the volume of each of `voids`, as far as the ball's centre can be there."""
         return np.asarray(np.bincount(self.void.ravel())[voids] * self.pitch**3)
 
     def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
@@ -158,7 +157,7 @@ def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, Int64Array]:
     squares = []
     for axis in range(3):
         ends = np.diff(solid.astype(np.int8), axis=axis, prepend=0, append=0)
-        for outward in (-1, 1):  # what ends shows upwards, what begins downwards
+        for outward in (-1, 1):  # -1: the set ends there, so its squares face up; 1: it begins
             at = np.unravel_index(np.flatnonzero(ends == outward), ends.shape)
             corner, along = np.ravel_multi_index(at, shape), (steps[(axis + 1) % 3], steps[(axis + 2) % 3])
             loop = np.array([(0, 0), (1, 0), (1, 1), (0, 1)][::-outward]) @ along

@@ -1,4 +1,4 @@
-"""Solids from the faces of bodies: skins of what has an inside, exactly as it is, slabs of sheets.
+"""Solids from the faces of bodies: exact skins of what has an inside, slabs of sheets.
 
 Every fan of corners that meets at a vertex within one region of space becomes a separate vertex, so surfaces that
 merely touch at a vertex or an edge come apart. Fans on a sheet are moved away from it; the free edges of sheets get a
@@ -100,10 +100,10 @@ def skins(soup: Soup) -> list[Piece]:
 
 
 def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int64Array, Int64Array]:
-    """Build side components; those that pass an edge twice from their insides.
+    """Build side components; a skin that passes an edge twice is built from its insides.
 
-    Where parts touch along an edge, their common outer skin passes the edge twice. Their insides are simple: those are
-    built, turned inside out, and the union joins them.
+    Where parts touch along an edge, their common outer skin passes the edge twice. The skins of their insides do not:
+    these are built, turned around, and joined by the union.
     """
     vertices, faces, label = _skin(soup, keep, flat)
     if not (soup.edges.face_count > 2).any():
@@ -123,7 +123,7 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
 
 
 def _solid(soup: Soup, mesh: tuple[FloatArray, Int64Array], side: int, is_thin: bool) -> Shape:
-    """A side component as a solid; sheets narrower than they become thick can cross themselves and be inside out."""
+    """A side component as a solid; a sheet narrower than thick may come out inside out: it is built face by face."""
     solid = to_manifold(*mesh)
     if is_thin and volume_of(solid) <= 0:
         some = (soup.sides.label.reshape(-1, 2) == side).any(axis=1)
@@ -182,7 +182,7 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
 
 
 def _corners_at(faces: Int64Array, halfedge: Int64Array, slot: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """Slots of the corners of sides at the smaller and the larger end of halfedges, given where those of each begin."""
+    """Slots of the corners at the smaller and the larger end of halfedges; `slot` is the first of each side."""
     face, here = np.divmod(halfedge, 3)
     there = (here + 1) % 3
     forward = faces[face, here] < faces[face, there]

@@ -1,4 +1,4 @@
-"""Wraps: what only a ball can tell from a solid is closed on a grid and projected onto the surface."""
+"""Wraps: space that a ball cannot reach, closed on a grid and projected onto the surface."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
-# A void of an outer skin is filled from this share of the solid's volume on, slits up to it: voids in furniture have
-# 0.04 and more, crevices at most 0.0023.
+# Least share of the solid's volume of a void of an outer skin that is filled, and greatest of slits: voids in furniture
+# have 0.04 and more, crevices at most 0.0023.
 _SLIT_VOLUME = 0.01
-# A slit is filled from this depth on, up to this width (multiples of the gap): what is shallower needs no cut, and what
-# is wider leaves steps of the grid. Between caps it may be wider, as in a fridge whose bodies close each other. It may
-# have no volume, but this share of the surface has to go with the slits.
+# Least depth of a slit that is filled, and its greatest width, elsewhere and between caps, as in a fridge whose bodies
+# close each other (multiples of the gap): what is shallower needs no cut, and what is wider leaves steps of the grid.
+# Filling has to remove the last share of the surface.
 _DEEP, _BESIDE, _BETWEEN_CAPS, _BARED = 1.5, 1 / 16, 1 / 4, 0.004
-# Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
+# A union with more tunnels has slits full of bridges: noise leaves them where walls of dense bodies touch.
 _TUNNELS = 25
 # Where a filled void has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
 # the corpus with filled voids, those that meet this have 0.73 of the hulls without filling, the others 1.04.
@@ -112,7 +112,7 @@ def may_have_voids(state: State) -> bool:
 
 
 def _walls(state: State) -> tuple[Soup, Soup]:
-    """What may be walls of voids: sheets and caps that nothing can reach; outer skins."""
+    """Faces that may be walls of voids: sheets and caps that nothing can reach; outer skins."""
     sheets = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
     return state.of_bodies(sheets), state.of_bodies(state.has("outer skin") & ~state.is_tangled)
 
@@ -138,7 +138,7 @@ def fill_voids(state: State) -> None:
 
 
 def _voids_near(state: State, walls: Soup) -> tuple[Int64Array, Int64Array]:
-    """The voids that points of faces may be walls of, 0 for none, and the body of each point."""
+    """For points of faces, the void whose wall each may be, 0 for none, and its body."""
     if not state.reach.void.any() or not _is_large(state, walls):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
@@ -192,7 +192,7 @@ def _is_large(state: State, walls: Soup) -> bool:
 
 
 def _wrapped(state: State, soup: Soup) -> Manifold:
-    """What the ball cannot reach from outside some faces."""
+    """A solid of all that the ball cannot reach from outside some faces."""
     reach = Reach.of(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
     faces = SurfaceQuery(soup.vertices, soup.faces, state.surface.threads)
     return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)

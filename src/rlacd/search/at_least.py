@@ -60,7 +60,7 @@ def at_least(solid: Component, parts: Sequence[Part], reach: float, run: Run) ->
 
 
 def _spread(points: FloatArray, count: int) -> list[int]:
-    """Farthest-point sampling, from the point farthest from the centre on."""
+    """Choose `count` points by farthest-point sampling, from the one farthest from the centre on."""
     gaps = points - points.mean(axis=0)
     chosen = [int(dots(gaps, gaps).argmax())]
     away = np.full(len(points), np.inf)

@@ -26,7 +26,7 @@ INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
 BALLS_AT_ONCE = 256
-"""Of which all pairs are looked at when balls are chosen; the others are searched once for all chosen ones."""
+"""Balls compared pair by pair when balls are chosen; the others are compared with all chosen ones at once."""
 
 TO_Z_UP = {  # rows: the source of the drawing's x, y, z axes
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
