@@ -128,7 +128,7 @@ def test_only_the_common_area_of_two_faces_vanishes() -> None:
     assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(12), "coplanar faces on the same side stay"
 
 
-def test_parts_that_are_all_film_keep_their_surfaces() -> None:
+def test_parts_that_are_all_slivers_keep_their_surfaces() -> None:
     """Every face of such a part touches the other one: without a surface there would be nothing to measure."""
     below = Component(Manifold.cube((1, 1, 2e-9)))
     above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
@@ -152,10 +152,10 @@ def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
 
 
 def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
-    solid, shaving, sheet = slab(1), slab(0.001, 1), slab(0.001, 3)
+    solid, sliver, sheet = slab(1), slab(0.001, 1), slab(0.001, 3)
     with Run(1) as run:
-        assert drop_slivers([solid, shaving, sheet], run) == [solid, sheet]
-        assert drop_slivers([solid, shaving], run, suspects=[solid]) == [solid, shaving]
+        assert drop_slivers([solid, sliver, sheet], run) == [solid, sheet]
+        assert drop_slivers([solid, sliver], run, suspects=[solid]) == [solid, sliver]
         assert drop_slivers([sheet], run) == [sheet]
 
 

@@ -43,8 +43,7 @@ def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[st
     Raises
     ------
     OutputNameError
-        Something else is there that this batch does not own. The very same bytes are: they are left by a run that was
-        killed before it could say so.
+        A file with other bytes is there that this batch does not own. The same bytes are left by a killed run.
     """
     for name, data in files.items():
         if not owns(name) and store.read(name) not in (None, data):

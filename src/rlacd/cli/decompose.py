@@ -32,7 +32,7 @@ MESH = (
 )
 
 REPORTS = (".json", *PAGES)
-"""What the name of a report ends in."""
+"""Endings of reports."""
 
 FROM = "What stdin holds, if IN is -: obj, stl, ...  [default: told from its content]"
 
@@ -40,7 +40,7 @@ FIRST = (
     *("output", "threshold", "quality", "max_hulls", "max_vertices"),
     *("preset", "criterion", "picture", "report", "timeout"),
 )
-"""What people use first, and ``--help`` shows."""
+"""The options that ``--help`` shows; ``--help-all`` shows all."""
 
 
 def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
@@ -172,7 +172,7 @@ def _rewrite(
 
 
 def _stage(mesh: Path, wanted: OutputOptions, *, apart: bool) -> Any:
-    """A USD stage with meshes that collide, if it is to become another."""
+    """The USD stage with colliding meshes, if that is the input and the output is a stage too; else None."""
     if any(path.suffix.lower() not in (".usd", ".usda", ".usdc") for path in (mesh, Path(str(wanted.output)))):
         return None
     from rlacd.io.robots.read import robot_or_none

@@ -1,4 +1,4 @@
-"""A start without what is not needed: trimesh imports every library that it can make use of."""
+"""Quick imports: trimesh without the libraries that it imports only because they are installed."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ class DistanceScreen(Screen):
     ----------
     threshold : float
     weight : float
-        Of ``R_v``, which the volumes give; 0 for a distance.
+        Weight of ``R_v``, which the volumes give; 0 for a distance.
     """
 
     threshold: float
@@ -134,7 +134,7 @@ class Distance(Criterion):
 
     name: ClassVar[str] = "distance"
     weight: ClassVar[float] = 0.0
-    """Of ``R_v``."""
+    """The weight of ``R_v``."""
     eliminates: ClassVar[bool] = True
     """A third more time saves a tenth of the parts, and the parts around a hole need not be 8, 16 or 32."""
 
@@ -144,7 +144,7 @@ class Distance(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Distance:
-        """Warnings give lengths as the threshold was given: in the frame, or in the input's unit."""
+        """Make the criterion; its warnings give lengths in the threshold's unit: the frame's or the input's."""
         return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
     @property
@@ -176,7 +176,7 @@ class Distance(Criterion):
         return {"threshold": self.threshold, "per_part": errors, "max": worst}
 
     def error(self, part: Part) -> float:
-        """Upper end of what `measure` finds; at most the threshold if the part certainly meets it."""
+        """Upper bound of the error; at most the threshold if the part certainly meets it."""
         measured = self.measure(part, tolerance=self.threshold / 50).value[1]
         if not self.threshold < measured <= 1.02 * self.threshold:
             return measured

@@ -104,7 +104,7 @@ class Navigable(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Navigable:
-        """The space of a solid; without balls where there is no time to find it."""
+        """Make the space of a solid; it has no balls if there is no time to find them."""
         space = options.criterion
         assert isinstance(space, NavigableSpace)
         if run is None:
@@ -227,7 +227,7 @@ class Navigable(Criterion):
         return 0.0 if self._is_small(part) else self._deepest(part, 0.0)
 
     def scaled(self, factor: float) -> Navigable:
-        """Coarser: hulls may reach into the balls by so much that tolerance plus allowance grow by `factor`."""
+        """The coarser criterion: the depth that hulls may reach, tolerance plus allowance, grows by `factor`."""
         other = replace(self, allowance=max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance))
         vars(other)["_intrusions"] = self._intrusions  # the balls are the same
         return other

@@ -70,21 +70,21 @@ def merge_parts(
     return alive if solid is None else _Merging(alive, _Bridged(criterion, run, solid), run).united()
 
 
-def merge_lifted(
+def merge_transferred(
     parts: Sequence[Part],
     proxy: Component,
     rehearsal: Criterion,
     confirmed: Callable[[Hull], Part | None],
     run: Run,
 ) -> list[Part]:
-    """Unite pairs of parts that were carried from a proxy to a solid, if their joint hull is tight on both.
+    """Unite pairs of parts transferred from a proxy to a solid, if their joint hull is tight on both.
 
     Parameters
     ----------
     parts : sequence of Part
         They may overlap, and need not consist of components.
     proxy : Component
-        Most pairs are rejected here, quickly.
+        Rejects most pairs quickly.
     rehearsal : Criterion
         What the proxy clipped to a joint hull has to meet.
     confirmed : callable
@@ -102,7 +102,7 @@ class _Adjoining:
     run: Run
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
-        """Pairs of a new part and another that may be united: here those that the volume bound allows.
+        """Pairs of a new part and another that may be united, by a bound on volumes.
 
         Incomplete if the run's work runs out.
         """
@@ -116,7 +116,7 @@ class _Adjoining:
         return _priced(pairs[kept], (hulls - filled)[kept])
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, float]:
-        """Unite two parts if that meets the criterion; with the work of finding out."""
+        """Unite two parts if the union meets the criterion; also returns the work of deciding."""
         union, price = Part.glued(first, second), price_of_uniting(first, second)
         is_met = union.size > 0 and self.criterion.is_met(union)  # without faces: it could not be clipped
         return union if is_met else None, price
@@ -134,7 +134,7 @@ class _Bridged(_Adjoining):
     confirmed: Callable[[Hull], Part | None] | None = None
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
-        """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
+        """Pairs whose joint hulls the solid may fill well enough, by an early-out test."""
         screen, run = self.criterion.screen, self.run
         reach = np.inf if len(alive.parts) <= self.few else screen.reach
         pairs = alive.boxes.pairs(new, reach, across=True)
@@ -174,8 +174,8 @@ class _Merging:
         self._run = run
         self._origin = list(range(len(parts)))  # the number of the first piece
         self._queue: list[_Pair] = []
-        self._next: list[_Pair] = []  # the cheapest, in their order
-        self._begun: dict[_Pair, Begun[tuple[Part | None, float]]] = {}  # more than are needed
+        self._next: list[_Pair] = []  # cheapest first
+        self._begun: dict[_Pair, Begun[tuple[Part | None, float]]] = {}  # tests under way, begun ahead of need
 
     def united(self) -> list[Part]:
         """Unite pairs until none is left that may be united."""

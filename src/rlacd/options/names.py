@@ -13,7 +13,7 @@ PRIMITIVE_KINDS: tuple[PrimitiveKind, ...] = get_args(PrimitiveKind)
 """Simplest first: in this order engines collide them fastest."""
 
 EDGES = "+edges"
-"""Ends the name of a policy that also cuts at concave edges."""
+"""Ends the name of a policy that also cuts at reflex edges."""
 
 SCORES = ("hull-sum", "max-excess", "excess-norm")
 """What a greedy policy may order planes by."""

@@ -74,7 +74,7 @@ PRESETS: dict[str, Preset] = {
     "bullet": Preset("Bullet", 64, None, ".urdf"),
     "godot": Preset("Godot", 32, None, ".glb", "godot"),
 }
-"""By the word that ``preset=`` and ``--preset`` take."""
+"""The engines by the word that ``preset=`` and ``--preset`` take."""
 
 
 def find_preset(name: str) -> Preset:

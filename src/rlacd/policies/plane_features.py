@@ -30,7 +30,7 @@ def plane_features(
     Parameters
     ----------
     s : Sweep
-        Of 25 planes along each of 6 directions, followed by those of concave edges.
+        Of 25 planes along each of 6 directions, followed by those of reflex edges.
     valid : bool [K * M]
     hull, volume : float
         Of the component's hull and of the component.

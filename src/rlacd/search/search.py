@@ -24,7 +24,7 @@ TIMES_FIRST_PASS = 4.5
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 8e6
-"""Absolute limits on that limit, in units: about 0.15 and 8 seconds of one core."""
+"""Least and greatest limit on the work of a bounded search, in units: about 0.15 and 8 seconds of one core."""
 
 WORK_OF_A_STEP = 1e5
 """Where only the number of steps is limited, the work allowed for each: far more than most take."""
@@ -37,10 +37,10 @@ STARTS = ("excess-norm", "hull-sum")
 """Scores of the greedy policy for further passes over the whole solid, in turn, each among other planes."""
 
 ANOTHER_PASS = 1.5
-"""Another pass is abandoned when it exceeds this multiple of the work of the first, ..."""
+"""Another pass is abandoned when it exceeds this multiple of the work of the first."""
 
 HOPELESS = 5
-"""... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
+"""Another pass is abandoned when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
 IN_VAIN = 8
 """A search ends when so many starts in a row have found nothing better."""
@@ -185,7 +185,7 @@ class _Search:
     early, best : list of Part
         What ``fast`` ends with, and the best parts so far.
     gained : float
-        When they became so few, by `time.perf_counter`.
+        When the best parts last became fewer, by `time.perf_counter`.
     starts, steps, accepted : int
         Starts searched from, trials made and trials accepted.
     """
@@ -200,10 +200,10 @@ class _Search:
         self._most = HOPELESS * len(parts)
         self._passes = 1
         self._state: Neighbourhood | None = None
-        self._ahead = 0  # parts of that when each had been offered to others
+        self._ahead = 0  # number of its parts once each had been offered to others
 
     def go_on(self, most: float) -> None:
-        """Search until the run is over, `most` trials are made, or no fewer parts can do."""
+        """Search until the run is over, `most` trials are made, or parts are as few as the lower bound."""
         run, enough, in_vain = self._run, self._context.enough, 0
         while self.steps < most and not run.is_over and len(self.best) > enough() and in_vain < IN_VAIN:
             before = len(self.best)

@@ -123,7 +123,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer with a head also what is no HTTP, which the base class takes for a version without heads."""
+        """Send a head even if the request is no HTTP: the base class takes it for HTTP/0.9, which has no heads."""
         self.request_version = self.protocol_version
         super().send_error(code, message, explain)
 

@@ -60,7 +60,7 @@ def draw_curve(
 
 
 def _step(most: int) -> int:
-    """Between lines of the grid: 1, 2 or 5 times a power of ten, for at most six of them."""
+    """Spacing of at most six lines of the grid: 1, 2 or 5 times a power of ten."""
     power = 1
     while True:
         for step in (power, 2 * power, 5 * power):
