@@ -63,7 +63,7 @@ def make(
         The mesh cannot be used, or its hulls cannot be written.
     """
     with TemporaryDirectory(dir=staging) as folder:
-        stage = robot_or_none(mesh) if spec.ending in STAGES else None
+        stage = robot_or_none(mesh) if spec.ending in STAGES and mesh.suffix.lower() in STAGES else None
         if is_robot(mesh) or stage is not None:
             ending = mesh.suffix if stage is None else spec.ending
             facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)

@@ -16,7 +16,6 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import networkx
 import numpy as np
 
 from rlacd.errors import import_extra
@@ -221,6 +220,8 @@ def _last(parents: Mapping[int, int], what: Mapping[int, int], links: Sequence[i
 
 def _adjacent(parents: Mapping[int, int], chosen: Sequence[int]) -> frozenset[tuple[int, int]]:
     """Places of chosen links that one joint connects, or several across links that are not chosen."""
+    import networkx  # only robots need it
+
     graph, new = networkx.Graph(parents.items()), {link: place for place, link in enumerate(chosen)}
     between = networkx.connected_components(graph.subgraph([link for link in graph if link not in new]))
     joined = [*map(set, graph.edges), *({near for link in part for near in graph[link]} for part in between)]
