@@ -16,7 +16,7 @@ from benchmarks.engines import ENGINES, STEP, Hulls
 from benchmarks.film import film
 from benchmarks.runner import Bench
 from benchmarks.simulate import get_mujoco
-from benchmarks.store import Row, Task, load_hulls
+from benchmarks.store import Row, Task, load_hulls, load_row, save_row
 from benchmarks.tables import Page, Table
 from benchmarks.tasks import SHAPES, TASKS, mesh_of
 from rlacd.cli.exit_codes import exit_codes
@@ -49,7 +49,7 @@ def app(out: Path, shown: Path | None) -> None:
             mesh.export(out / "shapes" / f"{name}.ply")
         bench = Bench(out / "shapes", [f"{name}.ply" for name in SHAPES], out, say=click.echo)
         ways = decompositions(bench)
-        rows = {way: [row for task in TASKS for row in simulated(bench, task, exact, ways[way])] for way in ways}
+        rows = {way: [row for task in TASKS for row in simulated(bench, task, way, exact, ways[way])] for way in ways}
         about = f"Ten tasks, {len(SHAPES)} shapes, steps of {1000 * STEP:g} ms; {machine()}, one thread."
         write(Page("Physics", [about, summary(ways, rows), details(rows)]), out, "physics")
         if shown is not None:
@@ -79,17 +79,28 @@ def decompositions(bench: Bench) -> dict[str, Hulls]:
     return found
 
 
-def simulated(bench: Bench, task: str, exact: Mapping[str, trimesh.Trimesh], hulls: Hulls) -> list[Row]:
+def simulated(bench: Bench, task: str, way: str, exact: Mapping[str, trimesh.Trimesh], hulls: Hulls) -> list[Row]:
     """A row for each engine: whether the task was passed, the deepest contact in metres, steps per CPU second."""
     rows = []
     for engine, world_of in ENGINES.items():
-        scene = TASKS[task]()
-        world = world_of(scene, exact, hulls)
-        steps, began = round(scene.seconds / STEP), time.process_time()
-        deepest = max(world.step() for _ in range(steps))
-        rate = steps / (time.process_time() - began)
-        rows.append({"task": task, "engine": engine, "passed": scene.passed(world), "deepest": deepest, "rate": rate})
-        bench.say(str(rows[-1]))
+        name = Task(task, f"{way} in {engine}", sum(map(len, hulls.values())))
+        row = load_row(bench.folder, name)
+        if row is None:
+            scene = TASKS[task]()
+            world = world_of(scene, exact, hulls)
+            steps, began = round(scene.seconds / STEP), time.process_time()
+            deepest = max(world.step() for _ in range(steps))
+            rate = steps / (time.process_time() - began)
+            row = {
+                "task": task,
+                "engine": engine,
+                "passed": bool(scene.passed(world)),
+                "deepest": deepest,
+                "rate": rate,
+            }
+            save_row(bench.folder, name, row)
+        bench.say(f"{way}: {row}")
+        rows.append(row)
     return rows
 
 

@@ -14,7 +14,6 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
 from rlacd.decomposition import Decomposition
 from rlacd.errors import DecompositionWarning, MissingExtraError, OptionError
 from rlacd.find_parts import Reached, covered, find_parts
@@ -333,6 +332,7 @@ def _clear_of_each_other(
     names: Sequence[str], meshes: Sequence[InputMesh], options: Sequence[Options], done: list[Finished], run: Run
 ) -> list[str]:
     """Decompose nodes again whose hulls touch though they do not; returns what to say of those that still do."""
+    from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
 
     def body(number: int) -> Body:
         mesh, hulls = meshes[number], done[number].hulls

@@ -7,7 +7,6 @@ import gc
 import importlib
 import io
 import os
-import shlex
 import sys
 import threading
 import warnings
@@ -62,6 +61,8 @@ class Commands(click.Group):
         word = args[0]
         if word not in COMMANDS and (Path(word).suffix or os.path.exists(word)):
             verb = "batch" if os.path.isdir(word) else "decompose"
+            import shlex
+
             typed = shlex.join(["rlacd", verb, *args])
             say(f"rlacd: {printable(word)} is not a command; did you mean  {printable(typed)}")
             raise SystemExit(ExitCode.BAD_INPUT)
