@@ -14,6 +14,7 @@ import rlacd
 from rlacd.clear import Body, Surface, at_rest, check
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
+from rlacd.io.robots.viewed import decompose_viewed
 from tests.models import TABLE_VOLUME, inside, table
 from tests.moving import drawer
 
@@ -257,6 +258,9 @@ def test_pairs_of_bodies_that_a_joint_connects_are_filtered_where_asked(tmp_path
     joint.CreateBody1Rel().AddTarget("/arm")
     stage.Save()
     done = rlacd.rewrite_robot(source, tmp_path / "out.usda", threads=1, quality="fast", exclude=how)
+    shown = decompose_viewed(source, quality="fast", threads=1)
+    assert (shown.links, shown.joints) == (["/robot", "/arm", "/floor"], ()), "the page shows a stage as it stands"
+    assert shown.touching([]) == []
     kinds = {(pair.first, pair.second): pair.kind for pair in done.pairs}
     assert kinds[("/robot", "/arm")] == "adjacent"
     assert kinds[("/robot", "/floor")] == kinds[("/arm", "/floor")] == "sometimes"

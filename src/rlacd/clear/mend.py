@@ -31,9 +31,9 @@ MOST_OFFENCES = 24
 OFF_HULLS = 10 * TOUCH
 """How far hulls stay off those of other bodies, a share of the size of all: single precision moves them less."""
 
-MOST_GROWTH, SPARE = 3, 24
-"""Hulls of all bodies after mending: so many times those before, or so many more. Links that turn inside each other
-with a hundredth of the tolerance between them take sixty each, which costs more in every step than it is worth."""
+MOST_GROWTH, SPARE = 3, 16
+"""A body may have so many times its hulls, or so many more. Links that turn inside each other with a hundredth of the
+tolerance between them take seven times as many, which costs more in every step than it is worth."""
 
 Redo = Callable[[int, Sequence[Obstacle], int], Sequence[Surface] | None]
 """Decomposes the body of this number again, clear of obstacles in its frame; None if that takes more hulls."""
@@ -66,6 +66,7 @@ class _Wishes:
     tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)  # the same again would not help
     renewed: Counter[int] = field(default_factory=Counter)  # how often a body was decomposed again
     given_up: set[int] = field(default_factory=set)
+    too_tight: float = 0.0  # the widest gap for which a body took too many hulls
 
     def add(self, wish: _Wish, poses: Sequence[FloatArray]) -> bool:
         """Add places; returns whether any is new."""
@@ -90,8 +91,7 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
     bodies = list(bodies)
     touching = check(bodies, motion)
     first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
-    count = sum(len(body.hulls) for body in bodies)
-    most = max(MOST_GROWTH * count, count + SPARE)
+    most = [max(MOST_GROWTH * len(body.hulls), len(body.hulls) + SPARE) for body in bodies]
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
         again = _wish(bodies, wrong, wishes)
@@ -99,10 +99,11 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
             break
         for body in sorted(again):
             obstacles = [_obstacle(bodies, wish, wishes, motion) for wish in wishes.places if wish.body == body]
-            others = sum(len(other.hulls) for other in bodies) - len(bodies[body].hulls)
-            hulls = redo(body, obstacles, most - others)
+            tight = min((wishes.gaps[wish] for wish in wishes.gaps if wish.body == body), default=np.inf)
+            hulls = None if tight <= wishes.too_tight else redo(body, obstacles, most[body])
             if hulls is None:
                 wishes.given_up.add(body)
+                wishes.too_tight = max(wishes.too_tight, tight if np.isfinite(tight) else 0.0)
                 continue
             bodies[body] = bodies[body].with_hulls(hulls)
             wishes.renewed[body] += 1
@@ -117,7 +118,8 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
 def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:
     """Add what bodies are to stay out of, and return those to decompose again: not both of a pair at once."""
     again, fixed = set[int](), set[int]()
-    for (i, j), found in sorted(wrong.items(), key=lambda one: (-one[1].offences[0].depth, one[0])):
+    left = {pair: found for pair, found in wrong.items() if wishes.given_up.isdisjoint(pair)}
+    for (i, j), found in sorted(left.items(), key=lambda one: (-one[1].depth, one[0])):
         seen = [place.pose for place in _spread(found.offences)]
         poses = {i: seen, j: [inverse(pose) for pose in seen]}
         ours, theirs = (any(enters(bodies[a], bodies[b].mesh, pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
@@ -127,9 +129,7 @@ def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes
         if ours and theirs:
             ways.insert(0, _Wish(i, j, True))
         for wish in ways:
-            if wish.body in wishes.given_up or wish.body in fixed or wish.other in again:
-                continue
-            if wishes.add(wish, poses[wish.body]):
+            if wish.body not in fixed and wish.other not in again and wishes.add(wish, poses[wish.body]):
                 again.add(wish.body)
                 fixed.add(wish.other)
                 if wish.of_mesh:

@@ -59,7 +59,8 @@ def rewrite_robot(
         not touch there do not touch as hulls either, and are cut finer where they would, or a warning names both. Needs
         the extra ``clear``. USD stages are looked at as they stand.
     exclude : sequence of "adjacent", "always" and "never"
-        Pairs of bodies of an MJCF model to add as ``<exclude>``, by when their hulls touch at these positions.
+        Pairs of bodies whose contacts are not to be found, by when their hulls touch at these positions: as
+        ``<exclude>`` in MJCF, filtered pairs in USD. Of bodies of a stage, only those that a joint connects are known.
     srdf : path-like, optional
         For a URDF, where to write them as ``<disable_collisions>`` for MoveIt.
     **options
