@@ -214,7 +214,6 @@ void bind_union(nb::module_& m) {
              new (self) HullUnion(hulls, threads);
            }),
            "hulls"_a, "threads"_a = 0)
-      .def("only", &HullUnion::only, "some"_a, "The union of the hulls with these numbers.")
       .def("exposed", released([](const HullUnion& self, double gap, int threads) {
              require_positive(1, gap);
              HullUnion::Exposed found = self.exposed(gap, threads);

@@ -127,12 +127,6 @@ HullUnion::HullUnion(std::vector<std::shared_ptr<ConvexBody>> hulls, int threads
   parallel_for(members_.size(), members_.size() < 8 ? 1 : threads, [&](std::size_t i) { members_[i]->planes(); });
 }
 
-HullUnion HullUnion::only(const std::vector<std::int32_t>& some) const {
-  HullUnion result;
-  for (const std::int32_t i : some) result.members_.push_back(members_.at(i));
-  return result;
-}
-
 double HullUnion::distance(Vec3 p) const {
   double best = kInfinity;
   for (const auto& member : members_)

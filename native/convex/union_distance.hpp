@@ -26,9 +26,6 @@ class HullUnion {
  public:
   HullUnion(std::vector<std::shared_ptr<ConvexBody>> hulls, int threads);
 
-  // The union of some of the hulls.
-  HullUnion only(const std::vector<std::int32_t>& some) const;
-
   // The surface of the union as triangles. Cracks between hulls narrower than `gap` count as closed; next to inner
   // corners of the surface, strips narrower than about `gap` are lost. A facet inside so many hulls that cutting it was
   // abandoned is recorded in `unresolved`: parts of it are hidden.
@@ -45,8 +42,6 @@ class HullUnion {
 
  private:
   friend class HullField;
-
-  HullUnion() = default;
 
   // Which faces have all their corners in one of the hulls.
   std::vector<char> held_faces(const Mesh& surface, int threads) const;

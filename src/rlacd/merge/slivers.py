@@ -41,14 +41,13 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     if not slivers:
         return parts
     boxes = np.array([part.box for part in parts])
-    union = hull_union([part.hull for part in parts], run.threads)
     kept = np.ones(len(parts), dtype=bool)
     stood_in: dict[int, BoolArray] = {}  # the hulls near each sliver when it was dropped
 
     def is_missed(own: int) -> bool:
         others = stood_in[own] = kept & _near(boxes, boxes[own])
-        some = np.flatnonzero(others)
-        return len(some) == 0 or _misses(union.only(some.tolist()), parts[own], run.threads)
+        near = [parts[i].hull for i in np.flatnonzero(others)]
+        return not near or _misses(hull_union(near, run.threads), parts[own], run.threads)
 
     smallest_first = sorted(slivers, key=lambda i: parts[i].hull.volume)
     for own in smallest_first:
