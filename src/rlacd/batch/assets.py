@@ -27,15 +27,15 @@ ROBOTS = (".urdf", ".xml")
 """File endings of robots; an ``.xml`` is one only if it is MJCF."""
 
 RESERVED = ("manifest.jsonl", "timings.jsonl", ".rlacd")
-"""What a batch writes beside its results."""
+"""Names of the files that a batch writes beside its results."""
 
 EVERYTHING = "**"
 
 HULLS = "_hulls"
-"""What `rlacd decompose` appends to a mesh's name to name its hulls."""
+"""Suffix that `rlacd decompose` gives a mesh's name for its hulls."""
 
 _MARKS = f'"generator":"{GENERATOR}"', f"# {GENERATOR}", f"comment {GENERATOR}"
-"""What GLB, OBJ and PLY files written by rlacd say, within the first bytes."""
+"""Marks within the first bytes of GLB, OBJ and PLY files that rlacd wrote."""
 
 _MARK_BYTES = 128
 

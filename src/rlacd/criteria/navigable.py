@@ -81,7 +81,7 @@ class Navigable(Criterion):
     conflicts : Conflicts
         Changes that `settled` made to the balls.
     hull : Hull or None
-        Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
+        The solid's hull, beyond which primitives may reach by the tolerance; without it there are none.
     """
 
     radius: float

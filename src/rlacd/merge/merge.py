@@ -83,7 +83,7 @@ def merge_transferred(
     proxy : Component
         Rejects most pairs quickly.
     rehearsal : Criterion
-        What the proxy clipped to a joint hull has to meet.
+        The criterion for the proxy clipped to a joint hull.
     confirmed : callable
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
     run : Run

@@ -42,7 +42,7 @@ class Sweep:
     solid_below, solid_above : float64
         Volumes of the two sides.
     section_area, section_perimeter : float64
-        Of the solid's cross-section.
+        Area and perimeter of the solid's cross-section.
     thickness_below, thickness_above : float64
         Extents of the two sides along the plane's normal.
     extent_below, extent_above : float64

@@ -37,7 +37,7 @@ class SearchContext:
     Attributes
     ----------
     root : Component
-        What is cut: the solid, or its proxy.
+        The component that is cut: the solid or its proxy.
     criterion : Criterion
         Every new part meets it.
     seed : int

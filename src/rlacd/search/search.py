@@ -18,7 +18,7 @@ from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
 from rlacd.solid.component import Part
 
 BEST_SECONDS = 5.0
-"""What ``best`` may take by default, more if its first search takes longer."""
+"""Seconds of ``best`` by default; more if its first search takes longer."""
 
 TIMES_FIRST_PASS = 4.5
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
@@ -43,7 +43,7 @@ HOPELESS = 5
 """Another pass is abandoned when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
 IN_VAIN = 8
-"""A search ends when so many starts in a row have found nothing better."""
+"""A search ends after so many starts in a row without a gain."""
 
 
 @dataclass
@@ -109,7 +109,7 @@ def search(
     parts : sequence of Part
         A decomposition of the solid.
     run : Run
-        Its work so far is taken as the work of the first pass.
+        The work it has done so far counts as the first pass.
     quality : "balanced" or "best"
     seconds : float, optional
         Wall time of the search, in place of that bound.
@@ -119,8 +119,8 @@ def search(
     Returns
     -------
     found : list of list of Part
-        What ``fast`` and ``balanced`` find, and the best; never worse than the given parts. They depend on the seed and
-        the steps, and on time only if `seconds` or the run ends the search.
+        The parts that ``fast`` and ``balanced`` find, and the best; never worse than the given ones. They depend on the
+        seed and the steps, and on time only if `seconds` or the run ends the search.
     summary : SearchSummary
     """
     # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
@@ -183,7 +183,7 @@ class _Search:
     Attributes
     ----------
     early, best : list of Part
-        What ``fast`` ends with, and the best parts so far.
+        The parts that ``fast`` ends with, and the best so far.
     gained : float
         When the best parts last became fewer, by `time.perf_counter`.
     starts, steps, accepted : int
