@@ -128,8 +128,7 @@ def find_assets(
     MeshFileError
         `folder` does not exist or is not a folder, or a folder in it cannot be read.
     """
-    # Names of results depend on all meshes of the folder, not only on the selected ones, so that a mesh's result has
-    # the same name in every run.
+    # Results are named among all meshes of the folder, not only the selected ones: the same in every run.
     names = sorted(name for name, kind in _files(folder, leave_out) if kind == "asset")
     places = _places(names, ending)
     return [Asset(name, folder / name, places[name]) for name in names if _matches(name, glob)]

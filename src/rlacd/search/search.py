@@ -100,8 +100,7 @@ def search(
 ) -> tuple[list[list[Part]], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
-    Without limits of its own, the search does a bounded multiple of the work of the first pass; ``best`` then goes on
-    until its seconds are over.
+    Without other limits, the search does a bounded multiple of the first pass's work; ``best`` goes on for its seconds.
 
     Parameters
     ----------
@@ -123,8 +122,7 @@ def search(
         seed and the steps, and on time only if `seconds` or the run ends the search.
     summary : SearchSummary
     """
-    # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
-    # below it.
+    # Slivers are dropped at the end anyway; if they counted here, a level could end with more hulls than the last.
     parts = drop_slivers(parts, run)
     begin, first_pass = time.perf_counter(), run.work.done
     allowed, bounded = math.inf, seconds is None and steps is None
