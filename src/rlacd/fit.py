@@ -17,7 +17,7 @@ COVERED = 5e-5
 
 
 class Fit(NamedTuple):
-    """What a criterion measured.
+    """The measurement of a criterion.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Fit(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Its entry in the report."""
+        """The key of its entry in the report."""
         return {"added_volume": "volume", "intrusion": "navigable"}.get(self.name, self.name)
 
     @property
@@ -92,7 +92,7 @@ def length_unit(report: Mapping[str, Any], unit: str | None = None) -> tuple[flo
     Parameters
     ----------
     report : mapping
-        Its `scale`, and of its `options` the `threshold_abs`.
+        Its `scale` and its option `threshold_abs` are read.
     unit : str, optional
         In which the threshold was typed: ``%`` of the longest side, or of `UNITS` for an input in metres.
 

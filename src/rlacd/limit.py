@@ -22,7 +22,7 @@ from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import NO_SIDES
 
 TIMES_PARTS = 2
-"""Cutting on for fewer corners leaves at most so many times the parts."""
+"""Cutting on for fewer corners multiplies the parts by at most this."""
 
 SHARE_OF_WORK, LEAST_SHARE = 0.3, 0.4e6
 """Share of the work done so far that cutting on may take, and merging as much again; at least so many units."""

@@ -109,8 +109,7 @@ def main() -> None:
     try:
         app(prog_name="rlacd", complete_var=COMPLETE)
     except SystemExit as ended:
-        # Taking the interpreter down object by object takes long: a tenth of a small mesh's time, and after a stop more
-        # than is left.
+        # Taking the interpreter down takes a tenth of a small mesh's time, and after a stop more than is left.
         late = ended.code == ExitCode.STOPPED_EARLY
         if late or threading.active_count() == 1:
             if not late:

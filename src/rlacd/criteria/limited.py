@@ -35,7 +35,7 @@ FEWEST_STARTS, MOST_STARTS = 5000, 50_000
 """Fewest and most points from which balls start."""
 
 PLAY = 1.01
-"""Only passages at least so many times as wide as a ball have to let it through: hulls around them are not exact."""
+"""Passages narrower than this multiple of a ball need not let it through: hulls around them are not exact."""
 
 
 def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) -> tuple[Balls, Balls]:
@@ -96,7 +96,7 @@ class LimitedCriterion(Criterion):
     free, kept : Balls
         The largest balls that fit in the solid's passages, and the balls that stay free of hulls.
     avoided : Avoided or None
-        What hulls may not enter.
+        The meshes that hulls may not enter.
     finest : Distance or None
         A part that is as tight as this is cut no further to avoid it.
     sides : float64 [P, 4]
@@ -126,12 +126,12 @@ class LimitedCriterion(Criterion):
 
     @property
     def eliminates(self) -> bool:
-        """As the underlying criterion."""
+        """Whether the underlying criterion eliminates."""
         return self.criterion.eliminates
 
     @property
     def screen(self) -> Screen:
-        """That of the underlying criterion: what it rejects fails here too."""
+        """The underlying criterion's tests: what they reject fails here too."""
         return self.criterion.screen
 
     @property

@@ -9,8 +9,7 @@ the input's bounding box is centred and its longest side is 2, the space is the 
 - at which a ball of radius r stays out of the closed half-spaces, and
 - that the centre of such a ball can reach.
 
-It is represented by balls with centres spread over its boundary, each as large as possible at distance t from the
-surface.
+Balls with centres spread over its boundary represent it, each as large as fits at distance t from the surface.
 """
 
 from __future__ import annotations
@@ -81,7 +80,7 @@ class Navigable(Criterion):
     conflicts : Conflicts
         Changes that `settled` made to the balls.
     hull : Hull or None
-        Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
+        The solid's hull, beyond which primitives may reach by the tolerance; without it there are none.
     """
 
     radius: float
@@ -138,8 +137,7 @@ class Navigable(Criterion):
         ball is found unless it is too contorted to be followed in steps of half a radius.
 
         Measured well inside the hull of the solid, 99 % of the space's boundary is within 0.6 ball radii of a centre,
-        and all of it within 0.75: between balls, a hull can reach a fifth of their radius past the boundary undetected,
-        and very rarely a third.
+        and all of it within 0.75: hulls can reach a fifth of the radius past the boundary undetected, rarely a third.
         """
         scale = solid.frame.scale
         radius, tolerance = space.in_frame(scale)

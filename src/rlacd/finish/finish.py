@@ -264,8 +264,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     ----------
     parts : sequence of Part
     points : float64 [N, 3]
-        Of more than `DENSE`, every second, third, ... is looked at. A hull that holds a point already is skipped: its
-        part will be dropped.
+        Of more than `DENSE`, every second, third, ... is looked at. A hull that holds a point is skipped: it will go.
     criterion : Criterion
 
     Returns

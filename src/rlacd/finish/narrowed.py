@@ -51,8 +51,7 @@ class Narrowed(NamedTuple):
     Attributes
     ----------
     passages
-        One entry each: around ``at_abs``, a ball of ``radius_abs`` fits in the input, one of ``left_abs`` between the
-        hulls.
+        One entry each: at ``at_abs``, a ball of ``radius_abs`` fits in the input, of ``left_abs`` between hulls.
     is_every
         Whether all are listed: no triangle or ball was left out, and no passage widens, as several in a row do.
     by_limits

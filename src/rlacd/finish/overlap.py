@@ -52,7 +52,7 @@ class Seams:
     ----------
     count : int
     short : tuple of ShortSeam
-        Those that still overlap by less.
+        The seams that still overlap by less.
     """
 
     count: int

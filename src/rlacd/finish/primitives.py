@@ -57,9 +57,9 @@ def primitive_part(
     part : Part
     criterion : Criterion
     kinds : collection of str
-        Those to choose from.
+        The kinds to choose from.
     limits : HullLimits, optional
-        Of the polyhedron.
+        Limits on the polyhedron.
     slack : float
         How much larger a primitive is made than needed, for later rounding.
     solid : Component, optional

@@ -31,8 +31,7 @@ from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
 
 COVERAGE_TOLERANCE = 5 * HALF_THICKNESS
-"""How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
-measurement."""
+"""How far hulls may reach beyond the threshold before the report warns: slack for repair and measurement."""
 
 NEARLY = RESOLVED
 """No point of the input should lie farther outside the hulls than this."""

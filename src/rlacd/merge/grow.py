@@ -130,7 +130,7 @@ def _heights(points: FloatArray, spaces: FloatArray) -> FloatArray:
 
 
 def _divided(components: Sequence[Component], spaces: FloatArray) -> tuple[list[Component], list[Component], float]:
-    """What of components is inside and outside of an intersection of half-spaces, and the work of cutting them."""
+    """Components cut by half-spaces: what lies in all of them, the rest, and the work of cutting."""
     inside: list[Component] = []
     outside: list[Component] = []
     units = 0.0

@@ -21,8 +21,8 @@ from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
 FEW_TO_PAIR = 100
-"""Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or near a
-common third part."""
+"""Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or a third
+part."""
 
 PAIRS_AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the run."""
@@ -47,8 +47,7 @@ def merge_parts(
 
     First the criterion judges the glued union of each pair. When no more pairs can be united this way and `solid` is
     given, parts are united across what lies between them: there it judges the solid clipped to the joint hull
-    (`ClippedPart`). Pairs are tested in batches on all workers and united in order of their cost, whatever the number
-    of threads.
+    (`ClippedPart`). Pairs are tested in batches on all workers and united in order of cost, for any number of threads.
 
     Parameters
     ----------
@@ -86,7 +85,7 @@ def merge_transferred(
     proxy : Component
         Rejects most pairs quickly.
     rehearsal : Criterion
-        What the proxy clipped to a joint hull has to meet.
+        The criterion for the proxy clipped to a joint hull.
     confirmed : callable
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
     run : Run

@@ -39,7 +39,7 @@ class Kind:
     values
         The same in a few characters, for tables; empty where the help says it.
     read
-        Turns a value into a plain one; raises any exception where it is no such value.
+        Turns a value into a plain one; raises any exception for a value of another kind.
     typed
         What the command line turns a word into.
     textual
@@ -122,7 +122,7 @@ def path_like() -> Kind:
 
 
 def custom(rule: str, read: Callable[[Any], Any], values: str = "", *, typed: type = str) -> Kind:
-    """Whatever `read` takes; it raises where it does not."""
+    """Any value for which `read` does not raise."""
     return Kind(rule, values, read, typed, textual=True)
 
 
@@ -285,7 +285,7 @@ def read(kind: Kind, name: str, value: Any) -> Any:
     Raises
     ------
     OptionError
-        It is no value of this kind.
+        The value is not of this kind.
     """
     try:
         return kind.read(value)
@@ -336,7 +336,7 @@ def relative(name: str, length: float, scale: float, bounds: tuple[float, float]
     Raises
     ------
     OptionError
-        That is out of bounds: the length is too small or too large for the object.
+        The length is too small or too large for the object.
     """
     side = LONGEST_SIDE[name]
     number, (least, most) = length * scale * side / 2, bounds

@@ -42,7 +42,7 @@ class Sweep:
     solid_below, solid_above : float64
         Volumes of the two sides.
     section_area, section_perimeter : float64
-        Of the solid's cross-section.
+        Area and perimeter of the solid's cross-section.
     thickness_below, thickness_above : float64
         Extents of the two sides along the plane's normal.
     extent_below, extent_above : float64
@@ -141,8 +141,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
     Parameters
     ----------
     exponent : float
-        1 for the sum, which orders planes as the sum of hull volumes does (and is given that sum's tolerance for ties);
-        infinity for the maximum.
+        1 for the sum, which orders planes like the sum of hull volumes (with its tolerance); infinity for the maximum.
     """
     # No plane costs more than the whole component: the hulls of the two sides are disjoint and lie in its hull.
     most = component.hull.volume if exponent == 1 else max(component.hull.volume - component.volume, 0.0)

@@ -120,7 +120,7 @@ class RandomShortlist:
     reflex_edges : int
         Number of reflex edges whose planes join them.
     seed : int
-        What is drawn depends on it and the component's vertices, whatever was cut before.
+        The drawn planes depend on it and the component's vertices alone.
     """
 
     def __init__(self, planes: int = 10, reflex_edges: int = EDGES_PER_COMPONENT, seed: int = 0) -> None:

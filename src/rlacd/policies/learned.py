@@ -23,8 +23,7 @@ NETWORKS = 4
 """Size of the ensemble."""
 
 PROMISING = 40
-"""Number of planes of least excess among which the networks choose, and as many of least hull sum: training saw few
-others."""
+"""Number of planes of least excess, and of least hull sum, among which the networks choose: training saw few others."""
 
 LEAST_GAIN = 0.02
 """Predicted saving in log(parts) for which the plane of least hull sum is given up: below it, predictions are noise."""

@@ -46,7 +46,7 @@ class Network:
     ----------
     layers : sequence of (weight [outputs, inputs], bias [outputs])
     about : mapping
-        What the file says of itself: ``kind``, and the length of the criterion it was trained with, ``threshold``.
+        Facts in the file: ``kind``, and ``threshold``, the length of the criterion it was trained with.
     """
 
     def __init__(

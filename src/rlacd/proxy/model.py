@@ -1,4 +1,4 @@
-"""What is cut in place of a solid: the solid itself, or a simpler copy of a dense one, whose parts are carried back.
+"""The model that is cut for a solid: the solid, or a simpler copy of a dense one, whose parts are transferred.
 
 Hulls grow to take in the surface of the solid that they miss (`Filling.uncovered`), so that together they cover the
 solid. The part of a hull is the solid clipped to it; a part that fails the criterion is cut on the solid.
@@ -42,7 +42,7 @@ class _Transferred:
     ----------
     hull : Hull
     part : Part or None
-        Its part of the solid, if that is known for this hull.
+        The solid clipped to this hull, once it has been.
     is_met : bool
         Whether that is known to meet the goal.
     cuts : int
@@ -56,7 +56,7 @@ class _Transferred:
 
     @property
     def on_solid(self) -> Part:
-        """Its part of the solid, which is known."""
+        """The solid clipped to the hull; only once it has been."""
         assert self.part is not None, "clipped first"
         return self.part
 
@@ -166,7 +166,7 @@ class Transfer:
             each.part = part
 
     def _clipped(self, hull: Hull) -> Part:
-        """What the solid fills of a hull; the hull itself if that is nothing."""
+        """The solid clipped to a hull; the hull itself if nothing is left."""
         part = self.solid.inside(hull)
         return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
@@ -214,7 +214,7 @@ class Model:
 
     @property
     def component(self) -> Component:
-        """What is cut."""
+        """The component that is cut: the proxy, or else the solid."""
         return self.solid if self.proxy is None else self.proxy.component
 
     def tighter(self, goal: Criterion, factor: float = 1.0) -> Criterion:

@@ -103,7 +103,7 @@ class _Hole:
         return self.is_damage or (is_small and depth <= HOLE)
 
     def described(self, is_closed: bool, vertices: FloatArray) -> Hole:
-        """What the report says of it."""
+        """The hole as the report lists it."""
         corners = vertices[self.loop]
         centre = corners.mean(axis=0)
         width = 2 * float(np.linalg.norm(corners - centre, axis=1).max())
@@ -157,7 +157,7 @@ class _Caps:
         return np.asarray(np.abs(volume))
 
     def _classified(self) -> list[_Hole]:
-        """The holes, and what each of them is."""
+        """The holes, each with whether it is damage."""
         holes = self._measured()
         is_damaged = sum(hole.looks_damaged for hole in holes) >= max(_DAMAGED, _GOOD_PART * len(holes))
         return [
@@ -165,7 +165,7 @@ class _Caps:
         ]
 
     def _measured(self) -> list[_Hole]:
-        """The holes, each by itself."""
+        """The holes, each measured by itself."""
         loops, own, tiny = self._rims.loops, self._body_of_hole, np.finfo(float).tiny
         body_area = np.maximum(self._area[own], tiny)
         of_all = np.bincount(own, self._cap_area, self._bodies)[own]

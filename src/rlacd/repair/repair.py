@@ -1,8 +1,8 @@
 """From any soup of triangles to one closed, oriented solid, by the least change that works.
 
 Input: an `InputMesh`. Output: a `Solid`, with the step that changed each body most. Equal vertices are merged,
-degenerate and doubled faces dropped. One closed body is taken as it is unless much of it is inside out. Everything else
-goes through `STEPS`, once.
+degenerate and doubled faces dropped. One closed body stays as it is unless largely inside out. All else goes through
+`STEPS`.
 
 The watertight-manifold algorithm of Huang et al. (2018) could replace most of them, but it grows every sheet by a voxel
 and turns a dozen exact faces into tens of thousands of approximate ones; these steps keep the faces of the input.

@@ -1,5 +1,4 @@
-"""Open boundaries of a surface: flaps, as opposed to the surface they stick to, the loops of edges around holes, and
-caps for these.
+"""Open boundaries of a surface: flaps that stick to it, the loops of edges around its holes, and caps for these.
 
 Input: a soup. Output: its flaps, loops of vertices around its holes, and triangles that close these without new
 vertices; nothing is decided or changed here.
@@ -8,8 +7,7 @@ Two faces that share an edge are mates; where more share it, those that continue
 mates form a patch, and all faces of a patch are wound alike, whatever the file says. A flap is a small patch attached
 to others at edges that these mate without it, or a flat patch within one loop: its free edges bound no hole. At a
 vertex where several holes meet, a loop turns from a free edge to the next one across the hole, so loops never run
-around existing faces. An island that touches its hole's rim at a vertex joins that hole's loop, which visits the vertex
-twice.
+around existing faces. An island that touches its hole's rim joins that hole's loop, which visits the vertex twice.
 """
 
 from __future__ import annotations

@@ -32,8 +32,7 @@ _FOLD = 0.94
 class Soup:
     """Faces during repair; `body` ``[F]`` is the body of each, by numbers that stay the same throughout.
 
-    The windings of `trusted` faces have been checked and corrected. `known_edges` are those of the faces, if they have
-    been collected already.
+    The windings of `trusted` faces have been checked and corrected. `known_edges` are those of the faces, if known.
     """
 
     vertices: FloatArray

@@ -1,4 +1,4 @@
-"""What is known of an input, and of the repairs of its bodies, while the steps of repair turn it into one solid."""
+"""The state of a repair: the input, and what the steps so far have made of its bodies."""
 
 from __future__ import annotations
 

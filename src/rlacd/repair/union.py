@@ -174,8 +174,7 @@ def hollowed(shapes: Sequence[Shape], inward: Sequence[bool]) -> Sequence[Shape]
     shapes : sequence of Manifold or (vertices, faces)
         Each with positive volume.
     inward : sequence of bool
-        Which of them the input winds inside out. A solid is a cavity if it is wound opposite to the outermost solid
-        around it.
+        Which of them the input winds inside out: cavities are wound opposite to the outermost solid around them.
 
     Returns
     -------

@@ -1,8 +1,7 @@
 """Solids from the faces of bodies: exact skins of what has an inside, slabs of sheets.
 
 Every fan of corners that meets at a vertex within one region of space becomes a separate vertex, so surfaces that
-merely touch at a vertex or an edge come apart. Fans on a sheet are moved away from it; the free edges of sheets get a
-rim.
+merely touch at a vertex or an edge come apart. Fans on a sheet move away from it; free edges of sheets get a rim.
 """
 
 from __future__ import annotations
@@ -194,8 +193,7 @@ def _rims(
 ) -> tuple[Int64Array, Int64Array, Int64Array]:
     """Close rims: the faces ``[M, 3]``, their labels, and for every new vertex (from `number` on) a fan at its place.
 
-    A rim edge runs from low to high; its face shows one side to the wedge's beginning, fans ``low[0]`` and ``high[0]``,
-    and the other to its end.
+    A rim edge runs from low to high; one side of its face is at the wedge's beginning (fans ``[0]``), one at its end.
     """
     quads = [np.stack([high[0], low[0], low[1]], axis=1), np.stack([high[0], low[1], high[1]], axis=1)]
     caps, cap_label, centers = _rim_caps(

@@ -37,7 +37,7 @@ class SearchContext:
     Attributes
     ----------
     root : Component
-        What is cut: the solid, or its proxy.
+        The component that is cut: the solid or its proxy.
     criterion : Criterion
         Every new part meets it.
     seed : int
@@ -129,8 +129,7 @@ class Neighbourhood:
         return len(self.best) <= self._context.enough()
 
     def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
-        """Search until the run is over, `most` trials are made, `patience` units save nothing, or no fewer parts can
-        do."""
+        """Search until the run or `most` trials are over, `patience` units save nothing, or no fewer parts can do."""
         self._in_vain = dict.fromkeys(Operator, 0)
         self._make(self._trials(patience), most)
 

@@ -122,7 +122,7 @@ def is_balanced(faces: Int64Array, edges: Edges) -> BoolArray:
 
 
 NO_AREA = TOLERANCE**2
-"""Slivers of less area than this are folds that rounding has closed."""
+"""Faces of less area than this are folds that rounding has closed."""
 
 
 def detach_slivers(vertices: FloatArray, faces: Int64Array, is_sliver: BoolArray) -> tuple[FloatArray, Int64Array]:

@@ -1,8 +1,7 @@
 """Connections of the viewer's server, with bounds on their number and duration.
 
 Every connection has a thread, so their number is bounded; one more is answered 503 at once, without a thread. Each has
-a deadline: a request that trickles in, a client that does not read and an idle connection are closed when it has
-passed.
+a deadline, at which slow requests, clients that do not read and idle connections are closed.
 """
 
 from __future__ import annotations

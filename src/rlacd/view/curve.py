@@ -24,7 +24,7 @@ def draw_curve(
     Raises
     ------
     MissingExtraError, OutputError, OptionError
-        As `rlacd.view.picture.check_picture`.
+        See `rlacd.view.picture.check_picture`.
     """
     place = check_picture(path)
     image, pen = (import_extra(f"PIL.{part}", "a picture", "view") for part in ("Image", "ImageDraw"))
