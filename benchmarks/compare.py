@@ -96,7 +96,7 @@ def published(groups: Mapping[str, Sequence[Row]]) -> Table:
     numbers: dict[str, tuple[Callable[[Sequence[Row]], float], str, Callable[[list[float]], float] | None]] = {
         "hulls": (lambda rows: sum(row["parts"] for row in rows), ",.0f", min),
         "triangles per mesh": (lambda rows: mean(rows, "faces"), ",.0f", min),
-        "farthest from the input: mean, worst mesh": (lambda rows: mean(rows, "hausdorff"), ".3f", min),
+        "farthest from the input at most: mean, worst mesh": (lambda rows: mean(rows, "hausdorff"), ".3f", min),
         "input's surface left uncovered": (lambda rows: mean(rows, "uncovered"), ".1%", None),
         "invalid hulls": (lambda rows: sum(row["invalid"] for row in rows), ".0f", None),
         f"times as fast as {first} (CPU, median)": (lambda rows: _times_as_fast(rows, good[0]), ".3g", max),

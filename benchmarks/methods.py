@@ -8,6 +8,7 @@ name                            tool                                          se
 ``...:OPTION=VALUE``            the same with that option, any number         concavity threshold (its own)
 ``...:space[=RADIUS]``          the same with navigable space                 tolerance (0.1)
 ``coacd``                       CoACD                                         concavity threshold (its own)
+``coacd-hulls``                 CoACD at its own threshold                    most hulls (64)
 ``vhacd``                       V-HACD 4                                      most hulls (its own)
 ``disjoint``                    `benchmarks.disjoint`                         concavity threshold (rlacd's)
 ==============================  ============================================  =====================================
@@ -22,6 +23,7 @@ import inspect
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -79,6 +81,8 @@ def make_method(name: str) -> Method:
     """
     if name == "coacd":
         return Method(name, version_of("coacd"), "threshold", 0.05, _coacd)
+    if name == "coacd-hulls":
+        return Method(name, version_of("coacd"), "hulls", 64, partial(_coacd, most=True))
     if name == "vhacd":
         return Method(name, version_of("vhacdx"), "hulls", 64, _vhacd)
     if name == "disjoint":
@@ -103,7 +107,7 @@ def rlacd_options(name: str) -> dict[str, Any]:
     if base not in QUALITIES:
         raise OptionError(
             f"there is no method {name!r}; it has to be default, fast or best, if need be followed by :OPTION=VALUE or "
-            "by :space[=RADIUS]; or coacd, vhacd, disjoint."
+            "by :space[=RADIUS]; or coacd, coacd-hulls, vhacd, disjoint."
         )
     options = dict(QUALITIES[base])
     for word in words:
@@ -150,11 +154,12 @@ def _rlacd(name: str) -> Run:
     return run
 
 
-def _coacd(vertices: FloatArray, faces: IntArray, number: float, threads: int) -> list[RawHull]:
+def _coacd(vertices: FloatArray, faces: IntArray, number: float, threads: int, most: bool = False) -> list[RawHull]:
     import coacd
 
     coacd.set_log_level("error")
-    found = coacd.run_coacd(coacd.Mesh(vertices, faces), threshold=number)
+    setting = {"max_convex_hull": round(number)} if most else {"threshold": number}
+    found = coacd.run_coacd(coacd.Mesh(vertices, faces), **setting)
     return [_as_arrays(v, f) for v, f in found]
 
 

@@ -1,175 +1,133 @@
-"""What decompositions are for: the same objects simulated as hulls of every tool, and as primitives."""
+"""Ten tasks in two physics engines, with the hulls of every tool."""
 
 from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Mapping
+from pathlib import Path
 
 import click
 import trimesh
 
-from benchmarks.cli import experiment, words
+from benchmarks.cli import OUT, PATH, write
 from benchmarks.compare import machine
-from benchmarks.methods import make_method, rlacd_options
+from benchmarks.engines import ENGINES, STEP, Hulls
+from benchmarks.film import film
 from benchmarks.runner import Bench
-from benchmarks.simulate import (
-    COPIES,
-    NEAR,
-    SECONDS,
-    SIZE,
-    STEP,
-    drops_in_mujoco,
-    get_mujoco,
-    get_warp,
-    model_size,
-    pile_in_mujoco,
-    pile_in_warp,
-    scaled_source,
-)
-from benchmarks.store import Row, Task, load_hulls
-from benchmarks.tables import Page, Table, managed, mean, ratio_of
-from rlacd.decompose_mesh import decompose
-from rlacd.errors import RlacdError
-from rlacd.result import Result
+from benchmarks.simulate import get_mujoco
+from benchmarks.store import Row, Task, load_hulls, load_row, save_row
+from benchmarks.tables import Page, Table
+from benchmarks.tasks import SHAPES, TASKS, mesh_of
+from rlacd.cli.exit_codes import exit_codes
+from rlacd.errors import MissingExtraError
 
-OTHERS = ("coacd", "vhacd")
-"""Other tools, at their authors' settings."""
-
-ONE_HULL = "fast:max_hulls=1"
-
-METHODS = f"{ONE_HULL},fast,default,fast:max_vertices=16,fast:primitives=true,coacd,vhacd"
+WAYS = {
+    "rlacd (default)": "default",
+    "rlacd `fast`": "fast",
+    "CoACD": "coacd",
+    "CoACD, as many hulls": "coacd-hulls",
+    "V-HACD, as many hulls": "vhacd",
+}
+"""Titles and methods; as many hulls as the first, for each shape."""
 
 
-def _check(methods: str, worlds: int | None, **_: object) -> None:
-    get_mujoco()
-    if worlds:
-        get_warp()
-    for name in words(methods):
-        make_method(name) if name in OTHERS else rlacd_options(name)
-
-
-@experiment(_check)
-@click.option("--methods", default=METHODS, show_default=True, help="coacd, vhacd, and rlacd as for compare.")
-@click.option("--piles", default=1, type=click.IntRange(1), help="Piles of each object, turned differently.")
-@click.option("--worlds", type=click.IntRange(1), help="The pile in so many worlds at once too, in MuJoCo Warp.")
-def app(bench: Bench, methods: str, piles: int, worlds: int | None) -> Page:
-    """Simulate the hulls in MuJoCo: a pile, and balls dropped into every hole; needs rlacd[sim].
+@click.command()
+@OUT
+@click.option("--film", "shown", type=PATH, help="A GIF of two of the tasks too.")
+def app(out: Path, shown: Path | None) -> None:
+    """Ten tasks in MuJoCo and PyBullet, with the hulls of rlacd, CoACD and V-HACD; needs rlacd[sim].
 
     \b
-    python -m benchmarks physics MESHES --list MESHES/quick.txt --out RUN
+    python -m benchmarks physics --out RUN
     """
-    groups: dict[str, list[Row]] = {way: [] for way in words(methods)}
-    for mesh in bench.names:
-        for way, result, cpu in _decompositions(bench, mesh, list(groups)):
-            row: Row = {"mesh": mesh}
-            try:
-                row |= {"error": result} if isinstance(result, str) else _simulated(result, piles, worlds)
-                row["cpu"] = cpu
-            except (RlacdError, ValueError, RuntimeError) as error:
-                row["error"] = " ".join(str(error).split())[:200]
-            groups[way].append(row)
-            bench.say(f"{way}: {row}")
-    about = (
-        f"{len(bench.names)} objects, scaled to {SIZE:g} m, of density 1000, each decomposed in every way; {COPIES} "
-        f"copies fall into a bin for {SECONDS:g} s ({piles} piles, steps of {1000 * STEP:g} ms). {machine()}, one "
-        "thread; CPU time."
+    with exit_codes():
+        _check()
+        exact = {name: mesh_of(name) for name in SHAPES}
+        (out / "shapes").mkdir(parents=True, exist_ok=True)
+        for name, mesh in exact.items():
+            mesh.export(out / "shapes" / f"{name}.ply")
+        bench = Bench(out / "shapes", [f"{name}.ply" for name in SHAPES], out, say=click.echo)
+        ways = decompositions(bench)
+        rows = {way: [row for task in TASKS for row in simulated(bench, task, way, exact, ways[way])] for way in ways}
+        about = f"Ten tasks, {len(SHAPES)} shapes, steps of {1000 * STEP:g} ms; {machine()}, one thread."
+        write(Page("Physics", [about, summary(ways, rows), details(rows)]), out, "physics")
+        if shown is not None:
+            film(shown, exact, {way: ways[way] for way in (*WAYS,)[:: len(WAYS) - 1]})
+
+
+def _check() -> None:
+    get_mujoco()
+    try:
+        import pybullet  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError("PyBullet is missing: run  pip install 'rlacd[sim]'  and try again.") from error
+
+
+def decompositions(bench: Bench) -> dict[str, Hulls]:
+    """The hulls of every shape, by the title of the tool."""
+    first = bench.run("default")
+    found: dict[str, Hulls] = {}
+    for title, method in WAYS.items():
+        if title.endswith("as many hulls"):
+            tasks = [Task(row["mesh"], method, row["parts"]) for row in first]
+        else:
+            tasks = [Task(row["mesh"], method, row["setting"]) for row in first]
+        bench.run_tasks(tasks)
+        hulls = {Path(task.mesh).stem: load_hulls(bench.hulls_of(task))[0] for task in tasks}
+        found[title] = {name: [trimesh.Trimesh(v, f, process=False) for v, f in some] for name, some in hulls.items()}
+    return found
+
+
+def simulated(bench: Bench, task: str, way: str, exact: Mapping[str, trimesh.Trimesh], hulls: Hulls) -> list[Row]:
+    """A row for each engine: whether the task was passed, the deepest contact in metres, steps per CPU second."""
+    rows = []
+    for engine, world_of in ENGINES.items():
+        name = Task(task, f"{way} in {engine}", sum(map(len, hulls.values())))
+        row = load_row(bench.folder, name)
+        if row is None:
+            scene = TASKS[task]()
+            world = world_of(scene, exact, hulls)
+            steps, began = round(scene.seconds / STEP), time.process_time()
+            deepest = max(world.step() for _ in range(steps))
+            rate = steps / (time.process_time() - began)
+            row = {
+                "task": task,
+                "engine": engine,
+                "passed": bool(scene.passed(world)),
+                "deepest": deepest,
+                "rate": rate,
+            }
+            save_row(bench.folder, name, row)
+        bench.say(f"{way}: {row}")
+        rows.append(row)
+    return rows
+
+
+def summary(ways: Mapping[str, Hulls], rows: Mapping[str, list[Row]]) -> Table:
+    """A line for each tool."""
+    lines = []
+    for way, some in rows.items():
+        deepest = [1000 * row["deepest"] for row in some]
+        passed = [sum(row["passed"] for row in some if row["engine"] == engine) for engine in ENGINES]
+        rates = [row["rate"] for row in some if row["task"] == "pile of fifty"]
+        lines.append(
+            [
+                *(way, sum(map(len, ways[way].values())), *passed),
+                *(f"{statistics.median(deepest):.1f}, {max(deepest):.0f}", *(f"{rate:.0f}" for rate in rates)),
+            ]
+        )
+    passed_in = [f"passed in {engine}" for engine in ENGINES]
+    return Table(
+        ["", "hulls", *passed_in, "deepest contact, mm: median, worst", *(f"pile, {name} steps/s" for name in ENGINES)],
+        lines,
     )
-    failed = [f"- {r['mesh']}, {way}: {r['error']}" for way, rows in groups.items() for r in rows if "error" in r]
-    return Page("Physics", [about, _summary(groups), _details(groups), "## Failures", "\n".join(failed) or "none"])
 
 
-def _decompositions(bench: Bench, mesh: str, ways: Sequence[str]) -> Iterator[tuple[str, Result | str, float]]:
-    """Hulls, or why there are none, and the CPU seconds that they took."""
-    scaled, factor, centre = scaled_source(bench.meshes / mesh)
-    mass = decompose(scaled, threads=1, **rlacd_options(ONE_HULL)).report["mass"]
-    for way in ways:
-        if way not in OTHERS:
-            began = time.process_time()
-            yield way, decompose(scaled, threads=1, **rlacd_options(way)), time.process_time() - began
-            continue
-        task = Task(mesh, way, make_method(way).default)
-        (row,) = bench.run_tasks([task])
-        if "error" in row:
-            yield way, row["error"], 0.0
-            continue
-        hulls, _ = load_hulls(bench.hulls_of(task))
-        shapes = [trimesh.Trimesh((v - centre) * factor, f, process=False) for v, f in hulls]
-        source = trimesh.Trimesh(*scaled, process=False)
-        yield way, Result(shapes, {"name": "mesh", "mass": mass}, source), row["cpu"]
-
-
-def _simulated(result: Result, piles: int, worlds: int | None) -> Row:
-    rates, contacts = zip(*(pile_in_mujoco(result, seed) for seed in range(piles)), strict=True)
-    return {
-        "parts": len(result),
-        "primitives": sum(each is not None for each in getattr(result, "primitives", [])),
-        "vertices": statistics.fmean(len(hull.vertices) for hull in result.hulls),
-        "bytes": model_size(result),
-        "over": result.report.get("hausdorff", {}).get("over"),  # unknown for other tools
-        "volume": float(sum(hull.volume for hull in result.hulls)),
-        **asdict(drops_in_mujoco(result)),
-        "rate": statistics.geometric_mean(rates),
-        "contacts": statistics.fmean(contacts),
-        **({"warp": pile_in_warp(result, worlds)} if worlds else {}),
-    }
-
-
-NOTE = (
-    "Over objects that every way solved; ratios are to the first way. Bytes: the MJCF file with its collision "
-    "meshes. Over: how far the hulls reach beyond the input (longest side: 2). Holes: of the balls that pass through "
-    "by the exact mesh, how many pass. Hollows: of those that come to rest inside the convex hull, how many rest "
-    f"within {100 * NEAR:g} % of the longest side of that place; both where a ball wider by as much does the same."
-)
-
-
-def _summary(groups: dict[str, list[Row]]) -> Table:
-    """One column for each way, over the objects that every way solved."""
-    good = managed(groups)
-    first = next(iter(good.values()))
-    if not first:
-        return Table(["", *groups], [])
-    columns = [_column(rows, first) for rows in good.values()]
-    lines = [[name, *(column[name] for column in columns)] for name in columns[0]]
-    return Table([f"{len(first)} objects", *groups], lines, NOTE)
-
-
-def _column(rows: list[Row], first: list[Row]) -> dict[str, str]:
-    over = [row["over"] for row in rows if row["over"] is not None]
-
-    def total(key: str) -> int:
-        return sum(row[key] for row in rows)
-
-    return {
-        "parts; a mesh": f"{total('parts')}; {mean(rows, 'parts'):.1f}",
-        "of these primitives": f"{total('primitives')}",
-        "vertices a hull": f"{mean(rows, 'vertices'):.0f}",
-        "bytes; a mesh": f"{total('bytes'):,}; {mean(rows, 'bytes'):,.0f}",
-        "over: mean, worst": f"{statistics.fmean(over):.4f}, {max(over):.4f}" if over else "–",
-        "volume, ratio": ratio_of(rows, first, "volume"),
-        "CPU s to decompose": f"{sum(row['cpu'] for row in rows):.1f}",
-        "holes": f"{total('passed')} of {total('holes')}",
-        "hollows": f"{total('rested')} of {total('hollows')}",
-        "steps/s": f"{statistics.geometric_mean(row['rate'] for row in rows):.0f}",
-        "steps/s, ratio": ratio_of(rows, first, "rate"),
-        "contacts": f"{mean(rows, 'contacts'):.0f}",
-        **(_in_warp(rows, first) if "warp" in rows[0] else {}),
-    }
-
-
-def _in_warp(rows: list[Row], first: list[Row]) -> dict[str, str]:
-    return {
-        "MuJoCo Warp, steps/s": f"{statistics.geometric_mean(row['warp'] for row in rows):,.0f}",
-        "MuJoCo Warp, ratio": ratio_of(rows, first, "warp"),
-    }
-
-
-def _details(groups: dict[str, list[Row]]) -> Table:
-    lines = [
-        [f"{r['mesh']}, {way}", r["parts"], f"{r['passed']} of {r['holes']}", f"{r['rested']} of {r['hollows']}"]
-        for way, rows in groups.items()
-        for r in rows
-        if "error" not in r
-    ]
-    return Table(["object, way", "parts", "holes", "hollows"], lines)
+def details(rows: Mapping[str, list[Row]]) -> Table:
+    """Each task with each tool."""
+    lines = []
+    for same in zip(*rows.values(), strict=True):
+        cells = [f"{'yes' if row['passed'] else 'NO'} / {1000 * row['deepest']:.1f}" for row in same]
+        lines.append([f"{same[0]['task']}, {same[0]['engine']}", *cells])
+    return Table(["task, engine", *rows], lines, "Passed / deepest contact, mm.")

@@ -1,55 +1,105 @@
-"""Whole robots: hulls a link, farthest, and MuJoCo's speed with each mesh at its own scale and with links as solids."""
+"""Whole robots: hulls, overlaps and MuJoCo's speed with each mesh decomposed for itself, and with links as solids."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import re
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
+import trimesh
 
 import rlacd
+from benchmarks.boxes import write_boxes
 from benchmarks.cli import PATH
+from benchmarks.methods import Method, make_method
+from benchmarks.store import load_hulls, save_hulls
 from benchmarks.tables import Ratio, Table
+from rlacd.clear import Body, Surface, check
 from rlacd.cli.exit_codes import exit_codes
+from rlacd.decomposition import Decomposition
 from rlacd.errors import RlacdError
 from rlacd.io.robots import is_robot
+from rlacd.io.robots.read import read_robot
 from rlacd.io.write import write_file
+from rlacd.options.robots import RobotOptions
 
 STEPS, ROUNDS = 500, 3
 """Steps that are timed, and how often each model takes them, in turn with the other: the best counts."""
 
-WAYS: dict[str, dict[str, Any]] = {"own": {"per": "mesh", "relative_to": "mesh"}, "whole": {}}
-"""Each mesh at its own scale, and the default."""
+BEFORE = {"coacd": "each mesh by CoACD", "own": "each mesh at its own scale"}
+"""What the default is compared with: hulls as obj2mjcf writes them, or those that rlacd makes of each mesh alone."""
 
 HEAD = [
-    *("robot", "meshes", "links", "hulls: each mesh at its own scale", "now", "a link"),
-    *("farthest, mm", "its size, mm", "steps/s: own scale", "now", "CPU s: own scale", "now"),
+    *("robot", "meshes", "links", "hulls: {}", "now", "a link", "farthest, mm", "its size, mm"),
+    *("deepest new overlap, mm: {}", "now", "steps/s: {}", "now", "CPU s: {}", "now"),
 ]
 
 
 def rewritten(robot: Path, way: str, options: dict[str, Any], packages: list[str], out: Path) -> dict[str, Any]:
     """Rewrite a robot in one way, unless a run before has, and report."""
-    place, kept = out / robot.stem / f"{way}{robot.suffix}", out / robot.stem / f"{way}.json"
+    place, kept = out / robot.parent.name / robot.stem / f"{way}{robot.suffix}", out / "rows"
+    kept = kept / f"{robot.parent.name}_{robot.stem}_{way}.json"
     if not kept.exists():
         place.parent.mkdir(parents=True, exist_ok=True)
-        began = time.process_time()
-        done = rlacd.rewrite_robot(robot, place, package_dirs=packages, threads=1, **WAYS[way], **options)
-        row = {**done.report(), "links": len(done.links), "cpu": time.process_time() - began}
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        if way == "coacd":
+            row = _by_coacd(robot, place, packages, out / "coacd")
+        else:
+            began = time.process_time()
+            how: dict[str, Any] = {"per": "mesh", "relative_to": "mesh"} if way == "own" else {}
+            done = rlacd.rewrite_robot(robot, place, package_dirs=packages, threads=1, **how, **options)
+            cpu, deepest = time.process_time() - began, max((pair.new_depth for pair in done.pairs), default=0.0)
+            row = {**done.report(), "links": len(done.links), "cpu": cpu, "deepest": deepest}
         write_file(kept, json.dumps(row).encode())
     return {**json.loads(kept.read_bytes()), "place": place}
 
 
-def measure(robot: Path, options: dict[str, Any], packages: list[str], out: Path) -> dict[str, Any]:
+def _by_coacd(robot: Path, place: Path, packages: list[str], store: Path) -> dict[str, Any]:
+    """Replace each mesh by what CoACD makes of it."""
+    method, cpu = make_method("coacd"), 0.0
+    read, results = read_robot(robot, packages, apart=True), {}
+    for collider in (collider for body in read.bodies for collider in body.colliders):
+        mesh = collider.mesh()
+        hulls, seconds = _stored(method, np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32), store)
+        results[collider] = Decomposition(hulls, {}, mesh)
+        cpu += seconds
+    read.write(place, results, None, RobotOptions(), whole=False)
+    bodies = [Body(body.name, _surface(body.mesh()), [*map(_surface, body.hulls(results))]) for body in read.bodies]
+    deepest = max((one.depth for one in check(bodies, read.motion(500, 0)).values()), default=0.0)
+    return {"hulls": sum(map(len, results.values())), "cpu": cpu, "deepest": deepest}
+
+
+def _stored(method: Method, vertices: Any, faces: Any, store: Path) -> tuple[list[trimesh.Trimesh], float]:
+    """The hulls of a mesh, and the CPU seconds that they took, now or in a run before."""
+    given = np.ascontiguousarray(vertices).tobytes() + np.ascontiguousarray(faces).tobytes() + method.version.encode()
+    path = store / f"{hashlib.sha256(given).hexdigest()[:24]}.npz"
+    if not path.exists():
+        store.mkdir(parents=True, exist_ok=True)
+        began = time.process_time()
+        save_hulls(path, method.run(vertices, faces, method.default, 1), {"cpu": time.process_time() - began})
+    hulls, account = load_hulls(path)
+    return [trimesh.Trimesh(*hull, process=False).convex_hull for hull in hulls], float(account["cpu"])
+
+
+def _surface(mesh: trimesh.Trimesh) -> Surface:
+    return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def measure(robot: Path, before: str, options: dict[str, Any], packages: list[str], out: Path) -> dict[str, Any]:
     """Rewrite a robot in both ways, and step both models in turn."""
-    row: dict[str, Any] = {way: rewritten(robot, way, options, packages, out) for way in WAYS}
+    ways = {"before": before, "whole": "whole"}
+    row: dict[str, Any] = {key: rewritten(robot, way, options, packages, out) for key, way in ways.items()}
     if row["whole"]["links"]:
-        for way, speed in zip(WAYS, _speeds([_model(row[way]["place"]) for way in WAYS]), strict=True):
-            row[way]["speed"] = speed
-    return {"robot": robot.stem, **row}
+        for key, speed in zip(ways, _speeds([_model(row[key]["place"]) for key in ways]), strict=True):
+            row[key]["speed"] = speed
+    return {"robot": robot.parent.name if robot.stem == "robot" else robot.stem, **row}
 
 
 def _model(path: Path) -> Any:
@@ -81,45 +131,52 @@ def _speeds(models: list[Any]) -> list[float]:
 
 
 def _line(row: dict[str, Any]) -> list[object]:
-    own, whole = row["own"], row["whole"]
+    own, whole = row["before"], row["whole"]
     far, size = (1000 * whole["metres"] * (whole[what] or math.nan) for what in ("farthest_abs", "size_abs"))
     return [
         *(row["robot"], whole["meshes"], whole["links"], own["hulls"], whole["hulls"]),
         *(f"{whole['hulls'] / whole['links']:.1f}", f"{far:.1f}", f"{size:.0f}"),
+        *(f"{1000 * whole['metres'] * way['deepest']:.2f}" for way in (own, whole)),
         *(f"{way[what]:.{digits}f}" for what, digits in (("speed", 0), ("cpu", 1)) for way in (own, whole)),
     ]
+
+
+def _paths(folder: Path, robots: Sequence[str], out: Path) -> list[Path]:
+    named = [folder / name for name in robots] or sorted(path for path in folder.rglob("*") if is_robot(path))
+    return [*named, *write_boxes(out / "boxes")]
 
 
 @click.command()
 @click.argument("folder", type=PATH)
 @click.argument("robots", nargs=-1)
 @click.option("--out", "-o", type=PATH, required=True, help="Folder of results, which a next run goes on with.")
+@click.option("--before", type=click.Choice([*BEFORE]), default="coacd", show_default=True, help="Compared with.")
 @click.option("--package-dir", "packages", multiple=True, help="As of rlacd decompose.")
-@click.option("--quality", default="fast", show_default=True, help="Of both ways.")
-def app(folder: Path, robots: tuple[str, ...], out: Path, packages: tuple[str, ...], quality: str) -> None:
-    """Rewrite all robots (URDF, MJCF) of a folder, or those named, and step them in MuJoCo. Needs rlacd[sim].
+@click.option("--quality", default="fast", show_default=True, help="Of rlacd.")
+def app(folder: Path, robots: tuple[str, ...], out: Path, before: str, packages: tuple[str, ...], quality: str) -> None:
+    """Rewrite all robots (URDF, MJCF) of a folder, or those named, and six of boxes; step them in MuJoCo. Needs
+    rlacd[sim,clear], and CoACD, which takes a minute or so a mesh.
 
     \b
     python -m benchmarks robots $(python -c "import example_robot_data as e; print(e.path)") --out RUN
     """
     with exit_codes():
-        paths = [folder / name for name in robots] or sorted(path for path in folder.rglob("*") if is_robot(path))
         rows = []
-        for path in paths:
+        for path in _paths(folder, robots, out):
             try:
-                row = measure(path, {"quality": quality}, [*packages], out)
+                row = measure(path, before, {"quality": quality}, [*packages], out)
             except (RlacdError, ValueError) as error:
                 click.echo(f"{path.stem}: {error}")
                 continue
             if row["whole"]["links"]:
                 rows.append(row)
                 click.echo(_line(row))
-        click.echo(Table(HEAD, [_line(row) for row in rows]))
+        click.echo(Table([head.format(BEFORE[before]) for head in HEAD], [_line(row) for row in rows]))
         for what, one, other in (
             ("hulls a link", ("whole", "hulls"), ("whole", "links")),
-            ("hulls, own scale / now", ("own", "hulls"), ("whole", "hulls")),
-            ("steps a second, now / own scale", ("whole", "speed"), ("own", "speed")),
-            ("CPU seconds, now / own scale", ("whole", "cpu"), ("own", "cpu")),
+            ("hulls, before / now", ("before", "hulls"), ("whole", "hulls")),
+            ("steps a second, now / before", ("whole", "speed"), ("before", "speed")),
+            ("CPU seconds, now / before", ("whole", "cpu"), ("before", "cpu")),
         ):
             values = ([row[way][key] for row in rows] for way, key in (one, other))
             click.echo(f"{what}, geometric mean: {Ratio.of(*values)}")

@@ -26,5 +26,5 @@ class Boxes:
 if __name__ == "__main__":
     meshes, run = map(Path, sys.argv[1:])
     train(meshes, run, TrainOptions.preset("returns", env_steps=5000), encoder=Boxes())
-    policy = load_policy(run, Boxes(), shortlist=10, concave_edges=4)  # the paper's rule
+    policy = load_policy(run, Boxes(), shortlist=10, reflex_edges=4)  # the paper's rule
     print(len(rlacd.decompose(next(meshes.rglob("*.ply")), policy=policy, quality="fast")), "hulls")

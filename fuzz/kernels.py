@@ -21,6 +21,7 @@ from fuzz.geometry import Floats, Polytope, distance_to_triangles, distance_to_u
 from fuzz.judges import finite_faces
 from fuzz.recipes import make_shape
 from rlacd import _native
+from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 
@@ -64,7 +65,7 @@ def hull_of(mesh: Soup, random: np.random.Generator) -> Hull | None:
     hull = Hull(vertices, faces, _native.mesh_volume(vertices, faces))
     limit = int(random.integers(4, 40))
     try:
-        fewer, few_faces = _native.simplify_hull(vertices, faces, limit, 2**31 - 1, 1e-6, np.empty((0, 4)))
+        fewer, few_faces = _native.simplify_hull(hull.body, limit, 2**31 - 1, 1e-6, np.empty((0, 4)))
     except ValueError as error:
         if "flat" not in str(error):
             raise
@@ -97,7 +98,7 @@ def surface_queries(mesh: Soup, other: Soup, random: np.random.Generator) -> _na
 
 def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, random: np.random.Generator) -> None:
     """Check the union of hulls against a surface."""
-    union = _native.HullUnion([hull.vertices for hull in hulls], [hull.faces for hull in hulls], 1)
+    union = hull_union(hulls, 1)
     solids = [Polytope(hull.vertices, hull.faces.astype(np.int64)) for hull in hulls]
     points = np.concatenate([random.uniform(-2, 2, (20, 3)), sampled(*mesh, 20, random)])
     expected = distance_to_union(points, solids)
@@ -116,7 +117,7 @@ def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, rando
             reached = float(distance_to_triangles(on, mesh[0][mesh[1]]).max())
             assert reached <= upper + 2e-5, f"over: {reached} > {upper}"
     pairs = np.array([[i, j] for i in range(len(hulls)) for j in range(i)], dtype=np.int32).reshape(-1, 2)
-    same(lambda threads: _native.joint_hull_volumes([hull.corners for hull in hulls], pairs, threads))
+    same(lambda threads: _native.joint_hull_volumes([hull.body for hull in hulls], pairs, threads))
 
 
 def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generator) -> None:
@@ -135,14 +136,13 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
     _native.candidate_planes(*mesh, hull.vertices, hull.faces, 12, 4)
     volume = _native.mesh_volume(*mesh)
     threshold = float(random.choice([0.01, 0.05, 0.3]))
-    met = _native.meets_concavity(*mesh, hull.vertices, hull.faces, volume, hull.volume, threshold)
-    (lower, upper), *_ = _native.concavity(*mesh, hull.vertices, hull.faces, volume, hull.volume, TOLERANCE)
+    met = _native.meets_concavity(*mesh, hull.body, volume, hull.volume, threshold)
+    (lower, upper), *_ = _native.concavity(*mesh, hull.body, volume, hull.volume, TOLERANCE)
     assert lower <= upper, f"concavity: {lower}, {upper}"
     assert not (met and lower > threshold * (1 + 1e-9)), f"concavity {lower} said to be within {threshold}"
     reached = distance_to_triangles(sampled(hull.vertices, hull.faces.astype(np.int64), 30, random), mesh[0][mesh[1]])
     assert reached.max() <= upper + ROUNDING, f"concavity: {reached.max()} > {upper}"
     _native.glue(*mesh, *other)
-    _native.do_touch(*([array] for array in (*mesh, *other)))
 
 
 def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generator) -> None:
@@ -151,14 +151,14 @@ def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generat
     reachable, ground = bool(random.random() < 0.5), np.array([[0, 0, 1, -0.5]])[: int(random.integers(2))]
     centres, radii = same(
         lambda threads: _native.navigable_balls(
-            surface, hull.vertices, hull.faces, radius, tolerance, reachable, None, ground, radius / 2, threads
+            surface, hull.body, radius, tolerance, reachable, None, ground, radius / 2, threads
         )
     )
     if len(centres) == 0:
         return
     assert (surface.distance(centres) >= radii + 0.9 * tolerance).all(), "a ball is too near"
     balls = _native.BallSet(centres, radii)
-    touched, depth = balls.intrusions(hull.vertices, hull.faces, None, 1e-9)
+    touched, depth = balls.intrusions(hull.body, None, 1e-9)
     solid = Polytope(hull.vertices, hull.faces.astype(np.int64))
     clear = solid.height(centres) > 0
     expected = radii - np.where(clear, solid.distance(centres), 0)

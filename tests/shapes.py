@@ -38,6 +38,10 @@ class Closed:
         assert rank == 3
         return Closed(np.ascontiguousarray(self.vertices[indices]), faces)
 
+    @property
+    def body(self) -> _native.ConvexBody:
+        return _native.ConvexBody(self.vertices, self.faces)
+
 
 def from_manifold(solid: Any) -> Closed:
     mesh = solid.to_mesh64()

@@ -12,7 +12,7 @@ import trimesh
 from lxml import etree
 
 import rlacd
-from rlacd.clear import Body, at_rest, check, mjcf_motion, urdf_motion
+from rlacd.clear import Body, Surface, at_rest, check, mjcf_motion, urdf_motion
 from rlacd.clear.bodies import overlapping, placed_boxes
 from rlacd.errors import OptionError
 from tests.moving import ALL, Joint, Robot, block, drawer, fork_and_lug
@@ -177,9 +177,8 @@ def test_a_body_inside_another_touches_it_and_one_in_its_hollow_does_not() -> No
     inner = trimesh.creation.box((1, 1, 1))
 
     def body(name: str, mesh: trimesh.Trimesh) -> Body:
-        surface = np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32)
         hull = mesh.convex_hull
-        return Body(name, surface, [(np.asarray(hull.vertices), np.asarray(hull.faces, np.int32))])
+        return Body(name, Surface(mesh.vertices, mesh.faces), [Surface(hull.vertices, hull.faces)])
 
     (found,) = check([body("a", outer), body("b", inner)], at_rest("ab")).values()
     assert (found.hulls.tolist(), found.meshes.tolist(), found.offences) == ([True], [True], ())
@@ -197,7 +196,7 @@ def test_without_the_extra_a_warning_says_that_nothing_was_checked(arm: Path, mo
 def test_what_is_not_for_a_kind_of_file_is_refused(arm: Path, tmp_path: Path) -> None:
     with pytest.raises(OptionError, match=r"srdf .* is for a URDF"):
         rlacd.rewrite_robot(arm, arm.with_name("out.xml"), srdf=tmp_path / "a.srdf")
-    with pytest.raises(OptionError, match=r"exclude .* is for MJCF"):
+    with pytest.raises(OptionError, match=r"exclude .* is for MJCF and USD"):
         rlacd.rewrite_robot(fork_and_lug().write(tmp_path), tmp_path / "out.urdf", exclude="always")
     with pytest.raises(OptionError, match="some of adjacent, always, never"):
         rlacd.rewrite_robot(arm, arm.with_name("out.xml"), exclude="sometimes")
@@ -212,12 +211,12 @@ def test_nodes_of_a_scene_that_do_not_touch_do_not_as_hulls() -> None:
     hulls = {name: [hull for hull in done if hull.metadata["node"] == name] for name in parts}
     assert {name for name, own in hulls.items() if own} == set(parts)
     bodies = [
-        Body(name, (mesh.vertices, mesh.faces), [(h.vertices, h.faces) for h in hulls[name]])
+        Body(name, Surface(mesh.vertices, mesh.faces), [Surface(h.vertices, h.faces) for h in hulls[name]])
         for name, mesh in parts.items()
     ]
     assert check(bodies, at_rest(list(parts))) == {}
     apart = [rlacd.decompose(mesh, threshold_abs=0.03 * 0.413, quality="fast", threads=1) for mesh in parts.values()]
-    alone = [Body(b.name, b.mesh, [(h.vertices, h.faces) for h in one]) for b, one in zip(bodies, apart, strict=True)]
+    alone = [b.with_hulls([Surface(h.vertices, h.faces) for h in own]) for b, own in zip(bodies, apart, strict=True)]
     assert len(check(alone, at_rest(list(parts)))) == 1, "each for itself, their hulls touch"
     assert not [warning for warning in done.report["warnings"] if "touch" in warning]
 

@@ -1,4 +1,4 @@
-"""Planes at concave edges, against trimesh's adjacency, real cuts and shapes whose answer is known."""
+"""Planes at reflex edges, against trimesh's adjacency, real cuts and shapes whose answer is known."""
 
 from __future__ import annotations
 
@@ -209,7 +209,7 @@ def test_edges_of_a_scan_lie_deep_not_in_its_noise() -> None:
 
 
 def assert_planes_belong_to_edges(component: Component, count: int = 4) -> None:
-    """Every plane contains a concave edge; it halves its angle, or has one of its faces on one side and touches it."""
+    """Every plane contains a reflex edge; it halves its angle, or has one of its faces on one side and touches it."""
     edges, candidates = ReflexEdges.of(component), concave_edge_planes(component, count)
     assert len(candidates) <= 3 * count
     assert np.linalg.norm(candidates.directions, axis=1) == pytest.approx(1)

@@ -236,16 +236,6 @@ def test_a_fork_has_threads_of_its_own() -> None:
             assert np.array_equal(found, other)
 
 
-def test_some_of_the_hulls_are_as_if_they_were_alone() -> None:
-    rng, some = np.random.default_rng(3), [7, 0, 4]
-    hulls = [h for c in rng.uniform(-1, 1, (9, 3)) if (h := Hull.of(c + rng.normal(scale=0.4, size=(12, 3))))]
-    whole, alone = hull_union(hulls), hull_union([hulls[i] for i in some])
-    points = rng.uniform(-2, 2, (500, 3))
-    found = whole.only(np.array(some, dtype=np.int32)).distance(points)
-    assert np.array_equal(found, alone.distance(points))
-    assert not np.array_equal(found, whole.distance(points))
-
-
 def test_no_hulls_add_nothing_and_miss_everything() -> None:
     brick = from_manifold(box(*BRICK))
     assert hull_distances([], brick.vertices, brick.faces) == HullDistances((0.0, 0.0), (np.inf, np.inf))

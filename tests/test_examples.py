@@ -136,6 +136,7 @@ def test_the_table_names_every_option_and_the_command_offers_every_argument() ->
         name for p in command.params if not getattr(p, "hidden", False) for name in p.opts if name.startswith("--")
     } - {
         "--from",  # of stdin, see docs/formats.md
+        "--like",  # a report, see docs/reference/report.md
         "--help",
         "--help-all",
     }

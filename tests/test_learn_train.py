@@ -293,7 +293,7 @@ def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tm
 
     assert "times greedy's parts" in said[-1]
     policy, solid = make_policy(str(path), scale=0.04), Component(small_solids()["cross"])
-    assert load_policy(tmp_path / "run", shortlist=10, concave_edges=4).choose(solid) == policy.choose(solid)
+    assert load_policy(tmp_path / "run", shortlist=10, reflex_edges=4).choose(solid) == policy.choose(solid)
     with Run(1) as alone:
         done, left = CutTree(solid, policy, alone).cut_until(Concavity(0.04))
     # Planes of concave edges are asked too, and the least hull sum finds them: no volume is left to save.

@@ -128,7 +128,7 @@ def test_only_the_common_area_of_two_faces_vanishes() -> None:
     assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(12), "coplanar faces on the same side stay"
 
 
-def test_parts_that_are_all_film_keep_their_surfaces() -> None:
+def test_parts_that_are_all_slivers_keep_their_surfaces() -> None:
     """Every face of such a part touches the other one: without a surface there would be nothing to measure."""
     below = Component(Manifold.cube((1, 1, 2e-9)))
     above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
@@ -152,10 +152,10 @@ def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
 
 
 def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
-    solid, shaving, sheet = slab(1), slab(0.001, 1), slab(0.001, 3)
+    solid, sliver, sheet = slab(1), slab(0.001, 1), slab(0.001, 3)
     with Run(1) as run:
-        assert drop_slivers([solid, shaving, sheet], run) == [solid, sheet]
-        assert drop_slivers([solid, shaving], run, suspects=[solid]) == [solid, shaving]
+        assert drop_slivers([solid, sliver, sheet], run) == [solid, sheet]
+        assert drop_slivers([solid, sliver], run, suspects=[solid]) == [solid, sliver]
         assert drop_slivers([sheet], run) == [sheet]
 
 
@@ -196,7 +196,7 @@ def test_what_grows_holds_its_hull_and_the_solid_comes_no_deeper_into_it(count: 
     solid = bars(count, seed)
     with Run(1) as run:
         piece = max((member for part in merged(solid, run) for member in part.members), key=lambda one: one.volume)
-    spaces = solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth)
+    spaces = solid.filling.grown(piece.hull.body, depth)
     normals, offsets = spaces[:, :3], spaces[:, 3]
     assert (piece.hull.vertices @ normals.T <= offsets + 1e-9).all()
     inside = (offsets - dense(from_manifold(to_manifold(solid.vertices, solid.faces))) @ normals.T).min(axis=1)
@@ -317,7 +317,7 @@ def share_fits(solid: Component, hull: Hull, threshold: float) -> bool | None:
     if len(vertices) == 0:
         return None
     return _native.meets_concavity(
-        vertices, mesh.tri_verts.astype(np.int32), hull.vertices, hull.faces, share.volume(), hull.volume, threshold
+        vertices, mesh.tri_verts.astype(np.int32), hull.body, share.volume(), hull.volume, threshold
     )
 
 
@@ -333,7 +333,7 @@ def test_a_quick_no_about_a_hull_or_a_pair_is_never_wrong(seed: int, threshold: 
     hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
     pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
     screen = Concavity(threshold).screen
-    _, feasibilities = screen.feasibilities(solid.filling, [hull.corners for hull in hulls], pairs, 1)
+    _, feasibilities = screen.feasibilities(solid.filling, [hull.body for hull in hulls], pairs, 1)
     for (i, j), feasibility in zip(pairs, feasibilities, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
         alone = screen.feasibility(solid.filling, joint)

@@ -42,7 +42,7 @@ GB = 2**30
 WORDS = {2: "two", 3: "three", 4: "four", 5: "five"}
 ORDINALS = {3: "third", 4: "quarter"}
 HALVES = {0.5: "half"}
-TWICE = {1.0: "as much as", 2.0: "twice"}
+TIMES = {1.0: "the work of another first pass", 2.0: "twice the work of the first pass"}
 
 
 def page(name: str) -> str:
@@ -63,7 +63,7 @@ LIMITS = {
     "docs/search.md": [
         f"may do {TIMES_FIRST_PASS:g} times the work of the first pass, at least {LEAST_WORK / 1e6:g} and at most "
         f"{MOST_WORK / 1e6:g} million units",
-        f"saved nothing in {TWICE[PATIENCE]} the work",
+        f"saved nothing in {TIMES[PATIENCE]}",
         f"at {MOST_CUTTING / 1e6:g} million units and {MOST_PER_FACE} per triangle",
         f"merging at {MOST_MERGING / 1e6:g} million",
         f"more than {MANY_COMPONENTS:,} pieces",

@@ -1,4 +1,4 @@
-"""`python -m benchmarks physics`: balls fall where the exact mesh lets them, and piles are timed."""
+"""`python -m benchmarks physics` and `piles`: balls fall where the exact mesh lets them, and piles are timed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from benchmarks import simulate
-from benchmarks.physics import app
+from benchmarks.piles import app
 from click.testing import CliRunner
 
 import rlacd
@@ -72,7 +72,7 @@ def test_the_command_writes_a_page_with_hulls_beside_primitives(
     given = [str(tmp_path / "meshes"), "--out", str(tmp_path / "run")]
     done = CliRunner().invoke(app, [*given, "--piles", "2", "--methods", "fast,fast:primitives=true"])
     assert done.exit_code == 0, done.output
-    lines = (tmp_path / "run" / "physics.md").read_text().splitlines()
+    lines = (tmp_path / "run" / "piles.md").read_text().splitlines()
     cells = {line.split(" | ")[0].strip("| "): line.strip("| ").split(" | ")[1:] for line in lines if " | " in line}
     assert cells["parts; a mesh"] == ["2; 1.0", "2; 1.0"]
     assert cells["of these primitives"] == ["0", "2"]

@@ -108,7 +108,7 @@ def test_a_section_may_have_holes_and_islands() -> None:
 
 
 def test_what_touches_the_plane_from_one_side_stays_whole() -> None:
-    """A corner, an edge, a valley and a face: no side gets a film of them."""
+    """A corner, an edge, a valley and a face: no side gets a sliver of them."""
     roof = Manifold.extrude(CrossSection([[(-1, 0), (0, 0.5), (1, 0), (1, 1), (-1, 1)]]), 1)  # a valley at y = 0.5
     tip = Manifold.hull_points(np.array([(0, 0, 0), (1, 0, 1), (-1, 1, 1), (-1, -1, 1)], dtype=float))
     for solid, plane in (
@@ -145,7 +145,7 @@ def test_cavities_stay_in_the_piece_around_them() -> None:
 
 @pytest.mark.parametrize("axis", range(3))
 def test_a_cut_along_an_axis_is_exact(axis: int) -> None:
-    """Faces in the plane stay whole on their own side, whatever the last bits of its offset: no side keeps a film."""
+    """Faces in the plane stay whole on their own side, whatever the last bits of its offset: no side keeps a sliver."""
 
     def upright(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Manifold:
         a, b = np.roll(lower, axis + 1), np.roll(upper, axis + 1)  # the last coordinate becomes number `axis`
@@ -180,6 +180,15 @@ def test_a_surface_that_is_not_closed_keeps_all_its_points_on_both_sides() -> No
             assert side is not None
             corners = vertices[sign * (vertices @ axis - 0.1) < 0]
             assert (np.abs(side[0][:, None] - corners).sum(axis=2).min(axis=0) == 0).all()
+
+
+def test_a_rim_that_runs_an_edge_both_ways_leaves_both_sides_closed() -> None:
+    """Where a real solid overlaps itself and a sliver of it lies above the plane, straightening makes such a rim."""
+    case = np.load(Path(__file__).parent / "cases" / "edge_both_ways.npz")
+    assert is_closed(case["faces"])
+    for side in _native.cut(case["vertices"], case["faces"], *case["normal"].tolist(), float(case["offset"]), -1.0):
+        assert side is not None
+        assert is_closed(side[1])
 
 
 def blob(seed: int) -> trimesh.Trimesh:
@@ -229,7 +238,7 @@ def test_cuts_follow_cuts_without_piling_up_vertices(seed) -> None:
 
 @pytest.mark.parametrize("offset", [0.0, 0.25, 0.5, 1.0])
 @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.25, 0.5, 0.0)])
-def test_films_that_coincide_are_closed(offset, shift) -> None:
+def test_slivers_that_coincide_are_closed(offset, shift) -> None:
     """Two boxes that share their faces and cross: rims coincide in part."""
     box = trimesh.creation.box(bounds=[(0, 0, 0), (1, 1, 1)])
     both = component_of(trimesh.util.concatenate([box, box.copy().apply_translation(shift)]))

@@ -152,10 +152,10 @@ def test_random_shortlists_cut_by_one_of_their_planes_whatever_was_cut_before(na
 def test_a_random_shortlist_of_all_planes_is_greedy_and_seeds_draw_different_ones() -> None:
     root = component_of(table())
     for edges, greedy in ((4, "greedy-hull-sum+edges"), (0, "greedy-hull-sum")):
-        planes = [RandomShortlist(150, concave_edges=edges).choose(root), make_policy(greedy).choose(root)]
+        planes = [RandomShortlist(150, reflex_edges=edges).choose(root), make_policy(greedy).choose(root)]
         sums = [sum(side.hull.volume for side in root.cut(plane) if side is not None) for plane in planes]
         assert sums[0] == pytest.approx(sums[1], rel=1e-9)
-    assert len({RandomShortlist(1, concave_edges=0, seed=seed).choose(root) for seed in range(8)}) > 1
+    assert len({RandomShortlist(1, reflex_edges=0, seed=seed).choose(root) for seed in range(8)}) > 1
 
 
 def chair() -> manifold3d.Manifold:

@@ -13,7 +13,7 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
-from rlacd.proxy.model import Lift
+from rlacd.proxy.model import Transfer
 from rlacd.proxy.simplify import simplify
 from rlacd.repair.union import unite
 from rlacd.run import Run
@@ -99,8 +99,8 @@ def test_a_part_without_room_below_the_threshold_keeps_its_own_hull() -> None:
         middle = (broken + met) / 2
         broken, met = (broken, middle) if Concavity(middle).is_met(solid) else (middle, met)
     goal, policy = Concavity(met), make_policy("greedy", SweepCache(), None)
-    lift = Lift(solid, proxy, goal, policy, Run(1))
-    (part,), _ = lift([proxy.component])
+    transfer = Transfer(solid, proxy, goal, policy, Run(1))
+    (part,), _ = transfer([proxy.component])
     assert goal.is_met(part)
     assert hull_union([part.hull], 1).distance(solid.vertices, 1).max() <= 1e-9
 

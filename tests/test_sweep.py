@@ -1,4 +1,4 @@
-"""The plane sweep against real cuts; the tree of cuts, where a second policy takes over and films are halved."""
+"""The plane sweep against real cuts; the tree of cuts, where a second policy takes over and slivers are halved."""
 
 from __future__ import annotations
 
@@ -196,11 +196,11 @@ def test_the_first_of_equal_planes_is_taken() -> None:
 
 def test_slivers_are_left_only_where_every_plane_leaves_one() -> None:
     notched = Component(Manifold.cube((4, 4, 1)) - Manifold.cube((1, 1, 0.02)))
-    shaving, middle = Candidates(np.eye(3)[2:], np.array([[0.02]])), Candidates(np.eye(3)[2:], np.array([[0.02, 0.5]]))
-    plane = least_excess(notched, shaving, 1.0)
+    sliver, middle = Candidates(np.eye(3)[2:], np.array([[0.02]])), Candidates(np.eye(3)[2:], np.array([[0.02, 0.5]]))
+    plane = least_excess(notched, sliver, 1.0)
     assert plane.offset == 0.02, "nothing else is left"
     plane = least_excess(notched, middle, 1.0)
-    assert plane.offset == 0.5, "the notch is not worth a film"
+    assert plane.offset == 0.5, "the notch is not worth a sliver"
     assert least_excess(notched, Candidates(np.eye(3)[2:], np.array([[-1.0, 0.0, 1.0, 7.0]])), 1.0) is None
     assert least_excess(notched, Candidates(np.zeros((0, 3)), np.zeros((0, 1))), 1.0) is None
 
@@ -317,20 +317,20 @@ class Never:
         return None
 
 
-def test_a_film_that_no_plane_cuts_is_halved_until_it_is_done() -> None:
+def test_a_sliver_that_no_plane_cuts_is_halved_until_it_is_done() -> None:
     with Run(1) as run:
-        film = gutter(1e-4)
-        parts = cut_by(CutTree(film, Never(), run))
+        sliver = gutter(1e-4)
+        parts = cut_by(CutTree(sliver, Never(), run))
         assert 4 <= len(parts) <= 64
-        assert sum(part.volume for part in parts) == pytest.approx(film.volume, rel=1e-6)
+        assert sum(part.volume for part in parts) == pytest.approx(sliver.volume, rel=1e-6)
         corners = np.concatenate([part.vertices for part in parts])
-        assert np.allclose([corners.min(axis=0), corners.max(axis=0)], film.box, atol=1e-12)
+        assert np.allclose([corners.min(axis=0), corners.max(axis=0)], sliver.box, atol=1e-12)
 
 
-def test_a_film_inside_out_is_halved_and_a_body_is_left_as_it_is() -> None:
+def test_a_sliver_inside_out_is_halved_and_a_body_is_left_as_it_is() -> None:
     with Run(1) as run:
-        film = gutter(1e-4)
-        turned = Component((film.vertices, np.ascontiguousarray(film.faces[:, ::-1])))
+        sliver = gutter(1e-4)
+        turned = Component((sliver.vertices, np.ascontiguousarray(sliver.faces[:, ::-1])))
         assert turned.volume < 0
         below, above = cut.halves(turned)
         assert below.volume + above.volume == pytest.approx(turned.volume, rel=1e-6)

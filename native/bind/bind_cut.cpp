@@ -3,7 +3,6 @@
 #include "decompose/concave_edges.hpp"
 #include "decompose/least_excess.hpp"
 #include "decompose/sweep.hpp"
-#include "solid/filling.hpp"
 #include "solid/pieces.hpp"
 #include "solid/reunite.hpp"
 
@@ -79,14 +78,9 @@ void bind_cut(nb::module_& m) {
         "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and "
         "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
   m.def("halve",
-        released([](const Mesh& mesh, const HullCorners& corners, const std::vector<const HullCorners*>& around,
-                    const std::vector<double>& volumes, double share, double least) {
-          require(around.size() == volumes.size(), "one volume a hull");
-          std::vector<HullAround> hulls;
-          for (std::size_t i = 0; i < around.size(); ++i) hulls.push_back({&around[i]->all, volumes[i]});
-          return columns(halve(mesh, corners.all, hulls, share, least));
-        }),
-        "vertices"_a, "faces"_a, "corners"_a, "around"_a, "volumes"_a, "share"_a, "least"_a,
+        released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<const ConvexBody*>& around,
+                    double share, double least) { return columns(halve(mesh, hull, around, share, least)); }),
+        "vertices"_a, "faces"_a, "hull"_a, "around"_a, "share"_a, "least"_a,
         "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
         "other of the two hulls around whose volumes it would add the least to; None twice if there are no two.");
   m.def(

@@ -1,4 +1,6 @@
 // Python bindings of distances: of points, of a part from its hull, of hulls from a solid and of their union.
+#include <nanobind/stl/shared_ptr.h>
+
 #include "bind/released.hpp"
 #include "convex/union_distance.hpp"
 #include "core/parallel.hpp"
@@ -117,28 +119,27 @@ void bind_concavity(nb::module_& m) {
   nb::class_<TreeCache>(m, "TreeCache", "The tree of one part's surface, made by the first test that needs it.")
       .def(nb::init<>());
   m.def("meets_concavity",
-        released([](const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold,
+        released([](const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double threshold,
                     const TreeCache* tree) {
           const TreeCache own;
           return meets_concavity(part, hull, part_volume, hull_volume, threshold, tree ? *tree : own);
         }),
-        "part_vertices"_a, "part_faces"_a, "hull_vertices"_a, "hull_faces"_a, "part_volume"_a, "hull_volume"_a,
-        "threshold"_a, "tree"_a = nb::none(),
+        "vertices"_a, "faces"_a, "hull"_a, "part_volume"_a, "hull_volume"_a, "threshold"_a, "tree"_a = nb::none(),
         "Whether the concavity of a closed part with this hull is certainly <= threshold.\n\n"
         "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part. "
         "`tree` is that of the part's surface; without it, one is made and forgotten.");
   m.def("volume_radius", released(volume_radius), "part_volume"_a, "hull_volume"_a,
         "R_v: the radius of a ball with the volume between a part and its hull.");
   m.def("concavity",
-        released([](const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
+        released([](const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double tolerance,
                     double floor, const TreeCache* tree) {
           require_positive(tolerance);
           const TreeCache own;
           const Concavity c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
           return std::tuple(c.value(), c.part_to_hull, c.hull_to_part, c.volume_radius);
         }),
-        "part_vertices"_a, "part_faces"_a, "hull_vertices"_a, "hull_faces"_a, "part_volume"_a, "hull_volume"_a,
-        "tolerance"_a, "floor"_a = 0.0, "tree"_a = nb::none(),
+        "vertices"_a, "faces"_a, "hull"_a, "part_volume"_a, "hull_volume"_a, "tolerance"_a, "floor"_a = 0.0,
+        "tree"_a = nb::none(),
         "Concavity of a closed part with this hull: (value, part_to_hull, hull_to_part, volume_radius).\n\n"
         "The first three are certified intervals (lower, upper). The value's is at most `tolerance` wide; that of a "
         "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
@@ -147,13 +148,6 @@ void bind_concavity(nb::module_& m) {
         "Surface (vertices [V, 3], faces [F, 3]) of the union of two closed solids with disjoint interiors: both "
         "surfaces without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring "
         "only.");
-  m.def("do_touch", released([](const std::vector<Mesh>& first, const std::vector<Mesh>& second) {
-          return std::any_of(first.begin(), first.end(), [&](const Mesh& a) {
-            return std::any_of(second.begin(), second.end(), [&](const Mesh& b) { return do_touch(a, b); });
-          });
-        }),
-        "vertices_a"_a, "faces_a"_a, "vertices_b"_a, "faces_b"_a,
-        "Whether some solid of a list touches one of another face to face, not just in an edge or a point.");
 }
 
 void bind_filling(nb::module_& m) {
@@ -164,14 +158,14 @@ void bind_filling(nb::module_& m) {
            }),
            "vertices"_a, "faces"_a, "threads"_a = 1)
       .def_prop_ro("surface", &Filling::surface, nb::rv_policy::reference_internal, "The solid's surface.")
-      .def("feasibility", released([](const Filling& self, const Mesh& hull, double threshold) {
+      .def("feasibility", released([](const Filling& self, const ConvexBody& hull, double threshold) {
              return static_cast<int>(self.feasibility(hull, threshold));
            }),
-           "hull_vertices"_a, "hull_faces"_a, "threshold"_a,
+           "hull"_a, "threshold"_a,
            "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
            "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
       .def("joint_feasibilities",
-           released([](const Filling& self, const std::vector<const HullCorners*>& hulls, const PairsIn& pairs,
+           released([](const Filling& self, const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs,
                        double threshold, int threads) {
              const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
              std::vector<double> volumes(pairs.shape(0));
@@ -188,25 +182,26 @@ void bind_filling(nb::module_& m) {
            "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, and the `feasibility` [P] of each, decided less "
            "thoroughly than for a single hull, where the hulls themselves are close enough to their shares of the "
            "solid. There is no volume (0) where it is 2.")
-      .def("comes_deeper", released(&Filling::comes_deeper), "hull_vertices"_a, "hull_faces"_a, "threshold"_a,
+      .def("comes_deeper", released(&Filling::comes_deeper), "hull"_a, "threshold"_a,
            "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
-      .def("clipped", released([](const Filling& self, const Mesh& hull) {
+      .def("clipped", released([](const Filling& self, const ConvexBody& hull) {
              ClippedSolid clip = self.clipped(hull);
              return std::tuple(std::move(clip.mesh.vertices), std::move(clip.mesh.faces), clip.volume);
            }),
-           "hull_vertices"_a, "hull_faces"_a,
+           "hull"_a,
            "The solid clipped to a convex hull and closed by caps on the hull's facets: vertices [V, 3], faces [F, 3], "
            "volume.")
-      .def("grown", released(&Filling::grown), "hull_vertices"_a, "hull_faces"_a, "depth"_a,
+      .def("grown", released(&Filling::grown), "hull"_a, "depth"_a,
            "Half-spaces n.x <= d that hold a hull, rows of n and d [P, 4]: their intersection has grown until the "
            "solid's surface stops it, which may come as deep as `depth` into it.")
       .def("uncovered",
-           released([](const Filling& self, const std::vector<Mesh>& hulls, double reach, double grain, int threads) {
+           released([](const Filling& self, const std::vector<const ConvexBody*>& hulls, double reach, double grain,
+                       int threads) {
              require(!hulls.empty(), "there are no hulls");
              require(grain > 0, "the grain must be positive");
              return self.uncovered(hulls, reach, grain, threads);
            }),
-           "vertices"_a, "faces"_a, "reach"_a, "grain"_a, "threads"_a = 0,
+           "hulls"_a, "reach"_a, "grain"_a, "threads"_a = 0,
            "Points [N, 3] that each convex hull has to take in, so that together they cover the solid's surface.\n\n"
            "Hulls grow by at most `grain` more than they must. Hulls farther than `reach` from a face are only looked "
            "at if all are.");
@@ -214,12 +209,11 @@ void bind_filling(nb::module_& m) {
 
 void bind_union(nb::module_& m) {
   nb::class_<HullUnion>(m, "HullUnion", "The union of convex hulls, each closed, convex and outward oriented.")
-      .def("__init__", released([](HullUnion* self, const std::vector<Mesh>& hulls, int threads) {
+      .def("__init__",
+           released([](HullUnion* self, const std::vector<std::shared_ptr<ConvexBody>>& hulls, int threads) {
              new (self) HullUnion(hulls, threads);
            }),
-           "vertices"_a, "faces"_a, "threads"_a = 0)
-      .def("only", &HullUnion::only, "some"_a,
-           "The union of the hulls with these numbers, which are not prepared again.")
+           "hulls"_a, "threads"_a = 0)
       .def("exposed", released([](const HullUnion& self, double gap, int threads) {
              require_positive(1, gap);
              HullUnion::Exposed found = self.exposed(gap, threads);

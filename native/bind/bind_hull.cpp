@@ -2,18 +2,16 @@
 #include <cmath>
 
 #include "bind/released.hpp"
-#include "convex/convex_body.hpp"
 #include "convex/flush.hpp"
 #include "convex/hull.hpp"
 #include "convex/simplify_hull.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/parallel.hpp"
-#include "solid/filling.hpp"
 
 namespace rlacd {
 
 constexpr int fields(Tag<Hull>) { return 3; }
-constexpr int fields(Tag<FlushBody::Contact>) { return 2; }
+constexpr int fields(Tag<Contact>) { return 2; }
 
 namespace {
 
@@ -30,14 +28,13 @@ std::vector<Vec3> to_numbers_only(const std::vector<PointsIn>& groups) {
   return points;
 }
 
-std::vector<double> joint_hull_volumes(const std::vector<const HullCorners*>& hulls, const PairsIn& pairs,
-                                       int threads) {
+std::vector<double> joint_hull_volumes(const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs, int threads) {
   const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
   std::vector<double> volumes(pairs.shape(0));
   const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
   parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
     HullBuilder hull;
-    hull.add(joined(hulls[pair[2 * i]]->all, hulls[pair[2 * i + 1]]->all));
+    hull.add(joined(hulls[pair[2 * i]]->mesh().vertices, hulls[pair[2 * i + 1]]->mesh().vertices));
     volumes[i] = hull.volume();
   });
   return volumes;
@@ -87,54 +84,51 @@ void bind_hull(nb::module_& m) {
   m.def("joint_hull_volumes", released(joint_hull_volumes), "hulls"_a, "pairs"_a, "threads"_a = 0,
         "Volumes [P] of the joint hulls of pairs [P, 2] of hulls.");
   m.def("simplify_hull",
-        released([](const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
+        released([](const ConvexBody& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
                     const std::vector<HalfSpace>& bounds, double enough) {
           require(tolerance >= 0, "the tolerance must not be negative");
-          require(!hull.vertices.empty(), "the hull has no vertices");
+          require(!hull.mesh().vertices.empty(), "the hull has no vertices");
           std::vector<Above> above;
           for (const HalfSpace& space : bounds) above.push_back({-space.normal, -space.offset});
           return simplify_hull(hull, max_vertices, max_faces, tolerance, above, enough);
         }),
-        "vertices"_a, "faces"_a, "max_vertices"_a, "max_faces"_a, "tolerance"_a, "bounds"_a,
+        "hull"_a, "max_vertices"_a, "max_faces"_a, "tolerance"_a, "bounds"_a,
         "enough"_a = std::numeric_limits<double>::infinity(),
         "A convex hull (vertices [V, 3], faces [F, 3]) around a convex hull with at most max_vertices corners and "
         "max_faces triangles and little added volume; corners that cost no more than `tolerance` of distance go "
         "anyway. It stays in the half-spaces n.x <= d of bounds [P, 4] (unit n, d), unless the limits leave no such "
         "hull. Without any, corners that stick out farther than `enough` are evened out.");
 
-  nb::class_<FlushBody>(m, "FlushBody", "A closed convex triangle mesh by its flat sides, for finding contacts.")
-      .def("__init__", released([](FlushBody* self, const Mesh& hull) { new (self) FlushBody(hull); }), "vertices"_a,
+  nb::class_<ConvexBody>(m, "ConvexBody", "A closed convex triangle mesh, prepared for what is asked about it.")
+      .def("__init__", released([](ConvexBody* self, const Mesh& mesh) { new (self) ConvexBody(mesh); }), "vertices"_a,
            "faces"_a)
-      .def("depths", released([](const FlushBody& self, const PointsIn& points) {
+      .def(
+          "__len__", [](const ConvexBody& self) { return self.mesh().vertices.size(); }, "Number of corners.")
+      .def_prop_ro(
+          "box", released([](const ConvexBody& self) { return std::vector<Vec3>{self.box().lower, self.box().upper}; }),
+          "Lower and upper corner of the bounding box [2, 3].")
+      .def("depths", released([](const ConvexBody& self, const std::vector<Vec3>& points) {
              std::vector<double> depths;
-             for (const Vec3 point : copied<Vec3>(points)) depths.push_back(self.depth(point));
+             for (const Vec3 point : points) depths.push_back(self.planes().nearest(point).depth);
              return depths;
            }),
            "points"_a, "How deep points [N, 3] lie inside [N]; negative outside.")
-      .def("contact", released([](const FlushBody& self, const FlushBody& other, double depth, double touch) {
+      .def("contact", released([](const ConvexBody& self, const ConvexBody& other, double depth, double touch) {
              require_depth(depth, touch);
-             return self.contact(other, depth, touch);
+             return contact(self, other, depth, touch);
            }),
            "other"_a, "depth"_a, "touch"_a,
            "Where a side of another body, turned the other way, lies less deep than `depth` under a side of this one: "
            "(sides [S] of this body, places [N, 3] on the other). Sides touch that are no farther apart than `touch`.")
       .def("layer",
-           released([](const FlushBody& self, const FlushBody& other, const VectorIn<std::int32_t>& sides, double depth,
-                       double touch) {
+           released([](const ConvexBody& self, const ConvexBody& other, const VectorIn<std::int32_t>& sides,
+                       double depth, double touch) {
              require_depth(depth, touch);
-             return self.layer(other, to_numbers(sides, self.size()), depth, touch);
+             return layer(self, other, to_numbers(sides, self.sides().size()), depth, touch);
            }),
            "other"_a, "sides"_a, "depth"_a, "touch"_a,
            "What another body fills of this one with some of its sides, and those within 60 degrees of them, moved "
            "outwards: points [N, 3] whose hull it is. Planes that it crosses by at most `touch` are left out.");
-  nb::class_<HullCorners>(m, "HullCorners", "The corners of a convex hull, prepared for tests of joint hulls.")
-      .def("__init__",
-           released([](HullCorners* self, const std::vector<Vec3>& corners) { new (self) HullCorners(corners); }),
-           "corners"_a)
-      .def("__len__", [](const HullCorners& self) { return self.all.size(); })
-      .def_prop_ro("box",
-                   released([](const HullCorners& self) { return std::vector<Vec3>{self.box.lower, self.box.upper}; }),
-                   "Lower and upper corner of the bounding box [2, 3].");
 }
 
 }  // namespace rlacd

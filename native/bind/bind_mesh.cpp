@@ -2,10 +2,10 @@
 #include <cmath>
 
 #include "bind/released.hpp"
+#include "convex/convex_body.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
 #include "decompose/simplifier.hpp"
-#include "solid/filling.hpp"
 #include "surface/bvh.hpp"
 #include "surface/crossings.hpp"
 #include "surface/curve.hpp"
@@ -223,14 +223,14 @@ void bind_mesh(nb::module_& m) {
   nb::class_<Boxes>(m, "Boxes", "The boxes of hulls under numbers.")
       .def(
           "__init__",
-          [](Boxes* self, const std::vector<const HullCorners*>& hulls) {
+          [](Boxes* self, const std::vector<const ConvexBody*>& hulls) {
             new (self) Boxes();
-            for (const HullCorners* hull : hulls) self->add(static_cast<std::int32_t>(self->size()), hull->box);
+            for (const ConvexBody* hull : hulls) self->add(static_cast<std::int32_t>(self->size()), hull->box());
           },
           "hulls"_a, "Hulls are numbered from 0.")
       .def("__len__", &Boxes::size)
       .def(
-          "add", [](Boxes& self, std::int32_t number, const HullCorners& hull) { self.add(number, hull.box); },
+          "add", [](Boxes& self, std::int32_t number, const ConvexBody& hull) { self.add(number, hull.box()); },
           "number"_a, "hull"_a, "Add the box of a hull; its number is larger than all before.")
       .def("without", &Boxes::without, "gone"_a, "All boxes but those of some numbers.")
       .def(

@@ -9,16 +9,15 @@ constexpr int fields(Tag<Balls>) { return 2; }
 void bind_navigable(nb::module_& m) {
   m.def(
       "navigable_balls",
-      released([](const Surface& surface, const Mesh& hull, double radius, double tolerance, bool reachable_only,
+      released([](const Surface& surface, const ConvexBody& hull, double radius, double tolerance, bool reachable_only,
                   const std::optional<PointsIn>& seeds, const std::vector<HalfSpace>& closed, double pitch,
                   int threads) {
         require(radius > 0 && tolerance > 0 && pitch > 0, "radius, tolerance and pitch must be positive");
         const BallSources sources = {reachable_only, !seeds, seeds ? to_points(*seeds) : std::vector<Vec3>()};
-        const ConvexBody body(hull);
-        return spread_balls(surface, {surface.bvh(), body, closed, radius, tolerance}, sources, pitch, threads);
+        return spread_balls(surface, {surface.bvh(), hull, closed, radius, tolerance}, sources, pitch, threads);
       }),
-      "surface"_a, "hull_vertices"_a, "hull_faces"_a, "radius"_a, "tolerance"_a, "reachable_only"_a, "seeds"_a.none(),
-      "closed"_a, "pitch"_a, "threads"_a = 0,
+      "surface"_a, "hull"_a, "radius"_a, "tolerance"_a, "reachable_only"_a, "seeds"_a.none(), "closed"_a, "pitch"_a,
+      "threads"_a = 0,
       "Balls (centres [B, 3], radii [B]) that stand for the navigable space around a closed surface with this hull.\n\n"
       "Balls come from the seeds [S, 3], or from outside where there are none; closed [P, 4] are half-spaces (unit "
       "normal n, offset d) with n.x < d that they keep out of; pitch is the grid's.");
@@ -30,18 +29,17 @@ void bind_navigable(nb::module_& m) {
            }),
            "centres"_a, "radii"_a)
       .def("intrusions",
-           released([](const Balls& self, const Mesh& mesh, const std::optional<VectorIn<std::int32_t>>& candidates,
-                       double least, bool first) {
+           released([](const Balls& self, const ConvexBody& hull,
+                       const std::optional<VectorIn<std::int32_t>>& candidates, double least, bool first) {
              std::vector<std::int32_t> among;
              if (candidates) among = to_numbers(*candidates, self.centres.size());
              std::vector<std::int32_t> balls;
              std::vector<double> depths;
-             for (const auto& [ball, depth] :
-                  intrusions(ConvexBody(mesh), self, candidates ? &among : nullptr, least, first))
+             for (const auto& [ball, depth] : intrusions(hull, self, candidates ? &among : nullptr, least, first))
                balls.push_back(ball), depths.push_back(depth);
              return std::pair(std::move(balls), std::move(depths));
            }),
-           "vertices"_a, "faces"_a, "candidates"_a.none(), "least"_a, "first"_a = false,
+           "hull"_a, "candidates"_a.none(), "least"_a, "first"_a = false,
            "Which of the candidates (None: of all balls) a convex hull reaches deeper than `least` into: (balls [K], "
            "depths [K]), in the order of the candidates. A depth is the ball's radius less the signed distance of its "
            "centre from the hull. With `first` it ends at the first.");

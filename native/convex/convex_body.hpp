@@ -1,15 +1,14 @@
-// How far a point is from a convex polytope, outside and inside.
+// A convex polytope, with what is asked about it: made when it is first needed, and kept.
 //
-// In:  a closed convex triangle mesh.
-// Out: signed distances, negative inside; exact up to rounding.
+// In:  a closed convex triangle mesh, whose flat sides may be cut into many triangles.
+// Out: signed distances, negative inside, exact up to rounding; facet planes; flat sides; a few corners.
 // How: inside, the nearest facet plane gives the distance. Outside, the farthest plane is a lower bound that settles
-//      most queries; the rest go to a tree of boxes over the facets, built when first needed.
+//      most queries; the rest go to a tree of boxes over the facets.
 #pragma once
 
-#include <memory>
-#include <mutex>
-
 #include "convex/convex_planes.hpp"
+#include "convex/polygon.hpp"
+#include "core/lazy.hpp"
 #include "surface/bvh.hpp"
 
 namespace rlacd {
@@ -17,31 +16,37 @@ namespace rlacd {
 class ConvexBody {
  public:
   explicit ConvexBody(Mesh mesh);
-  ConvexBody(const ConvexBody&) = delete;
-  ConvexBody& operator=(const ConvexBody&) = delete;
+
+  const Mesh& mesh() const { return mesh_; }
+  const Box& box() const { return box_; }
+  const ConvexPlanes& planes() const {
+    return planes_.get([this]() -> const Mesh& { return mesh_; });
+  }
+  const Bvh& bvh() const {
+    return bvh_.get([this]() -> const Mesh& { return mesh_; });
+  }
 
   // Signed distance of p; once the distance is known to be at least `enough`, any number between the two may be
   // returned.
   double distance(Vec3 p, double enough = std::numeric_limits<double>::infinity()) const;
 
-  // The closest point of the surface to a point outside.
-  Vec3 closest(Vec3 p) const { return bvh().closest(p).point; }
+  // Triangles of equal normals, up to rounding.
+  struct Side {
+    Plane plane;
+    Polygon polygon;
+  };
+  const std::vector<Side>& sides() const;
 
-  const Mesh& mesh() const { return mesh_; }
-  const ConvexPlanes& planes() const { return planes_; }
-  const Box& box() const { return box_; }
+  // All corners, or a few that span most of it if it has many.
+  const std::vector<Vec3>& few_corners() const;
 
  private:
-  const Bvh& bvh() const {
-    std::call_once(bvh_made_, [this] { bvh_ = std::make_unique<Bvh>(mesh_); });
-    return *bvh_;
-  }
-
   Mesh mesh_;
-  ConvexPlanes planes_;
   Box box_;
-  mutable std::once_flag bvh_made_;
-  mutable std::unique_ptr<Bvh> bvh_;
+  Lazy<ConvexPlanes> planes_;
+  Lazy<Bvh> bvh_;
+  Lazy<std::vector<Side>> sides_;
+  Lazy<std::vector<Vec3>> few_corners_;
 };
 
 // Whether a ball fits into a convex hull whose longest side may have any length: a linear program in the three

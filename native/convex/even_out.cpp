@@ -98,7 +98,9 @@ double farthest_out(const std::vector<Vec3>& corners, const Bvh& surface) {
 
 }  // namespace
 
-Mesh evened_out(Mesh outer, const Mesh& inner, const Bvh& surface, double enough) {
+Mesh evened_out(Mesh outer, const ConvexBody& body, double enough) {
+  const Mesh& inner = body.mesh();
+  const Bvh& surface = body.bvh();
   double least = farthest_out(outer.vertices, surface), least_volume = mesh_volume(outer);
   if (least <= enough) return outer;
   Vec3 middle;

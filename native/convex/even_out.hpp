@@ -1,6 +1,6 @@
 // The corners of a convex polytope around a convex polytope, moved until they stick out about equally.
 //
-// In:  an outer and an inner convex hull, the inner one's surface; a distance that is little enough.
+// In:  an outer and an inner convex hull; a distance that is little enough.
 // Out: an outer hull with no more corners that sticks out less, or the given one if that sticks out little enough.
 // How: what lies farthest out is a corner, and a corner alone cannot come in: its facets touch the inner hull, so its
 //      neighbours have to go out. Each step therefore moves all corners at once: in towards the inner hull, by a power
@@ -12,11 +12,10 @@
 // 4.9 %. No 64 corners stick out by less than 3.9 %.
 #pragma once
 
-#include "core/geometry.hpp"
-#include "surface/bvh.hpp"
+#include "convex/convex_body.hpp"
 
 namespace rlacd {
 
-Mesh evened_out(Mesh outer, const Mesh& inner, const Bvh& surface, double enough);
+Mesh evened_out(Mesh outer, const ConvexBody& inner, double enough);
 
 }  // namespace rlacd

@@ -15,6 +15,12 @@ using Polygon = std::vector<Vec3>;
 
 enum class Lies { kBelow, kAbove, kAcross };
 
+inline Vec3 middle_of(const std::vector<Vec3>& points) {
+  Vec3 sum;
+  for (const Vec3 p : points) sum = sum + p;
+  return (1.0 / static_cast<double>(points.size())) * sum;
+}
+
 inline Vec3 on_the_way(Vec3 p, Vec3 q, double share) { return p + share * (q - p); }
 inline PlanePoint on_the_way(PlanePoint p, PlanePoint q, double share) {
   return {p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])};

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/geometry.hpp"
+#include "convex/convex_body.hpp"
 
 namespace rlacd {
 
@@ -25,6 +25,6 @@ struct Polytope {
 };
 
 // Nothing if rounding leaves no such polytope.
-std::optional<Polytope> in_general_position(const Mesh& hull, double nudge);
+std::optional<Polytope> in_general_position(const ConvexBody& hull, double nudge);
 
 }  // namespace rlacd

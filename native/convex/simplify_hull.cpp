@@ -5,11 +5,10 @@
 #include <utility>
 
 #include "convex/convex_collapse.hpp"
-#include "convex/convex_planes.hpp"
 #include "convex/even_out.hpp"
+#include "convex/hull.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
-#include "surface/bvh.hpp"
 #include "surface/edges.hpp"
 
 namespace rlacd {
@@ -257,16 +256,17 @@ std::vector<std::size_t> stages(std::size_t corners, std::size_t most) {
 
 }  // namespace
 
-Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
+Mesh simplify_hull(const ConvexBody& body, std::size_t max_vertices, std::size_t max_faces, double tolerance,
                    const std::vector<Above>& bounds, double enough) {
   if (max_vertices < 4 || max_faces < 4) throw std::invalid_argument("a hull has at least 4 vertices and 4 faces");
   // A triangulated convex polytope has twice as many triangles as corners, minus four.
   const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
+  const Mesh& hull = body.mesh();
   const Whitening whitening(hull.vertices);
   if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kThinnest); !thick.empty())
     return hull.vertices.size() <= most
                ? hull
-               : simplify_hull(hull_mesh(thick), max_vertices, max_faces, tolerance, {}, enough);
+               : simplify_hull(ConvexBody(hull_mesh(thick)), max_vertices, max_faces, tolerance, {}, enough);
   std::vector<Vec3> whitened;
   for (const Vec3 p : hull.vertices) whitened.push_back(whitening.to(p));
   const Mesh inner = hull_mesh(whitened);
@@ -275,11 +275,9 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
   std::vector<Above> within;
   for (const Above& plane : bounds) within.push_back(whitening.to(plane));
 
-  const Bvh surface(hull);
-  const ConvexPlanes planes(hull);
   const auto redundant = [&](Vec3 point) {
     const Vec3 p = whitening.from(point);
-    return planes.nearest(p).depth >= -tolerance && surface.closest(p).distance2 <= tolerance * tolerance;
+    return body.planes().nearest(p).depth >= -tolerance && body.bvh().closest(p).distance2 <= tolerance * tolerance;
   };
   if (inner.vertices.size() <= most) {
     ConvexCollapse collapse(inner, within, [&](Vec3 p) { return whitening.from(p); }, tolerance);
@@ -295,14 +293,14 @@ Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_f
     best = relax_around(hull_mesh(collapse.corners()), inner, within, stage > most ? kSweepsOnTheWay : kSweepsAtTheEnd);
     if (!fits) break;
   }
-  if (!fits && !within.empty()) return simplify_hull(hull, max_vertices, max_faces, tolerance, {}, enough);
+  if (!fits && !within.empty()) return simplify_hull(body, max_vertices, max_faces, tolerance, {}, enough);
   if (!fits || (most <= kFewCorners && within.empty()))
     for (Mesh& cover : plain_covers(inner, most)) {
       cover = relax_around(std::move(cover), inner, {}, kSweepsAtTheEnd);
       if (!fits || mesh_volume(cover) < mesh_volume(best)) best = std::move(cover), fits = true;
     }
   Mesh outer = brought_back(best, inner, whitening);
-  return within.empty() && std::isfinite(enough) ? evened_out(std::move(outer), hull, surface, enough) : outer;
+  return within.empty() && std::isfinite(enough) ? evened_out(std::move(outer), body, enough) : outer;
 }
 
 }  // namespace rlacd

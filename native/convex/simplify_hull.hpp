@@ -18,13 +18,12 @@
 // times the volume for 16 to 64 corners, since a polytope of n planes needs nearly 2 n corners.
 #pragma once
 
-#include "convex/hull.hpp"
+#include "convex/convex_body.hpp"
 #include "convex/linear_program.hpp"
-#include "core/geometry.hpp"
 
 namespace rlacd {
 
-Mesh simplify_hull(const Mesh& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
+Mesh simplify_hull(const ConvexBody& hull, std::size_t max_vertices, std::size_t max_faces, double tolerance,
                    const std::vector<Above>& bounds, double enough);
 
 }  // namespace rlacd

@@ -123,15 +123,8 @@ class Gathering {
 
 }  // namespace
 
-HullUnion::HullUnion(std::vector<Mesh> hulls, int threads) : members_(hulls.size()) {
-  parallel_for(hulls.size(), hulls.size() < 8 ? 1 : threads,
-               [&](std::size_t i) { members_[i] = std::make_shared<const ConvexBody>(std::move(hulls[i])); });
-}
-
-HullUnion HullUnion::only(const std::vector<std::int32_t>& some) const {
-  HullUnion result;
-  for (const std::int32_t i : some) result.members_.push_back(members_.at(i));
-  return result;
+HullUnion::HullUnion(std::vector<std::shared_ptr<ConvexBody>> hulls, int threads) : members_(std::move(hulls)) {
+  parallel_for(members_.size(), members_.size() < 8 ? 1 : threads, [&](std::size_t i) { members_[i]->planes(); });
 }
 
 double HullUnion::distance(Vec3 p) const {
@@ -160,7 +153,7 @@ class HullField {
   double from(std::int32_t hull, Vec3 p) const { return std::max(0.0, members_[hull]->distance(p)); }
 
  private:
-  const std::vector<std::shared_ptr<const ConvexBody>>& members_;
+  const std::vector<std::shared_ptr<ConvexBody>>& members_;
 };
 
 HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {

@@ -24,10 +24,7 @@ namespace rlacd {
 
 class HullUnion {
  public:
-  HullUnion(std::vector<Mesh> hulls, int threads);
-
-  // The union of some of the hulls, which are shared, not prepared again.
-  HullUnion only(const std::vector<std::int32_t>& some) const;
+  HullUnion(std::vector<std::shared_ptr<ConvexBody>> hulls, int threads);
 
   // The surface of the union as triangles. Cracks between hulls narrower than `gap` count as closed; next to inner
   // corners of the surface, strips narrower than about `gap` are lost. A facet inside so many hulls that cutting it was
@@ -46,12 +43,10 @@ class HullUnion {
  private:
   friend class HullField;
 
-  HullUnion() = default;
-
   // Which faces have all their corners in one of the hulls.
   std::vector<char> held_faces(const Mesh& surface, int threads) const;
 
-  std::vector<std::shared_ptr<const ConvexBody>> members_;
+  std::vector<std::shared_ptr<ConvexBody>> members_;
 };
 
 }  // namespace rlacd

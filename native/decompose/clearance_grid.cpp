@@ -57,7 +57,7 @@ class Filling {
       if (room < field_.room_by_hull(away))
         value = field_.room_near(x, hit.slot);
       else
-        value = {room, normalized(field_.hull().closest(x) - x), hit.slot, NavigableField::Limit::kHull};
+        value = {room, normalized(field_.hull().bvh().closest(x).point - x), hit.slot, NavigableField::Limit::kHull};
       found.boundary.push_back({cell, cube.inside, value});
       return;
     }

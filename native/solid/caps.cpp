@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "core/invariant.hpp"
 #include "core/stop.hpp"
@@ -112,8 +112,12 @@ class Tangle {
 
   // Returns whether there are few enough.
   bool find_crossings() {
-    std::vector<std::size_t> by_left(corners_), active;
-    std::iota(by_left.begin(), by_left.end(), 0);
+    // Edges that run both ways, which straightened rims may have, bound nothing and have no faces to share a vertex.
+    std::unordered_set<std::uint64_t> run;
+    for (std::size_t i = 0; i < corners_; ++i) run.insert(directed(vertex_[i], vertex_[next_[i]]));
+    std::vector<std::size_t> by_left, active;
+    for (std::size_t i = 0; i < corners_; ++i)
+      if (run.count(directed(vertex_[next_[i]], vertex_[i])) == 0) by_left.push_back(i);
     const auto left = [&](std::size_t i) { return std::min(point_[i][0], point_[next_[i]][0]); };
     const auto right = [&](std::size_t i) { return std::max(point_[i][0], point_[next_[i]][0]); };
     std::sort(by_left.begin(), by_left.end(),

@@ -2,7 +2,6 @@
 
 #include <stdexcept>
 
-#include "convex/convex_planes.hpp"
 #include "core/elementary.hpp"
 #include "surface/surface_field.hpp"
 
@@ -15,9 +14,9 @@ constexpr std::size_t kProbes = 64;
 // Distance from points inside a hull to its surface; the witnesses are its planes.
 class DepthField {
  public:
-  DepthField(const ConvexPlanes& planes, const Mesh& hull) : planes_(planes) {
+  explicit DepthField(const ConvexBody& hull) : planes_(hull.planes()) {
     settled_.fill(-1);
-    const Box box = box_of_faces(hull);
+    const Box& box = hull.box();
     centre_ = 0.5 * (box.lower + box.upper);
     const Vec3 half = 0.5 * (box.upper - box.lower);
     for (int axis = 0; axis < 3; ++axis) shrink_[axis] = half[axis] > 0 ? 1 / half[axis] : 0;
@@ -59,9 +58,9 @@ class DepthField {
   std::array<std::int32_t, 6 * kGrid * kGrid> settled_;
 };
 
-void check(const Mesh& part, const Mesh& hull) {
+void check(const Mesh& part, const ConvexBody& hull) {
   if (part.faces.empty()) throw std::invalid_argument("the part has no faces");
-  if (hull.faces.empty()) throw std::invalid_argument("the hull has no faces");
+  if (hull.mesh().faces.empty()) throw std::invalid_argument("the hull has no faces");
 }
 
 }  // namespace
@@ -70,11 +69,10 @@ double volume_radius(double part_volume, double hull_volume) {
   return cube_root(std::max(0.0, 3 * (hull_volume - part_volume) / (4 * kPi)));
 }
 
-Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
+Concavity concavity(const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double tolerance,
                     double floor, const TreeCache& tree) {
   check(part, hull);
-  const ConvexPlanes planes(hull);
-  DepthField depth(planes, hull);
+  DepthField depth(hull);
   SurfaceField distance(tree.of(part));
   Concavity result;
   result.volume_radius = volume_radius(part_volume, hull_volume);
@@ -83,29 +81,28 @@ Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, doub
   goal.pass = std::max(floor, kVolumeWeight * result.volume_radius + tolerance);
   result.part_to_hull = maximize(depth, part, goal);
   goal.pass = std::max(goal.pass, result.part_to_hull.lower + tolerance);
-  result.hull_to_part = maximize(distance, hull, goal);
+  result.hull_to_part = maximize(distance, hull.mesh(), goal);
   return result;
 }
 
-bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold,
+bool meets_concavity(const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double threshold,
                      const TreeCache& tree) {
   check(part, hull);
   if (!(kVolumeWeight * volume_radius(part_volume, hull_volume) <= threshold)) return false;
-  const ConvexPlanes planes(hull);
 
   // A few corners spread over the part reject most failures before any triangle is examined.
   const std::size_t stride = std::max<std::size_t>(1, part.faces.size() / kProbes);
   for (std::size_t f = 0; f < part.faces.size(); f += stride)
-    if (planes.nearest(part.vertices[part.faces[f][0]]).depth > threshold) return false;
+    if (hull.planes().nearest(part.vertices[part.faces[f][0]]).depth > threshold) return false;
 
   Goal goal;
   goal.tolerance = kUndecided * threshold;
   goal.pass = threshold;
   goal.fail = threshold;
-  DepthField depth(planes, hull);
+  DepthField depth(hull);
   if (!(maximize(depth, part, goal).upper <= threshold)) return false;
   SurfaceField distance(tree.of(part));
-  return maximize(distance, hull, goal).upper <= threshold;
+  return maximize(distance, hull.mesh(), goal).upper <= threshold;
 }
 
 }  // namespace rlacd

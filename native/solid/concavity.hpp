@@ -9,7 +9,7 @@
 //      hull -> part: the distance to the nearest of the part's triangles, found through a tree of boxes.
 #pragma once
 
-#include "core/geometry.hpp"
+#include "convex/convex_body.hpp"
 #include "surface/branch_and_bound.hpp"
 #include "surface/surface.hpp"
 
@@ -33,12 +33,12 @@ double volume_radius(double part_volume, double hull_volume);
 // The interval of the value is at most `tolerance` wide; that of a one-sided distance may be wider below the value,
 // where the other terms decide it. Values up to `floor` need not be resolved: the interval may then be (0, floor).
 // `tree` is the part's, whatever its hull.
-Concavity concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double tolerance,
+Concavity concavity(const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double tolerance,
                     double floor, const TreeCache& tree);
 
 // True only if the concavity is certainly <= threshold. False if it is larger, or within 1e-3 of the threshold and
 // undecided.
-bool meets_concavity(const Mesh& part, const Mesh& hull, double part_volume, double hull_volume, double threshold,
+bool meets_concavity(const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double threshold,
                      const TreeCache& tree);
 
 }  // namespace rlacd

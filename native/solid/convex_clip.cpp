@@ -338,7 +338,7 @@ class Clip {
 
 }  // namespace
 
-std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const Mesh& hull) {
+std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const ConvexBody& hull) {
   for (const double larger : kLarger) {
     std::optional<Polytope> polytope = in_general_position(hull, larger * kNudge);
     if (!polytope) continue;

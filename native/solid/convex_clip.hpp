@@ -15,6 +15,7 @@
 #include <optional>
 #include <vector>
 
+#include "convex/convex_body.hpp"
 #include "solid/plane_cut.hpp"
 #include "surface/surface.hpp"
 
@@ -29,6 +30,6 @@ struct ConvexClip {
   std::vector<Section> sections;
 };
 
-std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const Mesh& hull);
+std::optional<ConvexClip> clip_to_convex(const Mesh& solid, const Surface& surface, const ConvexBody& hull);
 
 }  // namespace rlacd

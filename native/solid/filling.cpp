@@ -13,8 +13,6 @@
 namespace rlacd {
 namespace {
 
-constexpr std::size_t kMaybe = 40;  // corners; with more than this it pays to test some of them first
-
 constexpr double kInside = 0.5;
 constexpr double kBeyond = 1 + 1e-9;
 
@@ -96,37 +94,20 @@ struct Cell {
 
 }  // namespace
 
-Feasibility Filling::feasibility(const Mesh& hull, double threshold) const {
+Feasibility Filling::feasibility(const ConvexBody& hull, double threshold) const {
   if (comes_deeper(hull, threshold)) return Feasibility::kNever;
-  return is_missed(hull, hull.faces, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe;
+  return is_missed(hull.mesh(), hull.mesh().faces, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe;
 }
 
-HullCorners::HullCorners(std::vector<Vec3> corners) : all(std::move(corners)), box(Box::of(all)) {
-  if (all.size() <= kMaybe) {
-    some = all;
-    return;
-  }
-  std::vector<std::size_t> chosen;
-  for (int x = -1; x <= 1; ++x)
-    for (int y = -1; y <= 1; ++y)
-      for (int z = -1; z <= 1; ++z) {
-        const Vec3 towards = {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
-        const auto farthest = std::max_element(all.begin(), all.end(),
-                                               [towards](Vec3 p, Vec3 q) { return dot(towards, p) < dot(towards, q); });
-        chosen.push_back(static_cast<std::size_t>(farthest - all.begin()));
-      }
-  std::sort(chosen.begin(), chosen.end());
-  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
-  for (const std::size_t i : chosen) some.push_back(all[i]);
-}
-
-Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCorners& second, double threshold) const {
-  const bool are_all = first.some.size() == first.all.size() && second.some.size() == second.all.size();
-  Mesh hull = hull_mesh(joined(first.some, second.some));
-  if (!hull.faces.empty() && comes_deeper(hull, threshold)) return {0, Feasibility::kNever};
-  if (!are_all) hull = hull_mesh(joined(first.all, second.all));
+Filling::Joint Filling::joint_feasibility(const ConvexBody& first, const ConvexBody& second, double threshold) const {
+  const std::vector<Vec3>&all_first = first.mesh().vertices, &all_second = second.mesh().vertices;
+  const ConvexBody few(hull_mesh(joined(first.few_corners(), second.few_corners())));
+  if (!few.mesh().faces.empty() && comes_deeper(few, threshold)) return {0, Feasibility::kNever};
+  const bool are_all = &first.few_corners() == &all_first && &second.few_corners() == &all_second;
+  const ConvexBody body(are_all ? few.mesh() : hull_mesh(joined(all_first, all_second)));
+  const Mesh& hull = body.mesh();
   std::vector<char> is_new(hull.faces.size(), 1);
-  for (const std::vector<Vec3>* own : {&first.all, &second.all}) {
+  for (const std::vector<Vec3>* own : {&all_first, &all_second}) {
     std::vector<char> is_own(hull.vertices.size());
     std::transform(hull.vertices.begin(), hull.vertices.end(), is_own.begin(),
                    [own](Vec3 p) { return std::find(own->begin(), own->end(), p) != own->end(); });
@@ -140,14 +121,13 @@ Filling::Joint Filling::joint_feasibility(const HullCorners& first, const HullCo
     if (is_new[f]) facets.push_back(hull.faces[f]);
   const double volume = mesh_volume(hull);
   if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Feasibility::kNo};
-  if (!are_all && comes_deeper(hull, threshold)) return {volume, Feasibility::kNever};
+  if (!are_all && comes_deeper(body, threshold)) return {volume, Feasibility::kNever};
   return {volume, is_missed(hull, facets, threshold, kMostCellsOfPair) ? Feasibility::kNo : Feasibility::kMaybe};
 }
 
-bool Filling::comes_deeper(const Mesh& hull, double threshold) const {
-  const ConvexPlanes planes(hull);
-  Depths depths(planes, threshold);
-  Box inner = Box::of(hull.vertices);
+bool Filling::comes_deeper(const ConvexBody& hull, double threshold) const {
+  Depths depths(hull.planes(), threshold);
+  Box inner = hull.box();
   inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
   inner.upper = inner.upper - Vec3{threshold, threshold, threshold};
   const auto may_come = [&](const Box& box) {
@@ -192,7 +172,7 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
   return false;
 }
 
-ClippedSolid Filling::clipped(const Mesh& hull) const {
+ClippedSolid Filling::clipped(const ConvexBody& hull) const {
   ClippedSolid out;
   std::optional<ConvexClip> clip = clip_to_convex(solid_, surface_, hull);
   if (clip) {
@@ -201,7 +181,7 @@ ClippedSolid Filling::clipped(const Mesh& hull) const {
       add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal, area);
     if (area.folded > kFolded * area.all) clip.reset();
   }
-  out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull);
+  out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull.mesh());
   out.volume = std::fmax(0, mesh_volume(out.mesh));
   return out;
 }

@@ -10,7 +10,6 @@
 //      that the solid comes too deep, and facets it shares with one of them need not be examined.
 #pragma once
 
-#include "convex/convex_planes.hpp"
 #include "solid/convex_clip.hpp"
 #include "surface/surface.hpp"
 
@@ -18,23 +17,15 @@ namespace rlacd {
 
 // Hulls grow by at most `grain` more than they must. A hull whose box is farther from a triangle than `reach` takes it
 // only if all are.
-std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
-                                         double grain, int threads);
+std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<const ConvexBody*>& hulls,
+                                         double reach, double grain, int threads);
 
-std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const Mesh& hull, double depth);
+std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const ConvexBody& hull, double depth);
 
 enum class Feasibility : std::int32_t {
   kMaybe = 0,
   kNo = 1,     // not for this hull
   kNever = 2,  // nor for any hull that contains it
-};
-
-// The corners of a hull, a few of them that span most of it, and its box.
-struct HullCorners {
-  explicit HullCorners(std::vector<Vec3> corners);
-
-  std::vector<Vec3> all, some;
-  Box box;
 };
 
 struct ClippedSolid {
@@ -47,23 +38,23 @@ class Filling {
   explicit Filling(const Mesh& solid, int threads = 1) : solid_(solid), surface_(solid, threads) {}
 
   const Surface& surface() const { return surface_; }
-  Feasibility feasibility(const Mesh& hull, double threshold) const;
+  Feasibility feasibility(const ConvexBody& hull, double threshold) const;
   // The same for the joint hull of two hulls that are close enough to their own shares of the solid, and its volume
   // unless the verdict is kNever.
   struct Joint {
     double volume;
     Feasibility feasibility;
   };
-  Joint joint_feasibility(const HullCorners& first, const HullCorners& second, double threshold) const;
+  Joint joint_feasibility(const ConvexBody& first, const ConvexBody& second, double threshold) const;
   // Whether the verdict is kNever: much faster than the full verdict.
-  bool comes_deeper(const Mesh& hull, double threshold) const;
+  bool comes_deeper(const ConvexBody& hull, double threshold) const;
 
   // All that the solid fills of a convex hull, closed by caps on its facets.
-  ClippedSolid clipped(const Mesh& hull) const;
-  std::vector<HalfSpace> grown(const Mesh& hull, double depth) const {
+  ClippedSolid clipped(const ConvexBody& hull) const;
+  std::vector<HalfSpace> grown(const ConvexBody& hull, double depth) const {
     return grow(solid_, surface_.bvh(), hull, depth);
   }
-  std::vector<std::vector<Vec3>> uncovered(const std::vector<Mesh>& hulls, double reach, double grain,
+  std::vector<std::vector<Vec3>> uncovered(const std::vector<const ConvexBody*>& hulls, double reach, double grain,
                                            int threads) const {
     return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain, threads);
   }

@@ -178,16 +178,6 @@ Mesh glue(const Mesh& a, const Mesh& b) {
   return out;
 }
 
-bool do_touch(const Mesh& a, const Mesh& b) {
-  const std::vector<Facet> others = facets_within(b, box_of_faces(a));
-  for (const Facet& facet : facets_within(a, box_of_faces(b))) {
-    poll_stop();
-    if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return share_area(facet, other); }))
-      return true;
-  }
-  return false;
-}
-
 void add_touching_planes(std::vector<Plane>& planes, const Mesh& a, const Mesh& b) {
   const std::vector<Facet> others = facets_within(b, box_of_faces(a));
   std::vector<Facet> own = facets_within(a, box_of_faces(b));

@@ -19,9 +19,6 @@ constexpr double kCoincident = 1e-8;  // distance at which faces count as touchi
 
 Mesh glue(const Mesh& a, const Mesh& b);
 
-// Whether two solids touch face to face, not just in an edge or a point.
-bool do_touch(const Mesh& a, const Mesh& b);
-
 // Adds the planes in which two solids touch.
 void add_touching_planes(std::vector<Plane>& planes, const Mesh& a, const Mesh& b);
 

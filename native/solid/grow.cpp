@@ -11,8 +11,6 @@
 #include <queue>
 #include <tuple>
 
-#include "convex/convex_planes.hpp"
-#include "convex/polygon.hpp"
 #include "core/stop.hpp"
 #include "solid/filling.hpp"
 
@@ -24,8 +22,8 @@ constexpr double kTouching = 1e-6;  // a face no farther than this from the hull
 
 class Growth {
  public:
-  Growth(const Mesh& solid, const Bvh& bvh, const Mesh& hull, double depth)
-      : solid_(solid), bvh_(bvh), hull_(hull), planes_(hull), depth_(depth) {}
+  Growth(const Mesh& solid, const Bvh& bvh, const ConvexBody& hull, double depth)
+      : solid_(solid), bvh_(bvh), corners_(hull.mesh().vertices), planes_(hull.planes()), depth_(depth) {}
 
   std::vector<HalfSpace> run() {
     open_children(0);
@@ -88,7 +86,7 @@ class Growth {
     if (!(area > 0)) return;
     const Vec3 n = (1 / area) * product;
     double beyond = 0;
-    for (const Vec3 p : hull_.vertices) beyond = std::max(beyond, dot(n, p - a));
+    for (const Vec3 p : corners_) beyond = std::max(beyond, dot(n, p - a));
     const auto least = [&, a = a, b = b, c = c](Vec3 m) { return std::min({dot(m, a), dot(m, b), dot(m, c)}); };
     open_.push({distance(least), -1, {}, face, area, n, beyond, beyond <= depth_});
   }
@@ -138,8 +136,8 @@ class Growth {
 
   const Mesh& solid_;
   const Bvh& bvh_;
-  const Mesh& hull_;
-  const ConvexPlanes planes_;
+  const std::vector<Vec3>& corners_;
+  const ConvexPlanes& planes_;
   const double depth_;
   std::priority_queue<Item> open_;
   std::vector<HalfSpace> found_;
@@ -148,7 +146,7 @@ class Growth {
 
 }  // namespace
 
-std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const Mesh& hull, double depth) {
+std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const ConvexBody& hull, double depth) {
   return Growth(solid, bvh, hull, depth).run();
 }
 

@@ -86,10 +86,10 @@ std::vector<Mesh> bodies(const Mesh& mesh) {
   return found;
 }
 
-double growth(const HullAround& hull, const std::vector<Vec3>& corners) {
+double growth(const Mesh& hull, const std::vector<Vec3>& corners) {
   HullBuilder joint;
-  joint.add(joined(*hull.corners, corners));
-  return joint.volume() - hull.volume;
+  joint.add(joined(hull.vertices, corners));
+  return joint.volume() - mesh_volume(hull);
 }
 
 Vec3 middle(const std::vector<Vec3>& points) {
@@ -150,16 +150,18 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
   return pieces;
 }
 
-std::array<std::optional<Piece>, 2> halve(const Mesh& piece, const std::vector<Vec3>& corners,
-                                          const std::vector<HullAround>& around, double share, double least) {
+std::array<std::optional<Piece>, 2> halve(const Mesh& piece, const ConvexBody& hull,
+                                          const std::vector<const ConvexBody*>& around, double share, double least) {
+  const std::vector<Vec3>& corners = hull.mesh().vertices;
   if (around.size() < 2 || corners.empty()) return {};  // what one cannot take, it cannot take in halves
   std::vector<std::pair<double, std::size_t>> by_growth;
   for (std::size_t i = 0; i < around.size(); ++i) {
     poll_stop();
-    by_growth.emplace_back(growth(around[i], corners), i);
+    by_growth.emplace_back(growth(around[i]->mesh(), corners), i);
   }
   std::partial_sort(by_growth.begin(), by_growth.begin() + 2, by_growth.end());
-  const Vec3 along = middle(*around[by_growth[1].second].corners) - middle(*around[by_growth[0].second].corners);
+  const Vec3 along =
+      middle(around[by_growth[1].second]->mesh().vertices) - middle(around[by_growth[0].second]->mesh().vertices);
   const double length = norm(along);
   if (length == 0) return {};
   const Vec3 direction = {along.x / length, along.y / length, along.z / length};

@@ -8,9 +8,7 @@
 
 #include <algorithm>
 #include <array>
-#include <deque>
 
-#include "convex/convex_body.hpp"
 #include "core/parallel.hpp"
 #include "core/stop.hpp"
 #include "solid/filling.hpp"
@@ -36,11 +34,11 @@ struct Branch {
 
 class Cover {
  public:
-  Cover(const Mesh& solid, const Bvh& bvh, const std::deque<ConvexBody>& bodies, double reach, double grain)
+  Cover(const Mesh& solid, const Bvh& bvh, const std::vector<const ConvexBody*>& bodies, double reach, double grain)
       : solid_(solid), bvh_(bvh), bodies_(bodies), reach_(reach), grain_(grain), taken_(bodies.size()) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const std::size_t first = planes_.size();
-      for (std::size_t k = 0; k < bodies[i].planes().size(); ++k) planes_.push_back(static_cast<std::int32_t>(k));
+      for (std::size_t k = 0; k < bodies[i]->planes().size(); ++k) planes_.push_back(static_cast<std::int32_t>(k));
       near_.push_back({static_cast<std::int32_t>(i), first, planes_.size()});
     }
   }
@@ -86,7 +84,7 @@ class Cover {
     const Vec3 middle = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower);
     for (std::size_t i = above.first; i < above.last; ++i) {
       const Near candidate = near_[i];
-      const ConvexBody& body = bodies_[candidate.body];
+      const ConvexBody& body = *bodies_[candidate.body];
       if (!body.box().meets(box, reach_)) continue;
       const std::size_t first = planes_.size();
       for (std::size_t k = candidate.first; k < candidate.last; ++k) {
@@ -102,7 +100,7 @@ class Cover {
 
   // How far a body's planes would have to move out to take in a point; 0 inside.
   double beyond(const Near& near, Vec3 p) const {
-    const ConvexPlanes& planes = bodies_[near.body].planes();
+    const ConvexPlanes& planes = bodies_[near.body]->planes();
     double most = 0;
     for (std::size_t k = near.first; k < near.last; ++k) most = std::max(most, -planes.depth(planes_[k], p));
     return most;
@@ -139,7 +137,7 @@ class Cover {
 
   const Mesh& solid_;
   const Bvh& bvh_;
-  const std::deque<ConvexBody>& bodies_;
+  const std::vector<const ConvexBody*>& bodies_;
   const double reach_, grain_;
   // First all bodies with all their planes, then those near each node, and each half of a triangle, on the way to what
   // is looked at.
@@ -168,14 +166,12 @@ std::vector<Branch> branches(const Bvh& bvh) {
 
 }  // namespace
 
-std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<Mesh>& hulls, double reach,
-                                         double grain, int threads) {
-  std::deque<ConvexBody> bodies;
-  for (const Mesh& hull : hulls) bodies.emplace_back(hull);
+std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<const ConvexBody*>& hulls,
+                                         double reach, double grain, int threads) {
   const std::vector<Branch> work = branches(bvh);
   std::vector<std::vector<std::vector<Vec3>>> taken(work.size());
   parallel_for(work.size(), threads, [&](std::size_t i) {
-    Cover cover(mesh, bvh, bodies, reach, grain);
+    Cover cover(mesh, bvh, hulls, reach, grain);
     cover.visit(work[i]);
     taken[i] = cover.taken();
   });

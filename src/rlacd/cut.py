@@ -15,19 +15,19 @@ from rlacd.run import Run, work
 from rlacd.solid.component import Component, Plane, is_film
 from rlacd.solid.frame import HALF_THICKNESS
 
-SHAVING = HALF_THICKNESS
-"""No point of a shaving is farther than this from the solid across the cut."""
+CUT_SLIVER = HALF_THICKNESS
+"""No point of a sliver that is dropped is farther than this from the solid across its cut."""
 
 MANY_COMPONENTS = 1000
-"""With more components than this, the policy may have failed: there are solids that one breaks into thousands of parts
-and another into tens (research/learning.md). So a second one is tried, ..."""
+"""With more components than this, a second policy is tried: there are solids that one policy breaks into thousands of
+parts and another into tens (research/learning.md)."""
 
 FAR_FEWER = 1 / 2
-"""... and abandoned at this share of the components, or of the work done for them."""
+"""The second policy is abandoned at this share of the components, or of the work done for them."""
 
 
 class CutCache:
-    """Pieces and sides of components, each cut made once: several trees of cuts share their first levels."""
+    """Pieces and sides of components, computed once for all trees of cuts: they share their first levels."""
 
     def __init__(self) -> None:
         self._pieces: dict[Component, list[Component]] = {}
@@ -35,20 +35,20 @@ class CutCache:
         self._across: dict[Component, Component] = {}  # the other side of the last cut
 
     def pieces(self, component: Component) -> list[Component]:
-        """Get the connected pieces of a component without shavings; ``[component]`` if it is connected."""
+        """Get the connected pieces of a component without slivers; ``[component]`` if it is connected."""
         if component not in self._pieces:
             own = component.pieces()
             if len(own) == 1:
                 own = [component]
             across = self._across.get(component)
             if len(own) > 1 and across is not None:
-                own = [piece for piece in own if not is_shaving(piece, across)]
+                own = [piece for piece in own if not is_cut_sliver(piece, across)]
                 self._across.update((piece, across) for piece in own)
             self._pieces[component] = own
         return self._pieces[component]
 
     def sides(self, component: Component, plane: Plane) -> list[Component]:
-        """Get the sides below and above a plane, without shavings; an empty list if one side would be empty."""
+        """Get the sides below and above a plane, without slivers; an empty list if one side would be empty."""
         key = component, plane
         if key not in self._sides:
             below, above = component.cut(plane)
@@ -56,7 +56,7 @@ class CutCache:
                 self._sides[key] = []
             else:
                 self._across[below], self._across[above] = above, below
-                self._sides[key] = [side for side in (below, above) if not is_shaving(side, self._across[side])]
+                self._sides[key] = [side for side in (below, above) if not is_cut_sliver(side, self._across[side])]
         return self._sides[key]
 
 
@@ -76,7 +76,7 @@ class CutTree:
     cache : CutCache, optional
         Cuts shared with other trees.
     second : Policy, optional
-        Takes over if it leaves far fewer components than thousands.
+        Takes over if it leaves far fewer components (`FAR_FEWER`).
     """
 
     def __init__(
@@ -179,28 +179,28 @@ class CutTree:
         return self._cache.sides(component, plane)
 
 
-def halves(film: Component) -> list[Component]:
-    """Cut a film across the middle of its longest side; an empty list if it is too small or one side would be empty.
+def halves(sliver: Component) -> list[Component]:
+    """Cut a sliver across the middle of its longest side; an empty list if it is too small or one side would be empty.
 
     A side without volume is kept: what is inside out has none, but its hull covers the surface.
     """
-    lower, upper = film.box
+    lower, upper = sliver.box
     axis = int(np.argmax(upper - lower))
-    if upper[axis] - lower[axis] <= SHAVING:
+    if upper[axis] - lower[axis] <= CUT_SLIVER:
         return []
     normal = (float(axis == 0), float(axis == 1), float(axis == 2))
-    below, above = film.cut(Plane(normal, float(lower[axis] + upper[axis]) / 2), least=-math.inf)
+    below, above = sliver.cut(Plane(normal, float(lower[axis] + upper[axis]) / 2), least=-math.inf)
     return [] if below is None or above is None else [below, above]
 
 
-def is_shaving(piece: Component, across: Component) -> bool:
-    """Whether a piece is a film that a cut nearly parallel to the surface has shaved off the solid across the cut.
+def is_cut_sliver(piece: Component, across: Component) -> bool:
+    """Whether a piece is a sliver that a cut nearly parallel to the surface has left of the solid across the cut.
 
-    Films have ragged outlines that take very many cuts to become convex. They can be dropped because every point of a
-    shaving is within `SHAVING` of the solid across the cut.
+    Slivers have ragged outlines that take very many cuts to become convex. They can be dropped because every point of
+    one is within `CUT_SLIVER` of the solid across the cut.
     """
     if not is_film(piece):
         return False
     surface = _native.Surface(across.vertices, across.faces)
-    _, farthest = _native.directed_hausdorff(piece.vertices, piece.faces, surface, SHAVING / 4, 1)
-    return farthest <= SHAVING
+    _, farthest = _native.directed_hausdorff(piece.vertices, piece.faces, surface, CUT_SLIVER / 4, 1)
+    return farthest <= CUT_SLIVER

@@ -86,7 +86,7 @@ def cut_and_merge(
         except Stopped:
             run.note_stop()
         if run.stopped_by is not None and not strict:
-            left = _apart(left, run)
+            left = _pieces(left, run)
             pieces = [*done, *left]
         kept = {id(part) for part in pieces}
         unmet: list[Part] = [part for part in left if id(part) in kept]
@@ -102,7 +102,7 @@ def cut_and_merge(
     return Pass(pieces, unmet, parts, criterion)
 
 
-def _apart(components: Sequence[Component], run: Run) -> list[Component]:
+def _pieces(components: Sequence[Component], run: Run) -> list[Component]:
     """The connected pieces of components that there was no time to cut."""
     with run.shielded():
         return [piece for component in components for piece in component.pieces()]

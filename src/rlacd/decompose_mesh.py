@@ -14,7 +14,6 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
 from rlacd.decomposition import Decomposition
 from rlacd.errors import DecompositionWarning, MissingExtraError, OptionError
 from rlacd.find_parts import Reached, covered, find_parts
@@ -333,17 +332,19 @@ def _clear_of_each_other(
     names: Sequence[str], meshes: Sequence[InputMesh], options: Sequence[Options], done: list[Finished], run: Run
 ) -> list[str]:
     """Decompose nodes again whose hulls touch though they do not; returns what to say of those that still do."""
+    from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
 
     def body(number: int) -> Body:
-        mesh, hulls = meshes[number], [(hull.vertices, hull.faces) for hull in done[number].hulls]
-        surface = mesh.vertices, mesh.faces.astype(np.int32)
-        return Body(names[number], surface, [(v, f.astype(np.int32)) for v, f in hulls])
+        mesh, hulls = meshes[number], done[number].hulls
+        surfaces = [Surface(hull.vertices, hull.faces) for hull in hulls]
+        return Body(names[number], Surface(mesh.vertices, mesh.faces), surfaces)
 
-    def redo(number: int, obstacles: Sequence[Obstacle]) -> list[Surface]:
+    def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
         own = replace(options[number], avoid=(*options[number].avoid, *obstacles))
         reached = find_parts(meshes[number], own, run)
-        if run.stopped_by is None:
-            done[number] = finish(reached, run)
+        if run.stopped_by is not None or len(reached.parts) > most:
+            return None
+        done[number] = finish(reached, run)
         return body(number).hulls
 
     bodies, rest = [body(number) for number in range(len(names))], at_rest(names)

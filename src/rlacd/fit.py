@@ -13,11 +13,11 @@ RESOLVED = 1e-3
 """Distances in the frame above this (0.05 % of the longest side) are measured to 1 %; others are upper bounds."""
 
 COVERED = 5e-5
-"""The hulls cover an input of which they miss no more."""
+"""Hulls that miss no more than this of an input cover it."""
 
 
 class Fit(NamedTuple):
-    """What a criterion measured.
+    """The measurement of a criterion.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Fit(NamedTuple):
     limit : float or None
         None for navigable space, of which hulls may touch nothing.
     balls : int
-        Of navigable space.
+        Number of balls of navigable space.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Fit(NamedTuple):
 
     @classmethod
     def of(cls, report: Mapping[str, Any]) -> Fit | None:
-        """Read a report; None if it does not say."""
+        """Read a report; None if it holds no measurement."""
         for name in _LENGTHS:
             if name in report:
                 found = report[name]
@@ -55,7 +55,7 @@ class Fit(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Its entry in the report."""
+        """The key of its entry in the report."""
         return {"added_volume": "volume", "intrusion": "navigable"}.get(self.name, self.name)
 
     @property
@@ -64,7 +64,7 @@ class Fit(NamedTuple):
         return self.name in _LENGTHS
 
     def unit(self, scale: float) -> float:
-        """What a length that measures `scale` measures as the criterion does: nothing else if that is a share."""
+        """Unit of the measurement, where the unit of lengths is `scale`: 1 for a share of volume."""
         return 1.0 if self.name == "added_volume" else scale
 
     def words(self, scale: float = 1.0) -> str | None:
@@ -87,12 +87,12 @@ class Fit(NamedTuple):
 
 
 def length_unit(report: Mapping[str, Any], unit: str | None = None) -> tuple[float, str]:
-    """What a report's lengths are written in: as the threshold was given, so that they can be compared.
+    """The unit in which a report's lengths are written: the threshold's, so that they can be compared.
 
     Parameters
     ----------
     report : mapping
-        Its `scale`, and of its `options` the `threshold_abs`.
+        Its `scale` and its option `threshold_abs` are read.
     unit : str, optional
         In which the threshold was typed: ``%`` of the longest side, or of `UNITS` for an input in metres.
 

@@ -22,24 +22,24 @@ from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import NO_SIDES
 
 TIMES_PARTS = 2
-"""Parts are cut on for fewer corners as long as there are at most so many times the parts without that."""
+"""Cutting on for fewer corners multiplies the parts by at most this."""
 
 SHARE_OF_WORK, LEAST_SHARE = 0.3, 0.4e6
-"""Of the work done so far, that cutting on may take, and as much again to merge; at least so many units."""
+"""Share of the work done so far that cutting on may take, and merging as much again; at least so many units."""
 
 PIECES = 2
-"""Cutting on stops at so many times the pieces that there is room for: merging leaves half of them."""
+"""Cutting on stops at so many times the parts that may be added: merging leaves half of them."""
 
 NEARLY_EQUAL = 1.02
-"""Errors are measured to a fiftieth of the threshold."""
+"""Errors within this factor are equal: they are measured to a fiftieth of the threshold."""
 
 
 def cut_to_limits(
     parts: list[Part], limited: LimitedCriterion, solid: Component, options: Options, run: Run
 ) -> list[Part]:
-    """Cut parts whose hulls do not meet the criterion only because of the limits.
+    """Cut on parts whose hulls fail the criterion only because of the limits.
 
-    First for hulls that stay in the sides on which the solid rests, then for the others: the criterion comes first.
+    First with hulls kept within the sides on which the solid rests, then without: the criterion comes first.
     """
     most = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf))
     for goal in (limited, replace(limited, sides=NO_SIDES)) if len(limited.sides) else (limited,):
@@ -48,14 +48,14 @@ def cut_to_limits(
 
 
 def _cut_for(
-    limited: LimitedCriterion, parts: list[Part], room: int, solid: Component, options: Options, run: Run
+    limited: LimitedCriterion, parts: list[Part], extra: int, solid: Component, options: Options, run: Run
 ) -> list[Part]:
-    """Cut parts into at most `room` more pieces, those that take few first.
+    """Cut parts into at most `extra` more pieces, those that take few first.
 
     A part stays whole if its pieces would not meet it either, or if there would be too many parts. A body that is one
     part, such as a ball, always stays one.
     """
-    if room < 1 or len(parts) == 1:
+    if extra < 1 or len(parts) == 1:
         return parts
     cut = parts
     try:
@@ -64,11 +64,11 @@ def _cut_for(
             pieces: dict[Part, list[Part]] = {}
             for part, is_met in zip(parts, met, strict=True):
                 if not is_met and limited.criterion.is_met(part):
-                    pieces[part] = _cut_on(part, limited, solid, options, run, room)
+                    pieces[part] = _cut_on(part, limited, solid, options, run, extra)
             kept = {part: [part] for part in parts}
             for part, new in sorted(pieces.items(), key=lambda item: len(item[1])):
-                if 1 <= len(new) <= room + 1:
-                    room -= len(new) - 1
+                if 1 <= len(new) <= extra + 1:
+                    extra -= len(new) - 1
                     kept[part] = new
             cut = [piece for part in parts for piece in kept[part]]
         if len(cut) > len(parts) and options.merge:
@@ -81,7 +81,7 @@ def _cut_for(
     return cut
 
 
-def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, run: Run, room: int) -> list[Part]:
+def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, run: Run, extra: int) -> list[Part]:
     """The pieces of a part, all of which meet the criterion; none if there are too many."""
     inside = solid.inside(part.hull)
     if not inside.size:
@@ -89,8 +89,8 @@ def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, 
     scale = limited.overhang if math.isfinite(limited.overhang) else None
     policy = make_policy(options.first_policy, SweepCache(), scale)
     tree = CutTree(Component((inside.vertices, inside.faces)), policy, run)
-    done = cut_and_merge(tree, limited, run, merge=options.merge, most=PIECES * (room + 1), strict=True)
-    is_done = not done.unmet and not run.is_over and len(done.parts) <= room + 1
+    done = cut_and_merge(tree, limited, run, merge=options.merge, most=PIECES * (extra + 1), strict=True)
+    is_done = not done.unmet and not run.is_over and len(done.parts) <= extra + 1
     return done.parts if is_done else []
 
 
@@ -102,12 +102,12 @@ def at_most(
     limited: LimitedCriterion,
     run: Run,
 ) -> list[Part]:
-    """Get the parts, at most so many, whose largest error is least.
+    """Get at most `most` parts whose largest error is least.
 
     Parameters
     ----------
     most : int
-        With a larger one, more of the same states are looked at, so the error is never larger.
+        A larger number allows more of the same states, so the error is never larger.
     decompositions : iterable of sequence of Part
         Under coarser and coarser goals. Their parts are united two at a time, and every state on the way counts.
     unite : callable

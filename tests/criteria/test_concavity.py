@@ -120,9 +120,7 @@ def test_sliver_facets_do_not_shorten_distances() -> None:
         edges = np.vstack([along[:, order] * sign for order in ([0, 1, 2], [1, 0, 2], [1, 2, 0]) for sign in (1, -1)])
         points = np.vstack([edges + rng.normal(scale=scale, size=edges.shape), 1.0001 * part.vertices])
         hull = Closed(np.ascontiguousarray(points), np.zeros((0, 3), dtype=np.int32)).hull
-        _, part_to_hull, _, _ = _native.concavity(
-            part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, 1e-3
-        )
+        _, part_to_hull, _, _ = _native.concavity(part.vertices, part.faces, hull.body, part.volume, hull.volume, 1e-3)
         truth = 1.0  # the pocket's floor is 1 above the bottom and 1 below the top
         assert part_to_hull[1] >= truth - 1e-3
         assert part_to_hull[0] <= truth + 2e-3
@@ -188,7 +186,7 @@ def test_hull_larger_than_the_part_counts_in_full() -> None:
     part = from_manifold(box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)))
     hull = from_manifold(box((-0.6, -0.6, -0.6), (0.6, 0.6, 0.6)))
     value, part_to_hull, hull_to_part, _ = _native.concavity(
-        part.vertices, part.faces, hull.vertices, hull.faces, part.volume, hull.volume, 1e-4
+        part.vertices, part.faces, hull.body, part.volume, hull.volume, 1e-4
     )
     assert part_to_hull[0] - 1e-12 <= 0.1 <= part_to_hull[1] + 1e-12
     assert hull_to_part[0] == pytest.approx(0.1 * np.sqrt(3), abs=2e-4)
@@ -225,4 +223,4 @@ def test_bad_meshes_are_refused() -> None:
         ((good.vertices, good.faces + 100), (good.vertices, good.faces), "out of range"),
     ):
         with pytest.raises(ValueError, match=says):
-            _native.meets_concavity(*part, *hull, 1.0, 1.0, 0.05)
+            _native.meets_concavity(*part, _native.ConvexBody(*hull), 1.0, 1.0, 0.05)

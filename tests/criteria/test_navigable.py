@@ -25,6 +25,7 @@ from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part
+from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 from tests.hulls import assert_convex_hull
@@ -139,7 +140,7 @@ def test_the_boundary_is_covered(name: str, radius: float, tolerance: float) -> 
     distance = np.linalg.norm(points - closest, axis=1)
     far = distance > nav.radius + nav.tolerance
     level = closest[far] + (points - closest)[far] * ((nav.radius + nav.tolerance) / distance[far])[:, None]
-    to_hull = _native.HullUnion([hull.vertices], [hull.faces]).distance(level)
+    to_hull = hull_union([hull]).distance(level)
     level = level[to_hull < 0.5 * nav.radius]  # farther out a ball hardly touches the hull
     assert len(level) > 200
     gap, _ = cKDTree(nav.balls.centres).query(level)

@@ -160,11 +160,11 @@ def test_bad_hulls_are_refused() -> None:
     flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 1]], dtype=np.int32)
     with pytest.raises(ValueError, match="flat"):
-        _native.simplify_hull(flat, faces, 4, 4, 1e-6, NO_SIDES)
+        _native.simplify_hull(_native.ConvexBody(flat, faces), 4, 4, 1e-6, NO_SIDES)
     with pytest.raises(ValueError, match="not finite"):
-        _native.simplify_hull(flat * np.nan, faces, 4, 4, 1e-6, NO_SIDES)
+        _native.ConvexBody(flat * np.nan, faces)
     with pytest.raises(ValueError, match="no vertices"):
-        _native.simplify_hull(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32), 4, 4, 1e-6, NO_SIDES)
+        _native.simplify_hull(_native.ConvexBody(flat[:0], faces[:0]), 4, 4, 1e-6, NO_SIDES)
 
 
 def test_redundant_corners_stay_if_the_threshold_needs_them() -> None:

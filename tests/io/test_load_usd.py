@@ -12,7 +12,7 @@ import trimesh
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.load import load_mesh
-from rlacd.io.robots.usd import read_colliders
+from rlacd.io.robots.usd import read_stage
 
 Usd = pytest.importorskip("pxr.Usd", reason="the extra usd is not installed")
 from pxr import Gf, Sdf, UsdGeom, UsdPhysics, UsdUtils, Vt  # noqa: E402
@@ -131,7 +131,7 @@ def test_files_outside_the_folder_or_missing_are_named_and_never_opened(tmp_path
     (tmp_path / "in").mkdir()
     path = tmp_path / "in" / "cart.usda"
     path.write_text(f'#usda 1.0\ndef Mesh "A" {naming.replace("{folder}", str(tmp_path))} {{ }}\n')
-    for read in (load_mesh, read_colliders, check_files):
+    for read in (load_mesh, read_stage, check_files):
         with pytest.raises(MeshFileError, match=r"outside its folder|cannot be opened|by a template"):
             read(path)
     assert not [layer for layer in Sdf.Layer.GetLoadedLayers() if "secret" in layer.identifier]
@@ -151,7 +151,7 @@ def test_a_file_that_crashes_openusd_is_refused_and_leaves_nothing(
     left.mkdir()
     monkeypatch.setenv("TMPDIR", str(left))
     monkeypatch.setattr(tempfile, "tempdir", None)
-    for read in (load_mesh, read_colliders):
+    for read in (load_mesh, read_stage):
         with pytest.raises(MeshFileError, match=r"cupboard\.usdc.*export it again"):
             read(path)
     assert list(left.iterdir()) == []
@@ -173,9 +173,9 @@ def test_faces_that_are_holes_are_left_out(tmp_path: Path) -> None:
     mesh.CreateHoleIndicesAttr([12, 0])
     UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
     stage.Save()
-    colliders = read_colliders(tmp_path / "box.usda")
-    for faces in (load_mesh(tmp_path / "box.usda").faces, np.frombuffer(colliders.blobs["0.faces"], np.int64)):
-        assert np.array_equal(faces.reshape(-1, 3), BOX.faces[1:])
+    (body,) = read_stage(tmp_path / "box.usda").bodies
+    for faces in (load_mesh(tmp_path / "box.usda").faces, body.mesh().faces):
+        assert np.array_equal(faces, BOX.faces[1:])
     mesh.GetHoleIndicesAttr().Set([13])
     stage.Save()
     with pytest.raises(MeshFileError, match="holes at /box"):

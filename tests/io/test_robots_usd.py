@@ -11,9 +11,10 @@ import trimesh
 from click.testing import CliRunner
 
 import rlacd
-from rlacd.clear import Body, at_rest, check
+from rlacd.clear import Body, Surface, at_rest, check
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
+from rlacd.io.robots.viewed import decompose_viewed
 from tests.models import TABLE_VOLUME, inside, table
 from tests.moving import drawer
 
@@ -236,7 +237,38 @@ def test_bodies_that_do_not_touch_do_not_as_hulls_and_fixed_meshes_may(tmp_path:
     groups = [[hull.convex_hull for hull, path in hulls if f"/{name}" in path] for name in ("cabinet", "drawer")]
     assert all(groups)
     bodies = [
-        Body(name, (own[0].vertices, own[0].faces), [(h.vertices, h.faces) for h in own])
+        Body(name, Surface(own[0].vertices, own[0].faces), [Surface(h.vertices, h.faces) for h in own])
         for name, own in zip("ab", groups, strict=True)
     ]
     assert check(bodies, at_rest("ab")) == {}
+
+
+@pytest.mark.parametrize("how", ["adjacent", "always,never"])
+def test_pairs_of_bodies_that_a_joint_connects_are_filtered_where_asked(tmp_path: Path, how: str) -> None:
+    """Of pairs that are looked at only at rest, adjacent ones are known."""
+    pytest.importorskip("coal", reason="extra clear")
+    source = write_stage(tmp_path / "in.usda")
+    stage = Usd.Stage.Open(str(source))
+    UsdGeom.Xform.Define(stage, "/arm")
+    add_table(stage, "/arm/table")
+    add_table(stage, "/floor")
+    UsdPhysics.RigidBodyAPI.Apply(stage.GetPrimAtPath("/arm"))
+    joint = UsdPhysics.RevoluteJoint.Define(stage, "/hinge")
+    joint.CreateBody0Rel().AddTarget("/robot/table")
+    joint.CreateBody1Rel().AddTarget("/arm")
+    stage.Save()
+    done = rlacd.rewrite_robot(source, tmp_path / "out.usda", threads=1, quality="fast", exclude=how)
+    shown = decompose_viewed(source, quality="fast", threads=1)
+    assert (shown.links, shown.joints) == (["/robot", "/arm", "/floor"], ()), "the page shows a stage as it stands"
+    assert shown.touching([]) == []
+    kinds = {(pair.first, pair.second): pair.kind for pair in done.pairs}
+    assert kinds[("/robot", "/arm")] == "adjacent"
+    assert kinds[("/robot", "/floor")] == kinds[("/arm", "/floor")] == "sometimes"
+    after = Usd.Stage.Open(str(done.path))
+    filtered = {
+        str(prim.GetPath()): [*map(str, UsdPhysics.FilteredPairsAPI(prim).GetFilteredPairsRel().GetTargets())]
+        for prim in after.Traverse()
+        if prim.HasAPI(UsdPhysics.FilteredPairsAPI)
+    }
+    assert filtered == ({"/robot": ["/arm"]} if how == "adjacent" else {})
+    assert findings(after) == []

@@ -98,16 +98,16 @@ def test_welding_keeps_first_places_and_one_of_equal_faces(seed: int, count: int
     def windings(group: list[list[int]]) -> list[int]:
         return [round(np.linalg.det(np.eye(3)[np.argsort(face)])) for face in group]
 
-    kept, films = {}, set()
+    kept, slivers = {}, set()
     for corners, group in alike.items():
         net = sum(windings(group))
         kept[corners] = next(face for face, sign in zip(group, windings(group), strict=True) if sign * net >= 0)
-        films |= {corners} if net == 0 else set()
-    found, faces_found, is_film = _native.weld(vertices, triangles)
+        slivers |= {corners} if net == 0 else set()
+    found, faces_found, is_sliver = _native.weld(vertices, triangles)
     assert np.array_equal(found, vertices[used])
     assert not np.signbit(found[found == 0]).any()
     assert sorted(faces_found.tolist()) == sorted(kept.values())
-    assert [frozenset(face) in films for face in faces_found.tolist()] == is_film.tolist()
+    assert [frozenset(face) in slivers for face in faces_found.tolist()] == is_sliver.tolist()
 
 
 @settings(max_examples=50, deadline=None)
@@ -117,10 +117,10 @@ def test_edges_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: i
     _, triangles = soup(seed, count, faces)
     vertices, edges = np.random.default_rng(seed).normal(size=(count, 3)), Edges.of(triangles, count)
     pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    distinct, inverse, valence = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    distinct, inverse, face_count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     assert np.array_equal(edges.vertices, distinct)
     assert np.array_equal(edges.of_halfedge, inverse.reshape(-1))
-    assert np.array_equal(edges.valence, valence)
+    assert np.array_equal(edges.face_count, face_count)
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     assert np.array_equal(np.flatnonzero(first_of_doubled(triangles, count)), np.sort(first))
     number, body = bodies_of(triangles, edges)

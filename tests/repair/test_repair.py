@@ -226,7 +226,7 @@ def test_a_capped_body_whose_faces_cross_at_an_edge_is_solid(times):
 
 LOST = [
     *("test/capod/class5__m54.ply", "test/capod/class5__m55.ply", "test/capod/class5__m58.ply"),  # plants, wrapped
-    "train/kenney_cc0/space_kit__spaceCraft1.ply",  # films around a room that is filled
+    "train/kenney_cc0/space_kit__spaceCraft1.ply",  # slivers around a room that is filled
     "test/gazebo_models/speed_limit_sign__speed_limit_sign.ply",  # caps turn it inside out in places
     "train/kenney_cc0/furniture_pack__cabinetBedDrawer.ply",  # its first skin leads away from it
 ]

@@ -46,11 +46,11 @@ def test_a_fin_that_leans_into_its_body_is_kept_where_it_comes_out_again(tip):
     assert volume(solid) == pytest.approx(6.4, rel=1e-3)
 
 
-def test_a_film_that_begins_inside_its_body_is_kept_where_it_leads_out():
+def test_a_sliver_that_begins_inside_its_body_is_kept_where_it_leads_out():
     corners = [int(np.argmin(np.linalg.norm(BOX.vertices - at, axis=1))) for at in ((-1, -1, -1), (1, -1, -1))]
-    film = [[*corners, 8], [*corners[::-1], 8]]
+    sliver = [[*corners, 8], [*corners[::-1], 8]]
     tip = np.array([[0.0, 0.9, 2.0]])
-    solid = solid_of((np.vstack([BOX.vertices, tip]), np.vstack([BOX.faces, film])))
+    solid = solid_of((np.vstack([BOX.vertices, tip]), np.vstack([BOX.faces, sliver])))
     assert SurfaceQuery(*to_arrays(solid.manifold)).distance(solid.frame.to_frame(tip)) <= 2 * HALF_THICKNESS
     assert volume(solid) == pytest.approx(8, rel=0.01)
 

@@ -114,7 +114,7 @@ def test_hulls_of_bodies_that_had_no_repair_hold_them() -> None:
     assert len(result) == 40
     assert sum(hull.volume for hull in result) == pytest.approx(trimesh.Trimesh(*boxes(40)).volume)
     assert result.report["repair"] == []
-    assert result.report["concavity"] == {"per_part": None, "max": None}
+    assert result.report["concavity"] == {"threshold": 0.05, "per_part": None, "max": None}
 
 
 def test_bodies_by_the_thousand_share_hulls_with_those_near_them() -> None:

@@ -404,12 +404,14 @@ def test_figures_are_those_of_the_command_and_all_stays_in_the_frame(seen: Watch
     page.keyboard.press("Enter")
     wait_for_run(page, 2)
     words = ["decompose", str(mesh), "-o", str(tmp_path / "hulls.glb"), "--quality", "fast", "--threshold", "0.4"]
-    said = re.search(r"max concavity ([\d.]+)", CliRunner().invoke(app, words).output)
+    said = re.search(r"concavity at most ([\d.]+)", CliRunner().invoke(app, words).output)
     assert said is not None
-    figure = page.locator("#summary").inner_text().split("concavity\u00a0")[1].split()[0]
+    figure = page.locator("#summary").inner_text().split("concavity at most\u00a0")[1].split()[0]
     listed = page.locator("#parts tbody td:nth-child(4)").all_inner_texts()
     assert float(figure) == pytest.approx(float(said[1]), rel=0.006) == pytest.approx(max(map(float, listed)), rel=0.06)
     page.set_viewport_size({"width": 900, "height": 1000})  # the sides are nearest
+    page.wait_for_function("innerWidth === 900")
+    settle(page)
     page.locator("#explode").focus()
     page.keyboard.press("End")
     page.locator("#explode").blur()

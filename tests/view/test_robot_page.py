@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 import trimesh
 
 import rlacd
-from rlacd.clear import Motion, mjcf_motion, urdf_motion
+from rlacd.clear import mjcf_motion, urdf_motion
 from rlacd.io.robots.viewed import USUAL, decompose_viewed, read_viewed
 from rlacd.plain_json import to_json
 from rlacd.view.robot import RobotResult
@@ -99,8 +100,8 @@ def test_joints_move_links_as_the_robots_own_kinematics_do(seen: Watched, robots
     robot = decompose_viewed(robots / name, **USUAL, quality="fast", threads=1)
     assert isinstance(robot, RobotResult)
     shown = scene(robot)
-    found: Motion = (urdf_motion if name.endswith("urdf") else mjcf_motion)(robots / name, 20, seed=1)
-    motion = found.some(robot.links)
+    read = urdf_motion if name.endswith("urdf") else mjcf_motion
+    motion = read(robots / name, 20, seed=1, links=robot.links)
     given = [shown["robot"], shown["scale"], motion.positions.tolist()]
     moved = np.array(seen.page.evaluate(MATRICES, given)).reshape(21, len(robot.links), 4, 4).swapaxes(2, 3)
     corners, frame = trimesh.creation.box().vertices, 1.0 / shown["scale"]
@@ -160,7 +161,7 @@ def test_the_server_tells_contacts_of_joint_positions_only(press: ViewServer) ->
 @pytest.mark.slow
 def test_the_report_of_a_robot_shows_the_worst_positions(robots: Path, browser: Any, tmp_path: Path) -> None:
     done = rlacd.rewrite_robot(robots / "press.urdf", tmp_path / "out.urdf", samples=60, quality="fast", threads=1)
-    report = done.save_report(tmp_path / "press.html")
+    report = pickle.loads(pickle.dumps(done)).save_report(tmp_path / "press.html")
     with open_page(browser) as watched:
         page = watched.page
         page.goto(report.as_uri())

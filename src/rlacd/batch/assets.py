@@ -27,15 +27,15 @@ ROBOTS = (".urdf", ".xml")
 """File endings of robots; an ``.xml`` is one only if it is MJCF."""
 
 RESERVED = ("manifest.jsonl", "timings.jsonl", ".rlacd")
-"""What a batch writes beside its results."""
+"""Names of the files that a batch writes beside its results."""
 
 EVERYTHING = "**"
 
 HULLS = "_hulls"
-"""What `rlacd decompose` appends to a mesh's name to name its hulls."""
+"""Suffix that `rlacd decompose` gives a mesh's name for its hulls."""
 
 _MARKS = f'"generator":"{GENERATOR}"', f"# {GENERATOR}", f"comment {GENERATOR}"
-"""What GLB, OBJ and PLY files written by rlacd say, within the first bytes."""
+"""Marks within the first bytes of GLB, OBJ and PLY files that rlacd wrote."""
 
 _MARK_BYTES = 128
 
@@ -128,8 +128,7 @@ def find_assets(
     MeshFileError
         `folder` does not exist or is not a folder, or a folder in it cannot be read.
     """
-    # Names of results depend on all meshes of the folder, not only on the selected ones, so that a mesh's result has
-    # the same name in every run.
+    # Results are named among all meshes of the folder, not only the selected ones: the same in every run.
     names = sorted(name for name, kind in _files(folder, leave_out) if kind == "asset")
     places = _places(names, ending)
     return [Asset(name, folder / name, places[name]) for name in names if _matches(name, glob)]

@@ -83,7 +83,7 @@ class Summary:
 
 
 def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcome], None, None]:
-    """Process tasks in any order, taking them as the pool has room; what is yielded is written.
+    """Process tasks in any order, as the pool has room; an outcome is written before it is yielded.
 
     A mesh whose process died is tried again alone, after all others: on this machine they may have taken its memory.
     """
@@ -244,7 +244,7 @@ class Batch:
         return assets
 
     def _refuse_results_over_meshes(self, assets: list[Asset], here: Path) -> None:
-        """The folder of results may hold that of the meshes, in which a folder may have the same name again."""
+        """Refuse results that would overwrite meshes; the folder of results may be above that of the meshes."""
         places = {here.resolve() / asset.place for asset in assets}
         for asset in assets if self.glob == EVERYTHING else find_assets(self.assets, EVERYTHING, here):
             for path in (asset.path, asset.path.resolve()):

@@ -34,7 +34,7 @@ class Ledger(AbstractContextManager["Ledger"]):
 
     def __init__(self, store: ResultStore, name: str) -> None:
         self._store, self._name, self._journal = store, name, f"{PRIVATE}/{name}"
-        self._waiting: list[bytes] = []  # for the journal, for as long as the store says
+        self._waiting: list[bytes] = []  # for the journal, at most `append_every` seconds
         self._written = time.monotonic()
         self._rows: dict[str, Row] = {}
         self._owner: dict[str, str] = {}

@@ -146,7 +146,7 @@ def process(task: Task, work: Work, died: WorkerDiedError | None = None) -> Outc
 
 
 def _request(task: Task, work: Work) -> Request:
-    """Other machines get the mesh's files."""
+    """Make the request; for other machines it holds the mesh's files."""
     brought, stem = work.pool.many_machines, PurePosixPath(task.asset.place).name
     path, files = (None, task.asset.files()) if brought else (str(task.asset.path), {})
     values = {"spec": asdict(work.spec), "path": path, "name": task.asset.name, "stem": stem, "hull_only": False}

@@ -21,8 +21,10 @@ from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
 from rlacd.fit import Fit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
-from rlacd.io.robots import is_robot, rewrite_robot, usd
-from rlacd.io.robots.rewrite import rewrite_stage
+from rlacd.io.robots import is_robot, rewrite_robot
+from rlacd.io.robots.read import STAGES, robot_or_none
+from rlacd.io.robots.rewrite import rewrite
+from rlacd.io.robots.robot import Robot
 from rlacd.options.robots import RobotOptions
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.process import peak_memory
@@ -61,7 +63,7 @@ def make(
         The mesh cannot be used, or its hulls cannot be written.
     """
     with TemporaryDirectory(dir=staging) as folder:
-        stage = usd.colliders_of(mesh) if spec.ending in usd.ENDINGS else None
+        stage = robot_or_none(mesh) if spec.ending in STAGES and mesh.suffix.lower() in STAGES else None
         if is_robot(mesh) or stage is not None:
             ending = mesh.suffix if stage is None else spec.ending
             facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)
@@ -83,13 +85,13 @@ def _files_in(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
 
-def _robot(spec: JobSpec, robot: Path | usd.Colliders, place: Path, hull_only: bool) -> dict[str, Any]:
+def _robot(spec: JobSpec, robot: Path | Robot, place: Path, hull_only: bool) -> dict[str, Any]:
     """Rewrite a robot, or a stage as one file, with hulls in place of its collision meshes; returns facts."""
     options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.options
     if isinstance(robot, Path):
         done = rewrite_robot(robot, place, **options)
     else:
-        done = rewrite_stage(robot, place, options, RobotOptions(), keep_input=True)
+        done = rewrite(robot, place, options, RobotOptions(), keep_input=True)
         robot = robot.source
     here = {str(place.parent): "the results", str(robot.absolute().parent): "the robot's folder"}
     warnings = [STAND_IN] if hull_only else []

@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
 from rlacd.errors import MissingExtraError, OptionError, OutputError, OutputNameError, import_extra
 from rlacd.io.read.open_file import read_file
-from rlacd.io.write.atomic import lock_folder, output_errors, write_file
+from rlacd.io.write.atomic import output_errors, write_file
 
 PRIVATE = ".rlacd"
 """Folder inside the results for files that only the next run needs."""
@@ -43,8 +43,7 @@ def put_files(store: ResultStore, files: Mapping[str, bytes], owns: Callable[[st
     Raises
     ------
     OutputNameError
-        Something else is there that this batch does not own. The very same bytes are: they are left by a run that was
-        killed before it could say so.
+        A file with other bytes is there that this batch does not own. The same bytes are left by a killed run.
     """
     for name, data in files.items():
         if not owns(name) and store.read(name) not in (None, data):
@@ -133,15 +132,22 @@ class FolderStore:
     def open(self) -> None:
         """Lock the folder for this run, and remove files left incomplete by a killed one.
 
+        The system releases the lock when the process ends, however it does.
+
         Raises
         ------
         OutputError
             The folder cannot be made or written to, or another run is writing to it.
         """
-        lock = self.folder / PRIVATE / "lock"
+        held = self.folder / PRIVATE / "lock"
         with output_errors(self.folder):
-            lock.parent.mkdir(parents=True, exist_ok=True)
-            self._lock = lock_folder(self.folder, lock)
+            held.parent.mkdir(parents=True, exist_ok=True)
+            self._lock = FileLock(held, blocking=False, thread_local=False)
+            try:
+                self._lock.acquire()
+            except Timeout as error:
+                told = f"another run is writing to {self.folder}; wait for it or choose another folder."
+                raise OutputError(told) from error
         for at, _, files in os.walk(self.folder):
             for file in files:
                 if file.startswith(".rlacd-") and file.endswith(".tmp"):

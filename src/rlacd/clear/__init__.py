@@ -4,14 +4,13 @@ from rlacd.clear.bodies import Body, CrowdedError, Surface, may_touch
 from rlacd.clear.mend import Cleared, kept_clear
 from rlacd.clear.motion import Joint, Motion, at_rest, mjcf_motion, urdf_motion
 from rlacd.clear.pairs import LinkPair, link_pairs, warnings_of
-from rlacd.clear.touching import Known, Offence, Touching, check
+from rlacd.clear.touching import Offence, Touching, check
 
 __all__ = [
     "Body",
     "Cleared",
     "CrowdedError",
     "Joint",
-    "Known",
     "LinkPair",
     "Motion",
     "Offence",

@@ -1,14 +1,19 @@
-"""A rigid body as it was read and as hulls, and which bodies come near each other."""
+"""Rigid bodies as they were read and as hulls, as coal's shapes, and which of them come near each other."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from rlacd.errors import RlacdError
-from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray
+from rlacd import _native
+from rlacd.errors import RlacdError, import_extra
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray, dots
+from rlacd.solid.topology import used_points
 
 MOST_NEAR = 4_000_000
 """Pairs of boxes that come near each other along the x axis, over all samples; robots of a hundred links have fewer."""
@@ -18,22 +23,71 @@ class CrowdedError(RlacdError, ValueError):
     """More bodies stand in each other than can be checked."""
 
 
-Surface = tuple[FloatArray, IntArray]
-"""Vertices [V, 3] and triangles [F, 3]."""
+def get_coal() -> Any:
+    """The library coal; raises MissingExtraError."""
+    return sys.modules.get("coal") or import_extra("coal", "checking that bodies stay clear of each other", "clear")
+
+
+class Surface:
+    """Vertices float64 [V, 3] and triangles int32 [F, 3], with the shapes that coal makes of them when first needed."""
+
+    def __init__(self, vertices: FloatArray, faces: Int64Array | IntArray) -> None:
+        self.vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+        self.faces = np.ascontiguousarray(faces, dtype=np.int32)
+        self.met: dict[tuple[Surface, bytes], bool] = {}  # whether it touches others, seen at a pose
+
+    def __reduce__(self) -> Any:
+        return Surface, (self.vertices, self.faces)
+
+    @cached_property
+    def used(self) -> FloatArray:
+        """The corners of its triangles; without any, all points."""
+        return used_points(self.vertices, self.faces) if len(self.faces) else self.vertices
+
+    @cached_property
+    def box(self) -> FloatArray:
+        """Lower and upper corner of the box around it [2, 3]."""
+        return np.stack([self.used.min(axis=0), self.used.max(axis=0)])
+
+    @cached_property
+    def as_mesh(self) -> Any:
+        """For coal, a surface."""
+        model = get_coal().BVHModelOBBRSS()
+        model.beginModel(len(self.faces), len(self.vertices))
+        model.addVertices(self.vertices)
+        model.addTriangles(self.faces.astype(np.int64))
+        model.endModel()
+        return model
+
+    @cached_property
+    def as_convex(self) -> Any:
+        """For coal, a convex polytope."""
+        coal = get_coal()
+        points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+        points.extend([*self.vertices])
+        triangles.extend([coal.Triangle(*face) for face in self.faces.tolist()])
+        return coal.Convex(points, triangles)
+
+    @cached_property
+    def corner(self) -> FloatArray:
+        """The point [1, 3] farthest from its middle: hardly ever in the box of another body."""
+        away = self.used - self.box.mean(axis=0)
+        return self.used[[dots(away, away).argmax()]]
+
+    @cached_property
+    def _winding(self) -> _native.Surface:
+        return _native.Surface(self.vertices, self.faces)
+
+    def holds(self, point: FloatArray) -> bool:
+        """Whether it holds a point [1, 3] of another surface that does not cross it, and so all of that."""
+        if (point < self.box[0]).any() or (point > self.box[1]).any():
+            return False
+        return bool(self._winding.winding(point, accuracy=4.0, threads=1)[0] > 0.5)
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body; everything is in its own frame, and in one unit for all bodies.
-
-    Attributes
-    ----------
-    name : str
-    mesh : tuple
-        The surface as it was read.
-    hulls : list of tuple
-        The surfaces of convex polytopes.
-    """
+    """A rigid body, its surface as it was read, and its hulls; in its own frame, and in one unit for all bodies."""
 
     name: str
     mesh: Surface
@@ -44,20 +98,21 @@ class Body:
         return replace(self, hulls=[*hulls])
 
     @property
+    def is_filled(self) -> bool:
+        """Whether it can touch others."""
+        return bool(self.hulls and len(self.mesh.faces))
+
+    @property
     def box(self) -> FloatArray:
         """Lower and upper corner of a box around mesh and hulls [2, 3]."""
-        points = [self.mesh[0], *(vertices for vertices, _ in self.hulls)]
-        filled = [some for some in points if len(some)]
-        return np.stack(
-            [np.min([p.min(axis=0) for p in filled], axis=0), np.max([p.max(axis=0) for p in filled], axis=0)]
-        )
+        boxes = np.stack([surface.box for surface in (self.mesh, *self.hulls) if len(surface.used)])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
 def may_touch(bodies: Sequence[Body]) -> bool:
     """Whether boxes of hulls of two bodies that share a frame overlap."""
     owner = np.array([i for i, body in enumerate(bodies) for _ in body.hulls])
-    boxes = [np.stack([v.min(axis=0), v.max(axis=0)]) for body in bodies for v, _ in body.hulls]
-    pairs = overlapping(np.stack(boxes)[None])[:, 1:]
+    pairs = overlapping(np.stack([hull.box for body in bodies for hull in body.hulls])[None])[:, 1:]
     return bool((owner[pairs[:, 0]] != owner[pairs[:, 1]]).any())
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rlacd.clear.bodies import Body, Surface
 from rlacd.clear.motion import Motion
-from rlacd.clear.touching import TOUCH, Known, Offence, Shapes, Touching, check, size_of
+from rlacd.clear.touching import TOUCH, Offence, Touching, check, enters, gap, size_of
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import concatenated
 from rlacd.solid.obstacle import Obstacle
@@ -31,26 +31,22 @@ MOST_OFFENCES = 24
 OFF_HULLS = 10 * TOUCH
 """How far hulls stay off those of other bodies, a share of the size of all: single precision moves them less."""
 
-Redo = Callable[[int, Sequence[Obstacle]], Sequence[Surface]]
-"""Decomposes the body of this number again, clear of obstacles in its frame."""
+MOST_GROWTH, SPARE = 3, 16
+"""A body may have so many times its hulls, or so many more. Links that turn inside each other with a hundredth of the
+tolerance between them take seven times as many, which costs more in every step than it is worth."""
+
+Redo = Callable[[int, Sequence[Obstacle], int], Sequence[Surface] | None]
+"""Decomposes the body of this number again, clear of obstacles in its frame; None if that takes more hulls."""
 
 
 @dataclass(frozen=True)
 class Cleared:
-    """What became of bodies.
-
-    Attributes
-    ----------
-    bodies : list of Body
-    touching : dict
-        As `check` finds it for the new hulls.
-    mended : tuple of (int, int)
-        Pairs whose hulls touched though they did not, and no longer do.
-    """
+    """What became of bodies."""
 
     bodies: list[Body]
-    touching: dict[tuple[int, int], Touching]
-    mended: tuple[tuple[int, int], ...] = ()
+    touching: dict[tuple[int, int], Touching]  # as `check` finds it for the new hulls
+    mended: tuple[tuple[int, int], ...] = ()  # pairs whose hulls touched though they did not, and no longer do
+    given_up: frozenset[int] = frozenset()  # bodies that would have taken too many hulls
 
 
 class _Wish(NamedTuple):
@@ -63,24 +59,14 @@ class _Wish(NamedTuple):
 
 @dataclass
 class _Wishes:
-    """What bodies are to stay out of, and where, seen from them.
+    """What bodies are to stay out of, and where, seen from them."""
 
-    Attributes
-    ----------
-    places : dict
-        Poses of the other body, by their digits.
-    gaps : dict
-        The least gap between the two there.
-    tried : set
-        Places with the hulls that the other body had: the same again would not help.
-    renewed : dict
-        How often a body was decomposed again.
-    """
-
-    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)
-    gaps: dict[_Wish, float] = field(default_factory=dict)
-    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)
-    renewed: Counter[int] = field(default_factory=Counter)
+    places: dict[_Wish, dict[bytes, FloatArray]] = field(default_factory=dict)  # poses of the other, by their digits
+    gaps: dict[_Wish, float] = field(default_factory=dict)  # the least between the two there
+    tried: set[tuple[_Wish, int, bytes]] = field(default_factory=set)  # the same again would not help
+    renewed: Counter[int] = field(default_factory=Counter)  # how often a body was decomposed again
+    given_up: set[int] = field(default_factory=set)
+    too_tight: float = 0.0  # the widest gap for which a body took too many hulls
 
     def add(self, wish: _Wish, poses: Sequence[FloatArray]) -> bool:
         """Add places; returns whether any is new."""
@@ -103,33 +89,40 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
         The extra ``clear`` is not installed.
     """
     bodies = list(bodies)
-    known = Known()
-    touching = check(bodies, motion, known=known)
+    touching = check(bodies, motion)
     first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
+    most = [max(MOST_GROWTH * len(body.hulls), len(body.hulls) + SPARE) for body in bodies]
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
-        again = _wish(bodies, wrong, wishes, known)
+        again = _wish(bodies, wrong, wishes)
         if not again:
             break
         for body in sorted(again):
             obstacles = [_obstacle(bodies, wish, wishes, motion) for wish in wishes.places if wish.body == body]
-            bodies[body] = bodies[body].with_hulls(redo(body, obstacles))
+            tight = min((wishes.gaps[wish] for wish in wishes.gaps if wish.body == body), default=np.inf)
+            hulls = None if tight <= wishes.too_tight else redo(body, obstacles, most[body])
+            if hulls is None:
+                wishes.given_up.add(body)
+                wishes.too_tight = max(wishes.too_tight, tight if np.isfinite(tight) else 0.0)
+                continue
+            bodies[body] = bodies[body].with_hulls(hulls)
             wishes.renewed[body] += 1
+        again -= wishes.given_up
         near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
-        renewed = check(bodies, motion, near, known)
+        renewed = check(bodies, motion, near)
         touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
     mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
-    return Cleared(bodies, dict(sorted(touching.items())), tuple(mended))
+    return Cleared(bodies, dict(sorted(touching.items())), tuple(mended), frozenset(wishes.given_up))
 
 
-def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes, known: Known) -> set[int]:
+def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:
     """Add what bodies are to stay out of, and return those to decompose again: not both of a pair at once."""
-    shapes = {i: Shapes(bodies[i], known) for pair in wrong for i in pair}
     again, fixed = set[int](), set[int]()
-    for (i, j), found in sorted(wrong.items(), key=lambda one: (-one[1].offences[0].depth, one[0])):
+    left = {pair: found for pair, found in wrong.items() if wishes.given_up.isdisjoint(pair)}
+    for (i, j), found in sorted(left.items(), key=lambda one: (-one[1].depth, one[0])):
         seen = [place.pose for place in _spread(found.offences)]
         poses = {i: seen, j: [inverse(pose) for pose in seen]}
-        ours, theirs = (any(shapes[a].enters(shapes[b], pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
+        ours, theirs = (any(enters(bodies[a], bodies[b].mesh, pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
         ways = [_Wish(i, j, False), _Wish(j, i, False)]
         if theirs:
             ways.reverse()
@@ -140,8 +133,8 @@ def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes
                 again.add(wish.body)
                 fixed.add(wish.other)
                 if wish.of_mesh:
-                    gap = min(shapes[i].gap(shapes[j], pose) for pose in seen)
-                    wishes.gaps[wish] = min(gap, wishes.gaps.get(wish, gap))
+                    least = min(gap(bodies[i].mesh, bodies[j].mesh, pose) for pose in seen)
+                    wishes.gaps[wish] = min(least, wishes.gaps.get(wish, least))
                 break
     return again
 
@@ -161,9 +154,9 @@ def _obstacle(bodies: Sequence[Body], wish: _Wish, wishes: _Wishes, motion: Moti
     """The other body at all places, seen from the one that stays out of it, as far as it comes near that."""
     own, other = bodies[wish.body], bodies[wish.other]
     if wish.of_mesh:
-        (vertices, faces), margin = other.mesh, wishes.gaps[wish] / 2
+        vertices, faces, margin = other.mesh.vertices, other.mesh.faces, wishes.gaps[wish] / 2
     else:
-        vertices, faces = concatenated([(v, f.astype(np.int32)) for v, f in other.hulls])
+        vertices, faces = concatenated([(hull.vertices, hull.faces) for hull in other.hulls])
         margin = OFF_HULLS * size_of(bodies, motion)
     lower, upper = own.box[0] - margin, own.box[1] + margin
     near = []

@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,10 +24,13 @@ from rlacd.solid.arrays import FloatArray
 SAMPLES = 500
 """Joint positions that are looked at, beside that at rest."""
 
-_SLIDE, _HINGE = 2, 3
-"""``mjtJoint`` of MuJoCo."""
+_KINDS = {2: ("slides without limits", True), 3: ("turns", False)}
+"""What joints do of which ``mjtJoint``, and whether they slide; the others are free or balls."""
 
 _FOR = "checking that links stay clear of each other"
+
+Limits = tuple[float, float]
+"""Of a joint, in radians or the unit of length."""
 
 
 @dataclass(frozen=True)
@@ -62,41 +67,20 @@ class Joint:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where links are.
-
-    Attributes
-    ----------
-    links : tuple of str
-    poses : float64 [S, L, 4, 4]
-        From each link's frame to one that all share; the first sample is at rest.
-    joints : tuple of Joint
-        Those that move: first those that are sampled, then those that others drive.
-    positions : float64 [S, J]
-        Of the sampled joints, in radians or the unit of length.
-    adjacent : frozenset of (int, int)
-        Links that one joint connects, the lower number first.
-    warnings : tuple of str
-        What a joint's range was taken to be, where the file does not say.
-    fixed : frozenset of int
-        Links that never move: of two of them, hulls may touch.
-    carrier : tuple of int
-        For each link, the last below it, or itself, whose joint was looked at only at rest; -1 if there is none.
-    carried : tuple of int
-        For each link, the joint that carries it; -1 if none does.
-    place : callable
-        Takes positions [J] and returns the poses of links [L, 4, 4].
-    """
+    """Where links are."""
 
     links: tuple[str, ...]
-    poses: FloatArray
-    joints: tuple[Joint, ...] = ()
-    positions: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
+    poses: FloatArray  # [S, L, 4, 4], from each link's frame to one that all share; the first sample is at rest
+    joints: tuple[Joint, ...] = ()  # those that move: first those that are sampled, then those that others drive
+    positions: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))  # [S, J], of the sampled joints
+    # Links that one joint connects, or several without one of these links between, the lower number first; joints that
+    # were looked at only at rest do not count, since elsewhere links may be far from each other.
     adjacent: frozenset[tuple[int, int]] = frozenset()
-    warnings: tuple[str, ...] = ()
-    fixed: frozenset[int] = frozenset()
-    carrier: tuple[int, ...] = ()
-    carried: tuple[int, ...] = ()
-    place: Callable[[FloatArray], FloatArray] | None = None
+    warnings: tuple[str, ...] = ()  # what a joint's range was taken to be, where the file does not say
+    fixed: frozenset[int] = frozenset()  # links that never move: of two of them, hulls may touch
+    carrier: tuple[int, ...] = ()  # the last link below, or itself, whose joint was looked at only at rest; -1: none
+    carried: tuple[int, ...] = ()  # the joint that carries it; -1 if none does
+    place: Callable[[FloatArray], FloatArray] | None = None  # takes positions [J], returns poses [L, 4, 4]
 
     @property
     def sampled(self) -> tuple[Joint, ...]:
@@ -108,42 +92,6 @@ class Motion:
         row = np.array([positions], dtype=np.float64)
         return replace(self, positions=row, poses=self.poses[:1] if self.place is None else self.place(row[0])[None])
 
-    def some(self, links: Sequence[str]) -> Motion:
-        """Of some of the links, in the given order. Those between two of them do not keep them from being adjacent."""
-        numbers = {name: i for i, name in enumerate(self.links)}
-        chosen = [numbers[name] for name in links]
-        new = {old: i for i, old in enumerate(chosen)}
-        pairs = {(min(new[a], new[b]), max(new[a], new[b])) for a, b in self._joined(set(chosen))}
-        place = self.place
-        return replace(
-            self,
-            links=tuple(links),
-            poses=self.poses[:, chosen],
-            adjacent=frozenset(pairs),
-            fixed=frozenset(new[i] for i in self.fixed & {*chosen}),
-            carrier=tuple(self.carrier[i] for i in chosen),
-            carried=tuple(self.carried[i] for i in chosen),
-            place=None if place is None else lambda positions: place(positions)[chosen],
-        )
-
-    def _joined(self, kept: set[int]) -> set[tuple[int, int]]:
-        """Pairs of kept links that are adjacent, directly or across links that are not kept."""
-        near: dict[int, set[int]] = {}
-        for a, b in self.adjacent:
-            near.setdefault(a, set()).add(b)
-            near.setdefault(b, set()).add(a)
-        found = set()
-        for start in kept:
-            seen, waiting = {start}, [start]
-            while waiting:
-                for link in near.get(waiting.pop(), set()) - seen:
-                    seen.add(link)
-                    if link in kept:
-                        found.add((min(start, link), max(start, link)))
-                    else:
-                        waiting.append(link)
-        return found
-
     def words(self, sample: int) -> str:
         """The joint position of a sample, as text."""
         if sample == 0 or not self.sampled:
@@ -152,112 +100,222 @@ class Motion:
         return "at " + ", ".join(f"{joint.name} = {value:.4g}" for joint, value in moved)
 
 
-def at_rest(links: Sequence[str], fixed: Collection[str] = ()) -> Motion:
-    """Links that share a frame and are looked at where they are; those that are fixed may touch each other."""
+def at_rest(
+    links: Sequence[str],
+    fixed: Collection[str] = (),
+    poses: Sequence[FloatArray] | None = None,
+    adjacent: Collection[tuple[int, int]] = (),
+) -> Motion:
+    """Links that are looked at where they are, by default in one frame; those that are fixed may touch each other."""
+    where = np.tile(np.eye(4), (1, len(links), 1, 1)) if poses is None else np.stack(poses)[None]
     places = frozenset(i for i, name in enumerate(links) if name in fixed)
-    poses = np.tile(np.eye(4), (1, len(links), 1, 1))
-    return Motion(tuple(links), poses, fixed=places, carrier=tuple(range(len(links))), carried=(-1,) * len(links))
+    carrier, carried = tuple(range(len(links))), (-1,) * len(links)
+    near = frozenset(adjacent)
+    return Motion(tuple(links), where, adjacent=near, fixed=places, carrier=carrier, carried=carried)
 
 
-class _Range(NamedTuple):
+class _Read(NamedTuple):
+    """A joint of a file; what has no limits and no leader (-1: a constant) stays at rest."""
+
     name: str
     slides: bool
-    lower: float
-    upper: float
+    link: int
+    limits: Limits | None = None
+    rest: float = 0.0
+    leader: int | None = None
+    curve: tuple[float, ...] = ()
 
 
-def _positions(joints: Sequence[_Range], samples: int, seed: int) -> FloatArray:
-    """Rest, then so many samples [1 + samples, J]."""
-    rest = np.zeros((1, len(joints)))
-    if not joints or samples <= 0:
-        return rest
-    qmc = import_extra("scipy.stats.qmc", _FOR, "clear")
-    sobol = qmc.Sobol(len(joints), scramble=True, rng=np.random.default_rng(seed))
-    spread = sobol.random_base2(math.ceil(math.log2(samples)))[:samples]
-    lower, upper = (np.array([getattr(joint, side) for joint in joints]) for side in ("lower", "upper"))
-    return np.concatenate([rest, lower + spread * (upper - lower)])
-
-
-def _range(kind: str, name: str, limits: tuple[float, float] | None, said: list[str]) -> _Range | None:
-    """What is sampled of a joint that turns or slides; None if it stays at rest, which `said` tells."""
-    if limits is not None and limits[0] < limits[1] and all(map(math.isfinite, limits)):
-        return _Range(name, kind != "turns", *limits)
-    if kind == "turns":
-        if limits is None or limits[0] >= limits[1]:
-            said.append(f"the joint {name} has no limits, so a whole turn was looked at")
-        return _Range(name, False, -math.pi, math.pi)
-    said.append(f"the joint {name} {kind}, so it was looked at only at rest")
-    return None
-
-
-def urdf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
-    """Where the links of a URDF are.
+def urdf_motion(path: Path, samples: int = SAMPLES, seed: int = 0, links: Sequence[str] | None = None) -> Motion:
+    """Where the links of a URDF are; or some of them, in the given order.
 
     Raises
     ------
     MissingExtraError
         The extra ``clear`` is not installed.
     """
-    yourdfpy = import_extra("yourdfpy", _FOR, "clear")
-    with _quiet("yourdfpy"):
-        robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_collision_scene_graph=False)
-    said: list[str] = []
-    ranges = {each.name: each for joint in robot.actuated_joints if (each := _range(*_urdf_limits(joint), said))}
-    links = [link.name for link in robot.robot.links]
-
-    def place(positions: FloatArray) -> FloatArray:
-        robot.update_cfg(dict(zip(ranges, positions.tolist(), strict=True)))
-        return np.stack([robot.get_transform(name) for name in links])
-
-    positions = _positions([*ranges.values()], samples, seed)
-    poses = np.stack([place(row) for row in positions])
-    parents = {links.index(joint.child): links.index(joint.parent) for joint in robot.robot.joints}
-    held = {links.index(joint.child) for joint in robot.actuated_joints if joint.name not in ranges}
-    carrier = _last(parents, {link: link for link in held}, len(links))
-    joints, carried = _urdf_joints(robot.robot, ranges, parents, dict(zip(links, poses[0], strict=True)))
-    near = _pairs(parents)
-    return Motion(tuple(links), poses, joints, positions, near, tuple(said), frozenset(), carrier, carried, place)
+    return _motion(_Urdf(path), samples, seed, links)
 
 
-def _urdf_joints(
-    robot: Any, ranges: Mapping[str, _Range], parents: Mapping[int, int], rest: Mapping[str, FloatArray]
-) -> tuple[tuple[Joint, ...], tuple[int, ...]]:
-    """The joints that move, and for each link that which carries it."""
-    known, places = {joint.name: joint for joint in robot.joints}, [*rest]
-    driven = [j for j in robot.joints if j.mimic is not None and j.mimic.joint in ranges and j.type != "fixed"]
-    moving = [*(known[name] for name in ranges), *driven]
-    names = [joint.name for joint in moving]
-    carried = _last(parents, {places.index(joint.child): i for i, joint in enumerate(moving)}, len(places))
-    made = []
-    for joint in moving:
-        axis = np.array([1.0, 0.0, 0.0] if joint.axis is None else joint.axis, dtype=np.float64)
-        pose, parent = rest[joint.child], carried[places.index(joint.parent)]
-        where = pose[:3, 3], (pose[:3, :3] * axis / np.linalg.norm(axis)).sum(axis=1)
-        if joint.name in ranges:
-            _, slides, lower, upper = ranges[joint.name]
-            made.append(Joint(joint.name, slides, lower, upper, 0.0, *where, parent))
-        else:
-            leader, times = names.index(joint.mimic.joint), joint.mimic.multiplier
-            by = leader, (1.0 if times is None else float(times),)
-            made.append(Joint(joint.name, joint.type == "prismatic", 0.0, 0.0, 0.0, *where, parent, *by))
-    return tuple(made), carried
+def mjcf_motion(path: Path, samples: int = SAMPLES, seed: int = 0, links: Sequence[str] | None = None) -> Motion:
+    """Where the bodies of an MJCF model are; joints that others drive by a joint equality follow them.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra ``clear`` is not installed.
+    ValueError
+        MuJoCo does not read the model.
+    """
+    return _motion(_Mjcf(path), samples, seed, links)
 
 
-def _pairs(parents: Mapping[int, int]) -> frozenset[tuple[int, int]]:
-    return frozenset((min(pair), max(pair)) for pair in parents.items())
+def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] | None) -> Motion:
+    chosen = [file.links.index(name) for name in (file.links if links is None else links)]
+    sampled = {j: joint for j, joint in file.joints.items() if joint.limits is not None}
+    moving = sampled | {j: joint for j, joint in file.joints.items() if joint.leader in sampled}
+    number = {j: i for i, j in enumerate(moving)}
+    positions = _positions([*sampled.values()], samples, seed)
+    poses = np.stack([file.place(row) for row in positions[::-1]])[::-1]  # at rest last: there, axes are read
+    last = {moving[j].link: number[j] for j in sorted(moving)}  # of several in a link, each carries the next
+    joints = []
+    for j, joint in moving.items():
+        before = [number[i] for i in sorted(moving) if i < j and moving[i].link == joint.link]
+        parent = before[-1] if before else _last(file.parents, last, [file.parents.get(joint.link)])[0]
+        lower, upper = joint.limits or (joint.rest, joint.rest)
+        driven = -1 if joint.leader is None else number[joint.leader], joint.curve
+        joints.append(Joint(joint.name, joint.slides, lower, upper, joint.rest, *file.axis(j), parent, *driven))
+    held = {joint.link: joint.link for j, joint in file.joints.items() if joint.limits is None and joint.leader is None}
+    return Motion(
+        tuple(file.links[i] for i in chosen),
+        poses[:, chosen],
+        tuple(joints),
+        positions,
+        _adjacent({link: parent for link, parent in file.parents.items() if link not in held}, chosen),
+        tuple(file.said),
+        carrier=_last(file.parents, held, chosen),
+        carried=_last(file.parents, last, chosen),
+        place=partial(_placed, file, chosen),
+    )
 
 
-def _last(parents: Mapping[int, int], what: Mapping[int, int], count: int) -> tuple[int, ...]:
+def _placed(file: _Urdf | _Mjcf, chosen: list[int], positions: FloatArray) -> FloatArray:
+    return file.place(positions)[chosen]
+
+
+def _positions(joints: Sequence[_Read], samples: int, seed: int) -> FloatArray:
+    """Rest, then so many samples [1 + samples, J]."""
+    rest = np.array([[joint.rest for joint in joints]], dtype=np.float64)
+    if not joints or samples <= 0:
+        return rest
+    qmc = import_extra("scipy.stats.qmc", _FOR, "clear")
+    sobol = qmc.Sobol(len(joints), scramble=True, rng=np.random.default_rng(seed))
+    spread = sobol.random_base2(math.ceil(math.log2(samples)))[:samples]
+    lower, upper = np.array([joint.limits for joint in joints]).T
+    return np.concatenate([rest, lower + spread * (upper - lower)])
+
+
+def _limits(kind: str, name: str, given: Limits | None, said: list[str]) -> Limits | None:
+    """Between what a joint is sampled; None if it stays at rest, which `said` tells."""
+    if given is not None and given[0] < given[1] and all(map(math.isfinite, given)):
+        return given
+    if kind == "turns":
+        if given is None or given[0] >= given[1]:
+            said.append(f"the joint {name} has no limits, so a whole turn was looked at")
+        return -math.pi, math.pi
+    said.append(f"the joint {name} {kind}, so it was looked at only at rest")
+    return None
+
+
+def _last(parents: Mapping[int, int], what: Mapping[int, int], links: Sequence[int | None]) -> tuple[int, ...]:
     """For each link, what the last link on the way down to it has, or itself; -1 if none has anything."""
 
-    def last(link: int) -> int:
-        while link not in what:
-            if link not in parents:
-                return -1
-            link = parents[link]
-        return what[link]
+    def last(link: int | None) -> int:
+        while link is not None and link not in what:
+            link = parents.get(link)
+        return -1 if link is None else what[link]
 
-    return tuple(last(link) for link in range(count))
+    return tuple(map(last, links))
+
+
+def _adjacent(parents: Mapping[int, int], chosen: Sequence[int]) -> frozenset[tuple[int, int]]:
+    """Places of chosen links that one joint connects, or several across links that are not chosen."""
+    import networkx  # only robots need it
+
+    graph, new = networkx.Graph(parents.items()), {link: place for place, link in enumerate(chosen)}
+    between = networkx.connected_components(graph.subgraph([link for link in graph if link not in new]))
+    joined = [*map(set, graph.edges), *({near for link in part for near in graph[link]} for part in between)]
+    places = (sorted(new[link] for link in links if link in new) for links in joined)
+    return frozenset(pair for near in places for pair in combinations(near, 2))
+
+
+class _Urdf:
+    """A URDF as yourdfpy reads it."""
+
+    def __init__(self, path: Path) -> None:
+        yourdfpy = import_extra("yourdfpy", _FOR, "clear")
+        with _quiet("yourdfpy"):
+            self._robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_collision_scene_graph=False)
+        self._joints = self._robot.robot.joints
+        self.links, self.said = [link.name for link in self._robot.robot.links], list[str]()
+        self.parents = {self.links.index(joint.child): self.links.index(joint.parent) for joint in self._joints}
+        actuated = {joint.name for joint in self._robot.actuated_joints}
+        names = [joint.name for joint in self._joints]
+        self.joints = {}
+        for number, joint in enumerate(self._joints):
+            link, mimic = self.links.index(joint.child), joint.mimic
+            read = _Read(joint.name, joint.type == "prismatic", link)
+            if joint.name in actuated:
+                self.joints[number] = read._replace(limits=_limits(*_urdf_limits(joint), self.said))
+            elif mimic is not None and joint.type != "fixed" and mimic.joint in names:
+                times = 1.0 if mimic.multiplier is None else float(mimic.multiplier)
+                self.joints[number] = read._replace(leader=names.index(mimic.joint), curve=(times,))
+        self._sampled = [joint.name for joint in self.joints.values() if joint.limits is not None]
+
+    def place(self, positions: FloatArray) -> FloatArray:
+        self._robot.update_cfg(dict(zip(self._sampled, positions.tolist(), strict=True)))
+        return np.stack([self._robot.get_transform(name) for name in self.links])
+
+    def axis(self, joint: int) -> tuple[FloatArray, FloatArray]:
+        said, pose = self._joints[joint].axis, self._robot.get_transform(self._joints[joint].child)
+        axis = np.array([1.0, 0.0, 0.0] if said is None else said, dtype=np.float64)
+        return pose[:3, 3], (pose[:3, :3] * axis / np.linalg.norm(axis)).sum(axis=1)
+
+
+def _urdf_limits(joint: Any) -> tuple[str, str, Limits | None]:
+    if joint.type == "continuous":
+        return "turns", joint.name, (-math.inf, math.inf)
+    limit = joint.limit
+    known = limit is not None and limit.lower is not None and limit.upper is not None
+    kinds = {"revolute": "turns", "prismatic": "slides without limits"}
+    limits = (float(limit.lower), float(limit.upper)) if known and joint.type in kinds else None
+    return kinds.get(joint.type, f"is {joint.type}"), joint.name, limits
+
+
+class _Mjcf:
+    """An MJCF model as MuJoCo reads it."""
+
+    def __init__(self, path: Path) -> None:
+        mujoco = import_extra("mujoco", _FOR, "clear")
+        self._model = model = mujoco.MjModel.from_xml_path(str(path))
+        self._data, self._walk = mujoco.MjData(model), mujoco.mj_kinematics
+        self.links, self.said = [model.body(i).name or f"body_{i}" for i in range(model.nbody)], list[str]()
+        self.parents = {i: int(parent) for i, parent in enumerate(model.body_parentid) if i}
+        joint_equality = int(mujoco.mjtEq.mjEQ_JOINT)
+        self._driven = {
+            int(model.eq_obj1id[e]): (int(model.eq_obj2id[e]), model.eq_data[e, :5].tolist())
+            for e in range(model.neq)
+            if model.eq_type[e] == joint_equality and model.eq_active0[e]
+        }
+        self.joints = {j: self._read(j) for j in range(model.njnt)}
+        self._sampled = model.jnt_qposadr[[j for j, joint in self.joints.items() if joint.limits is not None]]
+
+    def _read(self, j: int) -> _Read:
+        model = self._model
+        kind, slides = _KINDS.get(int(model.jnt_type[j]), ("is free or a ball", None))
+        name, rest = model.joint(j).name or f"number {j}", float(model.qpos0[model.jnt_qposadr[j]])
+        read = _Read(name, bool(slides), int(model.jnt_bodyid[j]), rest=rest)
+        if j in self._driven:
+            leader, curve = self._driven[j]
+            return read._replace(leader=leader, curve=tuple(curve[1:]))
+        given = tuple(model.jnt_range[j].tolist()) if model.jnt_limited[j] and slides is not None else None
+        return read._replace(limits=_limits(kind, name, given, self.said))
+
+    def place(self, positions: FloatArray) -> FloatArray:
+        model, data = self._model, self._data
+        data.qpos[:] = model.qpos0
+        data.qpos[self._sampled] = positions
+        for driven, (leader, curve) in self._driven.items():
+            start, drives = model.jnt_qposadr[driven], model.jnt_qposadr[leader]
+            away = 0.0 if leader < 0 else data.qpos[drives] - model.qpos0[drives]
+            data.qpos[start] = model.qpos0[start] + sum(c * away**power for power, c in enumerate(curve))
+        self._walk(model, data)
+        poses = np.tile(np.eye(4), (model.nbody, 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = data.xmat.reshape(-1, 3, 3), data.xpos
+        return poses
+
+    def axis(self, joint: int) -> tuple[FloatArray, FloatArray]:
+        return self._data.xanchor[joint].copy(), self._data.xaxis[joint].copy()
 
 
 @contextmanager
@@ -270,100 +328,3 @@ def _quiet(name: str) -> Iterator[None]:
         yield
     finally:
         logger.setLevel(level)
-
-
-def _urdf_limits(joint: Any) -> tuple[str, str, tuple[float, float] | None]:
-    if joint.type == "continuous":
-        return "turns", joint.name, (-math.inf, math.inf)
-    limit = joint.limit
-    known = limit is not None and limit.lower is not None and limit.upper is not None
-    limits = (float(limit.lower), float(limit.upper)) if known else None
-    kinds = {"revolute": "turns", "prismatic": "slides without limits"}
-    return kinds.get(joint.type, f"is {joint.type}"), joint.name, limits if joint.type in kinds else None
-
-
-def mjcf_motion(path: Path, samples: int = SAMPLES, seed: int = 0) -> Motion:
-    """Where the bodies of an MJCF model are; joints that others drive by a joint equality follow them.
-
-    Raises
-    ------
-    MissingExtraError
-        The extra ``clear`` is not installed.
-    ValueError
-        MuJoCo does not read the model.
-    """
-    mujoco = import_extra("mujoco", _FOR, "clear")
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data, said = mujoco.MjData(model), list[str]()
-    driven = _driven(model, mujoco)
-    ranges = _mjcf_ranges(model, driven, said)
-    at = model.jnt_qposadr[[*ranges]]
-
-    def place(positions: FloatArray) -> FloatArray:
-        data.qpos[:] = model.qpos0
-        data.qpos[at] = positions
-        for slave, (master, curve) in driven.items():
-            away = 0.0 if master < 0 else data.qpos[model.jnt_qposadr[master]] - model.qpos0[model.jnt_qposadr[master]]
-            start = model.jnt_qposadr[slave]
-            data.qpos[start] = model.qpos0[start] + sum(c * away**power for power, c in enumerate(curve))
-        mujoco.mj_kinematics(model, data)
-        poses = np.tile(np.eye(4), (model.nbody, 1, 1))
-        poses[:, :3, :3], poses[:, :3, 3] = data.xmat.reshape(-1, 3, 3), data.xpos
-        return poses
-
-    positions = _positions([*ranges.values()], samples, seed)
-    positions[0] = model.qpos0[at]
-    poses = np.stack([place(row) for row in positions[::-1]])[::-1]  # at rest last: there, joints' axes are read
-    links = [model.body(i).name or f"body_{i}" for i in range(model.nbody)]
-    parents = {i: int(p) for i, p in enumerate(model.body_parentid) if i}
-    sampled = {int(model.jnt_bodyid[j]) for j in (*ranges, *driven)}
-    held = {int(body) for body in model.jnt_bodyid} - sampled
-    carrier = _last(parents, {link: link for link in held}, model.nbody)
-    joints, carried = _mjcf_joints(model, data, ranges, driven, parents)
-    near = _pairs(parents)
-    return Motion(tuple(links), poses, joints, positions, near, tuple(said), frozenset(), carrier, carried, place)
-
-
-def _mjcf_ranges(model: Any, driven: Collection[int], said: list[str]) -> dict[int, _Range]:
-    """What is sampled of each joint; those that are driven, or stay at rest, have nothing."""
-    ranges: dict[int, _Range] = {}
-    for j in range(model.njnt):
-        if j not in driven:
-            kind = {_SLIDE: "slides without limits", _HINGE: "turns"}.get(int(model.jnt_type[j]))
-            limits = tuple(model.jnt_range[j].tolist()) if kind and model.jnt_limited[j] else None
-            found = _range(kind or "is free or a ball", model.joint(j).name or f"number {j}", limits, said)
-            ranges |= {j: found} if found is not None else {}
-    return ranges
-
-
-def _mjcf_joints(
-    model: Any, data: Any, ranges: Mapping[int, _Range], driven: Mapping[int, Any], parents: Mapping[int, int]
-) -> tuple[tuple[Joint, ...], tuple[int, ...]]:
-    """The joints that move, and for each body that which carries it; of several in a body, one carries the next."""
-    moving = [*ranges, *(j for j, (master, _) in driven.items() if master in ranges)]
-    number = {j: i for i, j in enumerate(moving)}
-    carried = _last(parents, {int(model.jnt_bodyid[j]): number[j] for j in sorted(moving)}, model.nbody)
-    made = []
-    for j in moving:
-        body = int(model.jnt_bodyid[j])
-        before = [number[i] for i in range(int(model.body_jntadr[body]), j) if i in number]
-        parent = before[-1] if before else carried[parents[body]]
-        where = data.xanchor[j].copy(), data.xaxis[j].copy()
-        rest = float(model.qpos0[model.jnt_qposadr[j]])
-        if j in ranges:
-            name, slides, lower, upper = ranges[j]
-            made.append(Joint(name, slides, lower, upper, rest, *where, parent))
-        else:
-            (master, curve), slides = driven[j], int(model.jnt_type[j]) == _SLIDE
-            made.append(Joint(f"{j}", slides, rest, rest, rest, *where, parent, number[master], tuple(curve[1:])))
-    return tuple(made), carried
-
-
-def _driven(model: Any, mujoco: Any) -> dict[int, tuple[int, list[float]]]:
-    """Joints that a joint equality sets, with the joint that drives each (-1: none) and the polynomial."""
-    is_joint = np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT))
-    return {
-        int(model.eq_obj1id[e]): (int(model.eq_obj2id[e]), model.eq_data[e, :5].tolist())
-        for e in is_joint
-        if model.eq_active0[e]
-    }

@@ -9,6 +9,8 @@ from typing import Any, Literal
 from rlacd.clear.mend import Cleared
 from rlacd.clear.motion import Motion
 
+TOO_MANY = ": to be clear of each other takes too many hulls"
+
 Contact = Literal["adjacent", "always", "sometimes", "never"]
 
 
@@ -70,10 +72,10 @@ def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:
                 "always" if share == 1 else "sometimes" if share else "never"
             )
             meshes = float(touching.meshes.mean()) if touching else 0.0
-            depth = touching.offences[0].depth if touching and touching.offences else 0.0
+            depth = touching.depth if touching else 0.0
             names, is_kept = (first.name, bodies[j].name), (i, j) in cleared.mended
             joined, loose = (i, j) in motion.adjacent, motion.carrier[i] != motion.carrier[j]
-            pairs.append(LinkPair(*names, joined and not loose, contact, share, meshes, depth, is_kept, loose))
+            pairs.append(LinkPair(*names, joined, contact, share, meshes, depth, is_kept, loose))
     return pairs
 
 
@@ -87,7 +89,7 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
             places = "" if len(touching.offences) == 1 else f", the deepest of {len(touching.offences)} places"
             sentences.append(
                 f"Hulls of {names[pair]} touch though the links do not, up to {length(deepest.depth)} deep "
-                f"{motion.words(deepest.sample)}{places}."
+                f"{motion.words(deepest.sample)}{places}{'' if cleared.given_up.isdisjoint(pair) else TOO_MANY}."
             )
         elif deepest is not None:
             earlier.append((deepest.depth, names[pair]))

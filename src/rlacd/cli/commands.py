@@ -40,7 +40,7 @@ class Option(click.Option):
 
 
 def help_option() -> click.Option:
-    """``--help``, whose text may find stdout full or closed."""
+    """Make ``--help``; stdout may be full or closed when it prints."""
 
     def show(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
         if wanted and not ctx.resilient_parsing:

@@ -32,7 +32,7 @@ MESH = (
 )
 
 REPORTS = (".json", *PAGES)
-"""What the name of a report ends in."""
+"""Endings of reports."""
 
 FROM = "What stdin holds, if IN is -: obj, stl, ...  [default: told from its content]"
 
@@ -40,7 +40,7 @@ FIRST = (
     *("output", "threshold", "quality", "max_hulls", "max_vertices"),
     *("preset", "criterion", "picture", "report", "timeout"),
 )
-"""What people use first, and ``--help`` shows."""
+"""The options that ``--help`` shows; ``--help-all`` shows all."""
 
 
 def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
@@ -84,7 +84,7 @@ def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str
     in_metres = mesh.suffix.lower() in IN_METRES
     options = decompose_options(how, metres=in_metres or how.get("unit") is not None)
     wanted = _named(mesh, asked, options.get("preset"))
-    stage = _stage(mesh, wanted)
+    stage = _stage(mesh, wanted, apart=robots.get("per") == "mesh")
     robot = mesh.suffix.lower() in ROBOTS or stage is not None
     _check_output(mesh, wanted)
     _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted, robots)
@@ -151,13 +151,13 @@ def _rewrite(
 ) -> bool:
     """Replace the collision meshes of a robot, or of a stage that has been read; returns whether all are complete."""
     from rlacd.cli.terminal import rewrite_summary, watching, writing
-    from rlacd.io.robots.rewrite import rewrite_robot, rewrite_stage
+    from rlacd.io.robots.rewrite import rewrite, rewrite_robot
     from rlacd.plain_json import to_json
 
     with watching(quiet=bool(wanted.quiet)) as watch:
         options, place, flat = {**options, "progress": watch}, str(wanted.output), bool(wanted.keep_input)
         if stage is not None:
-            done = rewrite_stage(stage, Path(place), options, how, keep_input=flat)
+            done = rewrite(stage, Path(place), options, how, keep_input=flat)
         else:
             given = {"package_dirs": wanted.package_dirs or (), "keep_input": flat, **vars(how)}
             done = rewrite_robot(robot, place, **given, **options)
@@ -171,13 +171,13 @@ def _rewrite(
     return done.complete
 
 
-def _stage(mesh: Path, wanted: OutputOptions) -> Any:
-    """The colliding meshes of a USD stage that is to become another; None if there are none."""
-    if Path(str(wanted.output)).suffix.lower() not in (".usd", ".usda", ".usdc"):
+def _stage(mesh: Path, wanted: OutputOptions, *, apart: bool) -> Any:
+    """The USD stage with colliding meshes, if that is the input and the output is a stage too; else None."""
+    if any(path.suffix.lower() not in (".usd", ".usda", ".usdc") for path in (mesh, Path(str(wanted.output)))):
         return None
-    from rlacd.io.robots.usd import colliders_of
+    from rlacd.io.robots.read import robot_or_none
 
-    return colliders_of(mesh)
+    return robot_or_none(mesh, apart=apart)
 
 
 def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOptions:

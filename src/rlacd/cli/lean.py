@@ -1,4 +1,4 @@
-"""A start without what is not needed: trimesh imports every library that it can make use of."""
+"""Quick imports: trimesh without the libraries that it imports only because they are installed."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ from typing import NoReturn
 
 from rlacd.cli.exit_codes import INTERRUPTED, ExitCode, leave, say
 
-NOT_OURS = ("scipy", "shapely", "rtree", "cascadio")
-"""Libraries that trimesh uses where they are installed, and rlacd never needs: half of a command's time."""
+NOT_OURS = ("scipy", "shapely", "rtree", "cascadio", "embreex", "svg", "importlib.metadata")
+"""What trimesh uses where it is installed, and rlacd never needs: half of a command's time."""
 
-WITHOUT_GRAPHS = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
-"""Formats that trimesh reads without networkx and lxml."""
+NEEDLESS = {
+    **dict.fromkeys((".obj", ".glb", ".gltf"), ("networkx", "lxml")),
+    **dict.fromkeys((".stl", ".ply", ".off"), ("networkx", "lxml", "PIL")),
+}
+"""What trimesh reads formats without."""
 
 
 def import_trimesh(mesh: Path) -> None:
     """Import trimesh with what it needs to read a file like this; for commands that end with this mesh."""
-    unused = (*NOT_OURS, "networkx", "lxml") if mesh.suffix.lower() in WITHOUT_GRAPHS else NOT_OURS
+    unused = (*NOT_OURS, *NEEDLESS.get(mesh.suffix.lower(), ()))
     hidden = [name for name in unused if name not in sys.modules]
     sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
     with ctrl_c_at_once():

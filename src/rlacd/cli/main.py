@@ -7,7 +7,6 @@ import gc
 import importlib
 import io
 import os
-import shlex
 import sys
 import threading
 import warnings
@@ -62,6 +61,8 @@ class Commands(click.Group):
         word = args[0]
         if word not in COMMANDS and (Path(word).suffix or os.path.exists(word)):
             verb = "batch" if os.path.isdir(word) else "decompose"
+            import shlex
+
             typed = shlex.join(["rlacd", verb, *args])
             say(f"rlacd: {printable(word)} is not a command; did you mean  {printable(typed)}")
             raise SystemExit(ExitCode.BAD_INPUT)
@@ -108,8 +109,7 @@ def main() -> None:
     try:
         app(prog_name="rlacd", complete_var=COMPLETE)
     except SystemExit as ended:
-        # Taking the interpreter down object by object takes long: a tenth of a small mesh's time, and after a stop more
-        # than is left.
+        # Taking the interpreter down takes a tenth of a small mesh's time, and after a stop more than is left.
         late = ended.code == ExitCode.STOPPED_EARLY
         if late or threading.active_count() == 1:
             if not late:

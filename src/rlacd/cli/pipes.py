@@ -49,7 +49,7 @@ def refuse_stdin(mesh: Path) -> None:
 
 
 def stdout_name(output: str, file_format: str | None) -> str:
-    """The name of a file for what stdout is to get; any other output's own."""
+    """The name of a file whose content goes to stdout; any other output keeps its name."""
     from rlacd.io.write.target import FOLDER_FORMAT, MODEL_OF, WITH_MESHES, ending_of
 
     if output != STDIO:

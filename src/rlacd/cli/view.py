@@ -36,11 +36,13 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
     refuse_stdin(mesh)
     packages = given.pop("package_dirs") or ()
     with ctrl_c_at_once():
-        from rlacd.io.robots.viewed import USUAL, decompose_viewed, moves, read_viewed
+        from rlacd.io.robots.read import is_robot, robot_or_none
+        from rlacd.io.robots.viewed import USUAL, decompose_viewed, read_viewed
         from rlacd.view.viewer import open_viewer
 
     asked = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
-    controls = {**USUAL, **asked} if moves(mesh) else asked
+    moves = is_robot(mesh) or robot_or_none(mesh) is not None
+    controls = {**USUAL, **asked} if moves else asked
     given["read"] = partial(read_viewed, package_dirs=packages)
     decompose = partial(decompose_viewed, package_dirs=packages)
     with open_viewer(mesh, decompose, controls, **given) as server, suppress(KeyboardInterrupt):

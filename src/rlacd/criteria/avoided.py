@@ -17,7 +17,7 @@ from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.solid import Solid
 
 FINEST_SHARE = 0.01
-"""Share of the threshold down to which parts are cut whose hulls enter what they are to avoid."""
+"""Parts whose hulls enter a mesh to avoid are cut down to this share of the threshold."""
 
 SMALL = 0.02
 """Triangles that cross the solid are halved until their sides are at most this long, then left out."""
@@ -27,7 +27,7 @@ _HALVINGS = 40
 
 @dataclass(frozen=True)
 class Kept:
-    """What hulls stay out of, of one obstacle.
+    """The part of an obstacle that hulls stay out of.
 
     Attributes
     ----------
@@ -58,16 +58,16 @@ class Kept:
 
     def is_entered(self, hull: Hull) -> bool:
         """Whether a hull comes nearer than the margin."""
-        return self.filling is not None and self.filling.comes_deeper(hull.vertices, hull.faces, ROUNDING - self.margin)
+        return self.filling is not None and self.filling.comes_deeper(hull.body, ROUNDING - self.margin)
 
     def depth(self, hull: Hull) -> float:
         """How deep it reaches into a hull, to `TOLERANCE`; 0 if it does not."""
-        if self.filling is None or not self.filling.comes_deeper(hull.vertices, hull.faces, TOLERANCE):
+        if self.filling is None or not self.filling.comes_deeper(hull.body, TOLERANCE):
             return 0.0
         low, high = TOLERANCE, 2.0
         while high - low > TOLERANCE:
             middle = (low + high) / 2
-            is_deeper = self.filling.comes_deeper(hull.vertices, hull.faces, middle)
+            is_deeper = self.filling.comes_deeper(hull.body, middle)
             low, high = (middle, high) if is_deeper else (low, middle)
         return high
 
@@ -118,7 +118,7 @@ def warnings_of(found: dict[str, Any], reason: str) -> list[str]:
 
 
 def _outside(triangles: FloatArray, surface: _native.Surface) -> tuple[FloatArray, bool]:
-    """The triangles [T, 3, 3], halved where they are long, that do not cross a closed surface and are not inside it."""
+    """The triangles [T, 3, 3], long ones halved, that neither cross a closed surface nor lie inside it."""
     kept, is_crossed = [], False
     for _ in range(_HALVINGS):
         crossing = surface.crossing(*_mesh(triangles), TOLERANCE)

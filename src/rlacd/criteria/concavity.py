@@ -65,7 +65,7 @@ class DistanceScreen(Screen):
     ----------
     threshold : float
     weight : float
-        Of ``R_v``, which the volumes give; 0 for a distance.
+        Weight of ``R_v``, which the volumes give; 0 for a distance.
     """
 
     threshold: float
@@ -89,17 +89,17 @@ class DistanceScreen(Screen):
 
     def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
         """Test the solid's corners and points of the hull."""
-        return Feasibility(filling.feasibility(hull.vertices, hull.faces, self.threshold))
+        return Feasibility(filling.feasibility(hull.body, self.threshold))
 
     def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[_native.HullCorners], pairs: IntArray, threads: int
+        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Test the solid's corners and points of the joint hulls."""
         return filling.joint_feasibilities(hulls, pairs, self.threshold, threads)
 
     def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
         """Whether the solid's surface reaches deeper into the hull than the threshold."""
-        return filling.comes_deeper(hull.vertices, hull.faces, self.threshold)
+        return filling.comes_deeper(hull.body, self.threshold)
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class Distance(Criterion):
 
     name: ClassVar[str] = "distance"
     weight: ClassVar[float] = 0.0
-    """Of ``R_v``."""
+    """The weight of ``R_v``."""
     eliminates: ClassVar[bool] = True
     """A third more time saves a tenth of the parts, and the parts around a hole need not be 8, 16 or 32."""
 
@@ -144,7 +144,7 @@ class Distance(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Distance:
-        """Warnings give lengths as the threshold was given: in the frame, or in the input's unit."""
+        """Make the criterion; its warnings give lengths in the threshold's unit: the frame's or the input's."""
         return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
     @property
@@ -176,7 +176,7 @@ class Distance(Criterion):
         return {"threshold": self.threshold, "per_part": errors, "max": worst}
 
     def error(self, part: Part) -> float:
-        """Upper end of what `measure` finds; at most the threshold if the part certainly meets it."""
+        """Upper bound of the error; at most the threshold if the part certainly meets it."""
         measured = self.measure(part, tolerance=self.threshold / 50).value[1]
         if not self.threshold < measured <= 1.02 * self.threshold:
             return measured
@@ -187,10 +187,8 @@ class Distance(Criterion):
 
         False if it is larger, or if it is within 0.1 % of the threshold and branch and bound cannot decide.
         """
-        hull = part.hull
-        return _native.meets_concavity(
-            part.vertices, part.faces, hull.vertices, hull.faces, *self._volumes(part), self.threshold, part.tree
-        )
+        volumes = self._volumes(part)
+        return _native.meets_concavity(part.vertices, part.faces, part.hull.body, *volumes, self.threshold, part.tree)
 
     def measure(self, part: Part, tolerance: float = 1e-3, floor: float = 0.0) -> ConcavityValue:
         """Measure the distance or concavity to within ``tolerance`` (same frame as the threshold).
@@ -200,10 +198,8 @@ class Distance(Criterion):
         """
         if not tolerance > 0:
             raise OptionError(f"The tolerance must be positive, not {tolerance}; 0.001 is usual.")
-        hull, (volume, hull_volume) = part.hull, self._volumes(part)
-        found = _native.concavity(
-            part.vertices, part.faces, hull.vertices, hull.faces, volume, hull_volume, tolerance, floor, part.tree
-        )
+        volumes = self._volumes(part)
+        found = _native.concavity(part.vertices, part.faces, part.hull.body, *volumes, tolerance, floor, part.tree)
         return ConcavityValue(*found)
 
     def _volumes(self, part: Part) -> tuple[float, float]:

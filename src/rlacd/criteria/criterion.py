@@ -1,4 +1,4 @@
-"""The interface of criteria: they judge parts strictly, and screen unions by tests that reject certain failures."""
+"""The interface of criteria: strict tests of parts, and early-out tests of unions that certainly fail."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class CriterionSummary:
 
 
 class Criterion(Protocol):
-    """When a component is close enough to its hull to be a part; what most criteria share is stated here."""
+    """Decides when a component is close enough to its hull to be a part; the defaults suit most criteria."""
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
-        """Make the criterion that options ask for, for a solid; without a run there is no time to look at that."""
+        """Make the criterion that options ask for; without a run there is no time to look at the solid."""
         ...
 
     @property
@@ -52,7 +52,7 @@ class Criterion(Protocol):
 
     @property
     def screen(self) -> Screen:
-        """Cheap tests that reject unions which cannot meet the criterion."""
+        """Early-out tests, which reject unions that cannot meet the criterion."""
         ...
 
     def is_met(self, part: Part) -> bool:
@@ -76,12 +76,12 @@ class Criterion(Protocol):
 
     @property
     def overhang(self) -> float:
-        """How far the hull of a part that meets the criterion may reach beyond the part's surface."""
+        """Greatest outward deviation: how far a hull that meets the criterion may reach beyond its part's surface."""
         return math.inf
 
     @property
     def of_facets(self) -> Criterion:
-        """What a part whose exact hull meets the criterion has to meet with the hull that limits make of it."""
+        """The criterion for a part's limited hull, once its exact hull meets this one."""
         return self
 
     @property
@@ -96,7 +96,7 @@ class Criterion(Protocol):
 
     @property
     def alone(self) -> Criterion:
-        """The same without those meshes: for a simpler copy of the solid, which may itself enter them."""
+        """The same criterion without meshes to avoid, for a proxy, which may itself enter them."""
         return self
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
@@ -115,10 +115,10 @@ class Feasibility(IntEnum):
 
 @dataclass(frozen=True)
 class Screen:
-    """Necessary conditions for a union to meet a criterion.
+    """Early-out tests: necessary conditions for a union to meet a criterion.
 
-    The defaults suit a criterion that judges nothing but the hull of a part. Such a criterion needs no solid clipped to
-    a joint hull: what fills the hull makes no difference, and the glued union of the pair has been judged already.
+    The defaults suit a criterion that judges hulls alone. It needs no solid clipped to a joint hull: the glued union of
+    the pair, which has the same hull, has been judged already.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class Screen:
     """Whether the criterion judges what fills a hull, not the hull alone."""
 
     def filled(self, part: Part) -> float:
-        """Volume that a joint hull may fill for free on account of this part; the cheapest pairs are merged first."""
+        """Volume credited to a part; a pair costs |CH| - the credits of both, and the cheapest merges first."""
         return part.piece_hulls
 
     def least_error(self, volume: float, hull_volume: float) -> float:
@@ -148,7 +148,7 @@ class Screen:
         return Feasibility.NEVER
 
     def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[_native.HullCorners], pairs: IntArray, threads: int
+        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
     ) -> tuple[FloatArray, IntArray]:
         """Volumes [P] of the joint hulls of pairs [P, 2] of hulls (undefined for `NEVER`), and the `feasibility` [P] of
         each, decided less thoroughly."""

@@ -28,14 +28,14 @@ from rlacd.solid.resting import within_reach
 from rlacd.solid.solid import Solid
 
 SPACING = 0.125
-"""Share of their radius by which balls, and the points from which they start, are apart: an edge that comes between
-two reaches 1 % of the radius deeper than into either."""
+"""Distance between balls, and between the points from which they start, as a share of their radius: an edge that comes
+between two reaches 1 % of the radius deeper than into either."""
 
 FEWEST_STARTS, MOST_STARTS = 5000, 50_000
-"""Points from which balls start."""
+"""Fewest and most points from which balls start."""
 
 PLAY = 1.01
-"""Passages that are narrower than so many times a ball need not let it through: hulls around them cannot be exact."""
+"""Passages narrower than this multiple of a ball need not let it through: hulls around them are not exact."""
 
 
 def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) -> tuple[Balls, Balls]:
@@ -53,7 +53,7 @@ def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) ->
 
 
 def least_kept(options: Options, scale: float) -> float:
-    """The radius in the frame from which passages have to stay open; `scale` is its units per unit of the input."""
+    """Least radius, in the frame, of passages that stay open; `scale` is frame units per unit of the input."""
     if options.keep_open_abs is not None:
         return PLAY * options.keep_open_abs * scale
     return math.inf if options.keep_open is None else options.threshold
@@ -65,11 +65,11 @@ CRITERIA: dict[str, type[Criterion]] = {
     "volume": AddedVolume,
     "navigable": Navigable,
 }
-"""By the name that options give them."""
+"""The criteria by the names that options give them."""
 
 
 CLEARLY = 0.99
-"""Of the distance allowed: criteria are decided to 0.1 % of it, and a part's surface lies inside its hull."""
+"""Share of the allowed distance that limits may use, since criteria are decided to 0.1 % of it."""
 
 
 def limited_part(
@@ -86,17 +86,17 @@ def limited_part(
 
 @dataclass(frozen=True)
 class LimitedCriterion(Criterion):
-    """A criterion that the limited hull of a part has to meet too, and whose hulls keep passages open and avoid meshes.
+    """A criterion that limited hulls also have to meet, and whose hulls keep passages open and avoid meshes.
 
     Attributes
     ----------
     criterion : Criterion
-        All else is as it says.
+        The underlying criterion, which decides all else.
     limits : HullLimits
     free, kept : Balls
-        The largest that fit in the passages of the solid, and how large they have to stay.
+        The largest balls that fit in the solid's passages, and the balls that stay free of hulls.
     avoided : Avoided or None
-        What hulls may not enter.
+        The meshes that hulls may not enter.
     finest : Distance or None
         A part that is as tight as this is cut no further to avoid it.
     sides : float64 [P, 4]
@@ -113,7 +113,7 @@ class LimitedCriterion(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
-        """The criterion that the options name, with their passages; limits come later (see `rlacd.limit`)."""
+        """Make the named criterion with its passages; tighter limits apply only after cutting (see `rlacd.limit`)."""
         criterion = CRITERIA[options.criterion_name].prepare(options, solid, run)
         made = cls(criterion)
         if options.avoid:
@@ -126,12 +126,12 @@ class LimitedCriterion(Criterion):
 
     @property
     def eliminates(self) -> bool:
-        """As the underlying criterion."""
+        """Whether the underlying criterion eliminates."""
         return self.criterion.eliminates
 
     @property
     def screen(self) -> Screen:
-        """That of the underlying criterion: what it rejects fails here too."""
+        """The underlying criterion's tests: what they reject fails here too."""
         return self.criterion.screen
 
     @property
@@ -153,14 +153,14 @@ class LimitedCriterion(Criterion):
         return Intrusions(self.kept)
 
     def is_met(self, part: Part) -> bool:
-        """Decide for the exact hull first, then for the limited one: it stays out of the balls, and is tight."""
+        """Decide for the exact hull first, then for the limited one."""
         if not self._is_met(part, part):
             return False
         return keeps(part.hull, self.limits) or self.of_facets._is_met(self._limited(part), part)
 
     @cached_property
     def of_facets(self) -> LimitedCriterion:
-        """That of the underlying criterion; passages stay open, and meshes are avoided."""
+        """The same for the underlying criterion's `of_facets`, without limits."""
         return replace(self, criterion=self.criterion.of_facets, limits=NO_LIMITS)
 
     def _is_met(self, part: Part, exact: Part) -> bool:
@@ -168,13 +168,13 @@ class LimitedCriterion(Criterion):
         return not narrows and not self._enters(part, exact) and self.criterion.is_met(part)
 
     def _enters(self, part: Part, exact: Part) -> bool:
-        """Whether the hull enters what it is to avoid, and cuts may help: none makes a limited hull tight."""
+        """Whether the hull enters a mesh to avoid, and the part is not too fine to be cut for that."""
         if self.avoided is None or not self.avoided.is_entered(part.hull):
             return False
         return self.finest is None or not self.finest.is_met(exact)
 
     def error(self, part: Part) -> float:
-        """Measure the part against the hull that it ends with if it does not meet the criterion."""
+        """The error of the part with its limited hull."""
         return self.criterion.error(self._limited(part))
 
     def settled(self, parts: Sequence[Part]) -> LimitedCriterion:
@@ -184,7 +184,7 @@ class LimitedCriterion(Criterion):
         return replace(self, criterion=self.criterion.settled(limited), kept=kept)
 
     def scaled(self, factor: float) -> LimitedCriterion:
-        """Coarser: hulls may also take more of each ball, and coarser parts enter meshes, by the same factor."""
+        """The coarser criterion: hulls may take more of balls, and coarser parts enter meshes, by that factor."""
         radii = np.maximum(self.free.radii - factor * (self.free.radii - self.kept.radii), 0.0)
         finest = self.finest and self.finest.scaled(factor)
         return replace(
@@ -193,7 +193,7 @@ class LimitedCriterion(Criterion):
 
     @property
     def alone(self) -> Criterion:
-        """Without what hulls avoid."""
+        """The same criterion without meshes to avoid."""
         return replace(self, avoided=None)
 
     def _limited(self, part: Part) -> Part:

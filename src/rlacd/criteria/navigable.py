@@ -9,8 +9,7 @@ the input's bounding box is centred and its longest side is 2, the space is the 
 - at which a ball of radius r stays out of the closed half-spaces, and
 - that the centre of such a ball can reach.
 
-It is represented by balls with centres spread over its boundary, each as large as possible at distance t from the
-surface.
+Balls with centres spread over its boundary represent it, each as large as fits at distance t from the surface.
 """
 
 from __future__ import annotations
@@ -81,7 +80,7 @@ class Navigable(Criterion):
     conflicts : Conflicts
         Changes that `settled` made to the balls.
     hull : Hull or None
-        Of the solid. Primitives may reach beyond it by the tolerance; without it there are none.
+        The solid's hull, beyond which primitives may reach by the tolerance; without it there are none.
     """
 
     radius: float
@@ -104,7 +103,7 @@ class Navigable(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Navigable:
-        """The space of a solid; without balls where there is no time to find it."""
+        """Make the space of a solid; it has no balls if there is no time to find them."""
         space = options.criterion
         assert isinstance(space, NavigableSpace)
         if run is None:
@@ -138,8 +137,7 @@ class Navigable(Criterion):
         ball is found unless it is too contorted to be followed in steps of half a radius.
 
         Measured well inside the hull of the solid, 99 % of the space's boundary is within 0.6 ball radii of a centre,
-        and all of it within 0.75: between balls, a hull can reach a fifth of their radius past the boundary undetected,
-        and very rarely a third.
+        and all of it within 0.75: hulls can reach a fifth of the radius past the boundary undetected, rarely a third.
         """
         scale = solid.frame.scale
         radius, tolerance = space.in_frame(scale)
@@ -166,9 +164,7 @@ class Navigable(Criterion):
                 )
             lengths, reachable = (radius, tolerance), space.reachable_only
             balls = Balls(
-                *_native.navigable_balls(
-                    surface, hull.vertices, hull.faces, *lengths, reachable, seeds, planes, pitch, threads
-                )
+                *_native.navigable_balls(surface, hull.body, *lengths, reachable, seeds, planes, pitch, threads)
             )
         return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
 
@@ -229,7 +225,7 @@ class Navigable(Criterion):
         return 0.0 if self._is_small(part) else self._deepest(part, 0.0)
 
     def scaled(self, factor: float) -> Navigable:
-        """Coarser: hulls may reach into the balls by so much that tolerance plus allowance grow by `factor`."""
+        """The coarser criterion: the depth that hulls may reach, tolerance plus allowance, grows by `factor`."""
         other = replace(self, allowance=max(0.0, (self.tolerance + self.allowance) * factor - self.tolerance))
         vars(other)["_intrusions"] = self._intrusions  # the balls are the same
         return other
@@ -287,7 +283,7 @@ class Intrusions:
         if known is None:
             within = part.within
             candidates = None if within is None else self.of(within)[0]
-            known = self._balls.intrusions(part.hull.vertices, part.hull.faces, candidates, ROUNDING)
+            known = self._balls.intrusions(part.hull.body, candidates, ROUNDING)
             with self._lock:  # another thread may have done the same, with the same result
                 self._known[part] = known
         return known
@@ -295,7 +291,7 @@ class Intrusions:
     def any_beyond(self, part: Part, depth: float) -> bool:
         """Whether the part's hull reaches deeper than `depth` into any ball."""
         if part.within is None and self._recall(part) is None:  # a union: most fail, so stop at the first ball
-            first, _ = self._balls.intrusions(part.hull.vertices, part.hull.faces, None, depth, first=True)
+            first, _ = self._balls.intrusions(part.hull.body, None, depth, first=True)
             return len(first) > 0
         _, depths = self.of(part)
         return bool((depths > depth).any())

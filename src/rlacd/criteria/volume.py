@@ -25,7 +25,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 
 LEAST_PART = 1e-3
-"""Of the volume of the whole's convex hull: parts smaller than this count as this large."""
+"""Share of the volume of the whole's convex hull: smaller parts count as this large."""
 
 FACETS_REACH = 0.05
 """How far hulls within limits on vertices and triangles may stick out of their parts: the default threshold."""
@@ -36,7 +36,7 @@ REACH = 0.2
 
 @dataclass(frozen=True)
 class VolumeScreen(Screen):
-    """Tests of volumes alone."""
+    """Early-out tests by volumes alone."""
 
     criterion: AddedVolume
 
@@ -75,7 +75,7 @@ class AddedVolume(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> AddedVolume:
-        """Shares are of the part, or of the whole solid as the options say."""
+        """Make the criterion; shares are of each part or of the whole solid, as the options say."""
         if run is None:
             return cls(options.volume_tolerance, None, 0.0)
         hull = Hull.of(solid.vertices) if len(solid.vertices) else None
@@ -107,7 +107,7 @@ class AddedVolume(Criterion):
 
     @property
     def of_facets(self) -> Distance:
-        """A distance: of 64 vertices a ball's hull adds 4 % of volume, however small its pieces are cut."""
+        """A distance: the hull of a ball with 64 vertices adds 4 % of volume, however small its pieces are cut."""
         return Distance(FACETS_REACH)
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:

@@ -61,7 +61,7 @@ def misses_some(reached: Reached, run: Run) -> bool:
 
 
 def finish(reached: Reached, run: Run) -> Finished:
-    """Clean the parts, carry them to the input's unit, and measure them; again if hulls have to grow to the input."""
+    """Clean the parts, carry them to the input's unit, and measure them; repeat if hulls have to grow."""
     done, parts = _finished(reached, run)
     under = done.report["hausdorff"]["under"]
     if under is None or not NEARLY < under <= COVERAGE_TOLERANCE or run.stopped_by is not None:
@@ -96,15 +96,11 @@ def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
 
 
 def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Part] | None:
-    """The parts, with hulls grown to what of the input lies outside the finished ones; None if none can grow."""
+    """The parts with hulls grown to take in input outside the finished ones; None if none can grow."""
     hulls = [part.hull for part in finished]
     points = np.concatenate(
         _native.Filling(*reached.solid.surface, run.threads).uncovered(
-            [hull.vertices for hull in hulls],
-            [hull.faces for hull in hulls],
-            COVERAGE_TOLERANCE,
-            GROWTH_TO_SPARE,
-            run.threads,
+            [hull.body for hull in hulls], COVERAGE_TOLERANCE, GROWTH_TO_SPARE, run.threads
         )
     )
     distance = hull_union(hulls, run.threads).distance(points, run.threads)
@@ -124,7 +120,7 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
         shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
         if shaped is not part:
             return shaped
-        share = SHARE_OF_OVERHANG if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
+        share = SHARE_OF_DEVIATION if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
         near = within_reach(sides, part.hull, share * goal.overhang)
         part = kept_within(part, near, goal)
         return limit_part(
@@ -171,10 +167,9 @@ def in_input(hull: Hull, frame: Frame, limits: HullLimits = NO_LIMITS) -> trimes
 
 
 def as_carried(part: Part, there: trimesh.Trimesh, frame: Frame) -> Part:
-    """Get the part with the hull that `in_input` made of its own, in the frame: what has to be measured.
+    """Get the part with its hull as `in_input` rounded it, back in the frame, to be measured.
 
-    The same part if no vertex is farther than `TOLERANCE` from its own hull, as always unless the coordinates resolve
-    little.
+    The same part if no vertex is farther than `TOLERANCE` from the original hull, as in all but coarse coordinates.
     """
     points = frame.to_frame(there.vertices)
     if part.hull.primitive is not None or np.abs(points).max() > LARGEST_COORDINATE:
@@ -193,11 +188,11 @@ def _thickened(points: FloatArray, limits: HullLimits) -> Hull:
     return hull if hull is not None and keeps(hull, limits) else plain_hull(points, limits)
 
 
-SHARE_OF_OVERHANG = 0.2
-"""A simple hull grows by at most this share of what the criterion allows beyond a part."""
+SHARE_OF_DEVIATION = 0.2
+"""A simple hull grows by at most this share of the outward deviation that the criterion allows."""
 
 GROWTHS_TRIED = 3
-"""If the criterion is no longer met, half the growth is tried, and so on."""
+"""Growths tried, each half of the one before, until the criterion is met."""
 
 
 def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: FloatArray = NO_SIDES) -> Part:
@@ -208,7 +203,7 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
     """
     if not math.isfinite(criterion.overhang):
         return part
-    growth = SHARE_OF_OVERHANG * criterion.overhang
+    growth = SHARE_OF_DEVIATION * criterion.overhang
     for _ in range(GROWTHS_TRIED):
         simple = limited_part(part, limits, tolerance=growth, sides=sides)
         if simple is part:
@@ -269,8 +264,7 @@ def take_in(parts: Sequence[Part], points: FloatArray, criterion: Criterion) -> 
     ----------
     parts : sequence of Part
     points : float64 [N, 3]
-        A hull that holds one already is skipped: its part is going to be dropped. Of more than `DENSE`, only every
-        second, third, ... is looked at.
+        Of more than `DENSE`, every second, third, ... is looked at. A hull that holds a point is skipped: it will go.
     criterion : Criterion
 
     Returns
@@ -315,7 +309,7 @@ def padded(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _tetrahedron_around(points: FloatArray) -> FloatArray:
-    """Corners [4, 3] of a tetrahedron around that box: one of its corners and three on the extended edges."""
+    """Corners [4, 3] of a tetrahedron around the points' box: one of the box, three on its extended edges."""
     box = _box_around(points)
     lower, upper = box[0], box[-1]
     to_lower = lower / 2 + upper / 2 > 0  # edges lead towards the origin, where coordinates do not overflow

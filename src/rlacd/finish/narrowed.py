@@ -20,27 +20,27 @@ from rlacd.solid.passages import FACES, Density, passage_balls
 from rlacd.solid.primitive import Balls
 
 NARROWEST = 8 * HALF_THICKNESS
-"""Radius of the narrowest passages looked for (the longest side is 2): folds of scans and gaps of sheets are such."""
+"""Least radius of passages looked for (the longest side is 2): folds of scans and gaps of sheets are narrower."""
 
 LEAST_LOSS = 0.1
 """Share of its radius that a passage has to lose to be listed."""
 
 MOSTLY = 1 / 2
-"""Share of its radius below which there is a warning of a passage wider than the tolerance."""
+"""A passage wider than the tolerance is warned of if less than this share of its radius is left."""
 
 DENSITY = Density(600, 0.5)
 
 MOST_BALLS = 600
-"""Balls that are looked at: the wide ones that lose most come first."""
+"""Most balls looked at: the wide ones that lose most come first."""
 
 MOST_NAMED = 3
-"""Passages of which a warning says the place."""
+"""Most passages whose places a warning names."""
 
 BETWEEN = 0.02
-"""Share of its radius that a passage kept open may lose more: its walls are kept off balls that are apart."""
+"""Further share of its radius that a passage kept open may lose: walls are kept off balls with gaps between."""
 
 WIDER = 1.05
-"""What is so many times as wide is no longer the same passage, such as the room between two holes on one axis."""
+"""A place so many times as wide is another passage, such as the space between two holes on one axis."""
 
 _NEIGHBOURS = 8
 
@@ -51,10 +51,9 @@ class Narrowed(NamedTuple):
     Attributes
     ----------
     passages
-        One entry each: around ``at_abs``, a ball of ``radius_abs`` fits in the input, one of ``left_abs`` between the
-        hulls.
+        One entry each: at ``at_abs``, a ball of ``radius_abs`` fits in the input, of ``left_abs`` between hulls.
     is_every
-        Whether these are all: no triangle and no ball was left out, and none widens, where it may be several.
+        Whether all are listed: no triangle or ball was left out, and no passage widens, as several in a row do.
     by_limits
         Whether a limit on hulls undid what cutting had kept open.
     """
@@ -65,7 +64,7 @@ class Narrowed(NamedTuple):
 
 
 def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> Narrowed:
-    """Find the passages that hulls narrow, which reach out by at most `over` in the frame: no passage loses more."""
+    """Find the passages that hulls narrow; no hull reaches out, so no passage loses, more than `over` in the frame."""
     most = min(over / LEAST_LOSS, 2.0)
     if reached.root is None or most <= NARROWEST:
         return Narrowed([])
@@ -104,7 +103,7 @@ def _by_limits(reached: Reached, union: _native.HullUnion, threads: int) -> bool
 
 
 def _told(reached: Reached, radii: FloatArray, left: FloatArray) -> NDArray[np.int64]:
-    """What to warn of: 2 where less is left than asked for, 1 where others wider than the tolerance lose over half."""
+    """Return ``[N]`` 2 if less is left than asked for, 1 if another above the tolerance loses over half, else 0."""
     options, scale = reached.options, reached.solid.frame.scale
     asked = (options.keep_open or 0.0) * radii + (options.keep_open_abs or 0.0) * scale - BETWEEN * radii
     is_asked = radii >= least_kept(options, scale)
@@ -113,13 +112,13 @@ def _told(reached: Reached, radii: FloatArray, left: FloatArray) -> NDArray[np.i
 
 
 def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[np.int64]:
-    """The number of the passage in which each ball stands: those between which there is a way are in one."""
+    """The number of each ball's passage: balls are in the same one if there is a way between them."""
     ways = balls.centres[:, None] - balls.centres
     squares = dots(ways, ways)
     near = np.argsort(squares, axis=1, kind="stable")[:, 1 : 1 + _NEIGHBOURS]
     pairs = np.stack([np.repeat(np.arange(len(balls)), near.shape[1]), near.ravel()])
     joined = pairs[:, _have_a_way(balls, pairs, surface, threads)]
-    while True:  # then those of any two passages that are nearest, until none meet
+    while True:  # join passages whose nearest balls have a way between them, until none have
         passage = _native.components(len(balls), *joined)[1]
         pairs = np.array(np.nonzero(passage[:, None] < passage))
         pairs = pairs[:, np.argsort(squares[pairs[0], pairs[1]], kind="stable")]
@@ -131,7 +130,7 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[n
 
 
 def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface, threads: int) -> BoolArray:
-    """Between which pairs a ball goes straight that is half the larger, and always in its passage."""
+    """Whether, between each pair, a ball of half the larger radius goes straight and stays in the passage."""
     larger, starts = balls.radii[pairs].max(axis=0), balls.centres[pairs[0]]
     ways = balls.centres[pairs[1]] - starts
     lengths, gone = np.sqrt(dots(ways, ways)), np.zeros(len(larger))
@@ -139,8 +138,8 @@ def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface,
     active = np.flatnonzero(goes)
     while len(active):
         at = starts[active] + (gone[active] / lengths[active])[:, None] * ways[active]
-        room = surface.distance(at, threads)
-        goes[active] = (room > larger[active] / 2) & (room < WIDER * larger[active])
+        space = surface.distance(at, threads)
+        goes[active] = (space > larger[active] / 2) & (space < WIDER * larger[active])
         gone[active] += larger[active] / 4
         active = active[goes[active] & (gone[active] < lengths[active])]
     return goes

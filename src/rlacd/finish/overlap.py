@@ -1,9 +1,9 @@
 """Hulls that overlap where they touch, so that nothing thin slips between them.
 
 Cuts leave hulls flush: at a seam, the way out of either is sideways, so a simulator pushes a wire that reaches the seam
-into it, not out. Here one of two hulls takes in a layer of the other, as thick as the overlap asked for: what the other
-fills of the first with its facets there moved outwards. That layer lies in the solid, up to the threshold, so only the
-joint hull has to be tested.
+into it, not out. Here one of two hulls takes in a layer of the other, as thick as the overlap: the part of the other
+within the first hull once its facets there are moved outwards. The layer lies in the solid, up to the threshold, so
+only the joint hull has to be tested.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from rlacd.solid.component import LOST_VOLUME, Component, Part
 from rlacd.solid.hull import TOLERANCE, Hull
 
 HELD = 0.7
-"""A seam overlaps enough if each of its points lies deep in some hull: as deep as in the solid or by half the overlap,
-whichever is less, times this. On either side of a seam in a bent solid, neither hull is quite as deep as the solid."""
+"""Each point of a seam has to lie in some hull at least this share as deep as in the solid, or as half the overlap if
+that is less. On either side of a seam in a bent solid, neither hull is quite as deep as the solid."""
 
 
 @dataclass(frozen=True)
 class ShortSeam:
-    """A seam where the criterion left no room.
+    """A seam that the criterion keeps from overlapping enough.
 
     Attributes
     ----------
     parts : tuple of int
         The two.
     place : float64 [3]
-        Where the seam is farthest from what was asked for.
+        Where the seam lacks the most depth.
     depth : float
         How deep that place lies in the hull that it lies deepest in.
     """
@@ -46,13 +46,13 @@ class ShortSeam:
 
 @dataclass(frozen=True)
 class Seams:
-    """What became of the seams, where two hulls touched with less overlap than asked for.
+    """The seams, where two hulls touched with less overlap than asked for.
 
     Attributes
     ----------
     count : int
     short : tuple of ShortSeam
-        Those that still overlap by less.
+        The seams that still overlap by less.
     """
 
     count: int
@@ -66,7 +66,7 @@ class _Seam(NamedTuple):
 
     def deepest(self, bodies: Sequence[_Body]) -> FloatArray:
         """How deep each place lies in the body that it lies deepest in [N]; 0 outside all."""
-        depths: FloatArray = np.max([body.sides.depths(self.places) for body in bodies], axis=0, initial=0.0)
+        depths: FloatArray = np.max([body.part.hull.body.depths(self.places) for body in bodies], axis=0, initial=0.0)
         return depths
 
 
@@ -84,9 +84,9 @@ def overlap_parts(
     solid : Component
         The whole solid.
     criterion : Criterion
-        It decides on everything the solid fills of a grown hull, as for hulls that reach across others.
+        It judges all that the solid fills of a grown hull.
     overlap : float
-        How deep, in the frame.
+        Depth of the overlap, in the frame.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def overlap_parts(
     """
     bodies = [_Body(part) for part in parts]
     tolerated = max((criterion.error(part) for part in parts if not criterion.is_met(part)), default=None)
-    boxes = _native.Boxes([part.hull.corners for part in parts])
+    boxes = _native.Boxes([part.hull.body for part in parts])
     pairs = boxes.pairs(range(len(parts)), TOLERANCE).tolist()
     near: list[set[int]] = [set() for _ in parts]
     for first, second in pairs:
@@ -130,7 +130,7 @@ def overlap_parts(
 
 
 def _short(bodies: Sequence[_Body], seams: Sequence[_Seam]) -> Iterator[ShortSeam]:
-    """Those of which some place is not as deep in any body as asked for."""
+    """The seams with a place that lies in no body as deep as asked for."""
     if not seams:
         return
     low, high = np.stack([body.part.box for body in bodies], axis=1)
@@ -145,17 +145,17 @@ def _short(bodies: Sequence[_Body], seams: Sequence[_Seam]) -> Iterator[ShortSea
 def _changes(
     bodies: list[_Body], near: list[set[int]], first: int, second: int, overlap: float
 ) -> Iterator[list[tuple[int, Hull]]]:
-    """Ways to make two bodies overlap, each as grown hulls: the one that adds least, the other, half of either.
+    """Ways to make two bodies overlap, each as grown hulls: the cheaper one grows, the other, or both by half.
 
-    First with all sides of a body moved at which it touches any other, so that its layers join; if that is too much,
-    with those only at which it touches the other one.
+    First, all sides move at which a body touches any other, so that its layers join; if that is too much, only those at
+    which it touches the other one.
     """
     both = ((first, second), (second, first))
 
     def grown(one: int, other: int, depth: float, touched: set[int]) -> tuple[float, tuple[int, Hull]] | None:
         body = bodies[one]
         sides = np.unique(np.concatenate([body.contact(bodies[place], overlap)[0] for place in sorted(touched)]))
-        layer = Hull.of(body.sides.layer(bodies[other].sides, sides, depth, TOLERANCE))
+        layer = Hull.of(body.part.hull.body.layer(bodies[other].part.hull.body, sides, depth, TOLERANCE))
         if layer is None:
             return None
         hull = Hull.around(body.part.hull, layer)
@@ -182,15 +182,14 @@ def _judged(part: Part, hull: Hull, solid: Component, criterion: Criterion, tole
 
 
 class _Body:
-    """A part with the flat sides of its hull, and where it touches others."""
+    """A part, and where its hull touches others."""
 
     def __init__(self, part: Part) -> None:
         self.part = part
-        self.sides = _native.FlushBody(part.hull.vertices, part.hull.faces)
         self._contacts: dict[_Body, tuple[IntArray, FloatArray]] = {}
 
     def contact(self, other: _Body, overlap: float) -> tuple[IntArray, FloatArray]:
-        """Sides [S] under which a side of another body lies less deep than the overlap, and places on that [N, 3]."""
+        """Sides [S] that cover sides of another body by less than the overlap, and places [N, 3] on the latter."""
         if other not in self._contacts:
-            self._contacts[other] = self.sides.contact(other.sides, overlap, TOLERANCE)
+            self._contacts[other] = self.part.hull.body.contact(other.part.hull.body, overlap, TOLERANCE)
         return self._contacts[other]

@@ -22,11 +22,10 @@ SIMPLER = 1.25
 """A simpler primitive is preferred unless its volume exceeds that of the tightest by this factor."""
 
 DIRECTIONS = 12
-"""Of facets of the hull that are tried as axes, and half as many of edges, largest first, besides principal axes and
-the frame's."""
+"""Normals of facets tried as axes, and half as many edges, largest first, beside principal axes and the frame's."""
 
 SAME_DIRECTION = 0.9998
-"""Cosine of the angle (1 degree) below which two directions are tried once."""
+"""Two directions with at least this cosine between them (1 degree) are tried once."""
 
 ROUND_AXES = DIRECTIONS // 3
 """Axes about which capsules and cylinders are fitted: those with the least volume by a lower bound."""
@@ -35,7 +34,7 @@ SINGULAR = 1e-12
 """Share of a squared length at which a point lies in the affine hull of others."""
 
 RADII = np.linspace(1.0, 1.4, 21)
-"""Radii of capsules that are tried, over the least one: a wider capsule may be shorter."""
+"""Radii of capsules tried, as multiples of the least: a wider capsule may be shorter."""
 
 
 def primitive_part(
@@ -58,9 +57,9 @@ def primitive_part(
     part : Part
     criterion : Criterion
     kinds : collection of str
-        Those to choose from.
+        The kinds to choose from.
     limits : HullLimits, optional
-        Of the polyhedron.
+        Limits on the polyhedron.
     slack : float
         How much larger a primitive is made than needed, for later rounding.
     solid : Component, optional

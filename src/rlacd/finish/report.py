@@ -31,26 +31,24 @@ from rlacd.solid.mass import Mass, joint_mass, mass_of
 from rlacd.solid.solid import Solid
 
 COVERAGE_TOLERANCE = 5 * HALF_THICKNESS
-"""How far the union of the hulls may reach beyond the threshold before the report warns: slack for repair and
-measurement."""
+"""How far hulls may reach beyond the threshold before the report warns: slack for repair and measurement."""
 
 NEARLY = RESOLVED
 """No point of the input should lie farther outside the hulls than this."""
 
 MOST_HOLES = 1000
-"""Holes that a report lists."""
+"""Most holes that a report lists."""
 
 
 class Missed(NamedTuple):
-    """Places that hulls do not hold: how far the farthest of them is, and a sentence if that is worth one."""
+    """Points outside the hulls: the farthest distance, and a sentence if it is worth one."""
 
     distance: float
     said: list[str]
 
 
 class _Distances(NamedTuple):
-    """How far the hulls reach out and fall short, and where they do so most: a place of the input, and its body; and
-    the passages that they narrow. What was left out is by itself."""
+    """How far hulls reach beyond the input and fall short of it, and where most; narrowed passages; input left out."""
 
     over: float
     under: float
@@ -71,27 +69,27 @@ def make_report(
     ----------
     reached : Reached
     parts : sequence of Part
-        Those that were reached, cleaned.
+        The cleaned parts.
     hulls : sequence of trimesh.Trimesh
-        Theirs, in the input's unit.
+        The hulls of the parts, in the input's unit.
     seams : Seams or None
-        What became of the seams, if hulls were to overlap.
+        The seams, if hulls were to overlap.
     """
     solid, options, criterion = reached.solid, reached.options, reached.goal
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
     errors = None if is_cover else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
-    apart = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
+    distances = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
         weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
         entered = criterion.avoided and criterion.avoided.found(parts, solid.frame.scale)
-        missed = _shortcomings([part.hull for part in parts], apart, reached, len(summary.warnings) > 0)
+        missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
-        warnings += _unmeasured(solid) if has_surface and apart is None else []
+        warnings += _unmeasured(solid) if has_surface and distances is None else []
         warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
-        warnings += too_narrow(apart.narrowed, reached, run.stopped_by is not None) if apart else []
+        warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
         warnings += warnings_of(entered, _why_entered(run)) if entered else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
@@ -106,8 +104,11 @@ def make_report(
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
             **({"avoid": entered} if entered else {}),
-            "hausdorff": {"over": apart and apart.over, "under": apart and max(apart.under, apart.left_out.distance)},
-            "passages": apart and apart.narrowed.passages,
+            "hausdorff": {
+                "over": distances and distances.over,
+                "under": distances and max(distances.under, distances.left_out.distance),
+            },
+            "passages": distances and distances.narrowed.passages,
             "scale": solid.frame.scale,
             "mass": mass_of(*concatenated(weighed), solid.frame).as_plain(),
             "repair": [{**vars(body)} for body in solid.bodies],
@@ -177,7 +178,7 @@ def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) ->
     reports : sequence of (str, dict)
         Each node's name and report.
     scale : float
-        Frame units of the scene per unit of the input: its lengths are in that frame.
+        Frame units of the scene per unit of the input; joint lengths are in that frame.
     """
     each = [(name, report, scale / report["scale"]) for name, report in reports]
     first, counted = reports[0][1], ("parts", "faces", "vertices")
@@ -244,7 +245,7 @@ def _farthest(lengths: Sequence[tuple[float | None, float]]) -> float | None:
 
 
 def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Of all nodes; parts are numbered through."""
+    """Join the seams of all nodes, with parts numbered through."""
     seams = [report["overlap"] for report in reports]
     if any(one["seams"] is None for one in seams):
         return dict.fromkeys(seams[0])
@@ -258,7 +259,7 @@ def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _joint_avoid(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Of all nodes: a mesh that several enter is listed for each."""
+    """Join what hulls of all nodes enter: a mesh entered by several nodes is listed for each."""
     crossed = dict.fromkeys(name for one in each for name in one["crossed"])
     return {"crossed": [*crossed], "entered": [entry for one in each for entry in one["entered"]]}
 
@@ -286,7 +287,7 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
 
 
 def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) -> Missed:
-    """How far outside the hulls the corners ``[N, 3]`` lie that only faces with corners in one place have."""
+    """How far outside the hulls points ``[N, 3]`` lie that belong only to faces without an area."""
     if len(points) == 0:
         return Missed(0.0, [])
     distance = hull_union(hulls, run.threads).distance(np.ascontiguousarray(points), run.threads)
@@ -369,8 +370,8 @@ def _early_end(run: Run) -> list[str]:
     ]
 
 
-def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
-    """What hulls fall short of; how far they reach out is known where the criterion has said so (`exceeds`)."""
+def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
+    """Say what hulls miss, and how far they reach out unless the criterion has reported that (`exceeds`)."""
     options, scale = reached.options, reached.solid.frame.scale
     unit, in_words = length_unit({"options": vars(options), "scale": scale})
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
@@ -378,22 +379,23 @@ def _shortcomings(hulls: Sequence[Hull], apart: _Distances | None, reached: Reac
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if options.quality == "best" and reached.found is None and options.max_hulls is not None and exceeds:
         sentences.append(f"Nothing was searched: only uniting parts leads to as few hulls as {options.max_hulls}.")
-    if apart is not None and apart.under > COVERAGE_TOLERANCE:
+    if distances is not None and distances.under > COVERAGE_TOLERANCE:
         sentences.append(
-            f"Some of the input's surface lies up to {apart.under / unit:.4g} ({in_words}) outside the hulls, farthest "
-            f"near {apart.under_at}: repair dropped what it could not make solid (see `deviation` in `repair`)."
+            f"Some of the input's surface lies up to {distances.under / unit:.4g} ({in_words}) outside the hulls, "
+            f"farthest near {distances.under_at}: repair dropped what it could not make solid (see `deviation` in "
+            "`repair`)."
         )
-    sentences += apart.left_out.said if apart is not None else []
-    if apart is not None and not exceeds and apart.over > reached.goal.overhang + COVERAGE_TOLERANCE:
+    sentences += distances.left_out.said if distances is not None else []
+    if distances is not None and not exceeds and distances.over > reached.goal.overhang + COVERAGE_TOLERANCE:
         sentences.append(
-            f"The hulls reach {apart.over / unit:.4g} ({in_words}) beyond the input's surface, more than the "
-            f"threshold, farthest near {apart.over_at}: {_why_beyond(reached.solid, options)}."
+            f"The hulls reach {distances.over / unit:.4g} ({in_words}) beyond the input's surface, more than the "
+            f"threshold, farthest near {distances.over_at}: {_why_beyond(reached.solid, options)}."
         )
     return sentences
 
 
 def _why_beyond(solid: Solid, options: Options) -> str:
-    """What repair did that moves hulls away from the surface, and what leaves it undone."""
+    """Name the repairs that move hulls away from the surface, and the options that avoid them."""
     filled = any(body.step in ("capped", "wrapped") for body in solid.bodies)
     if filled and options.open != "thin":
         return "repair closed openings (see `repair`), which --open thin leaves open"

@@ -187,7 +187,7 @@ class Training:
 
 
 def policy_of(network: Network, encoder: Encoder, **deployment: int) -> QPolicy:
-    """Make a policy of a network; `deployment` is `QPolicy`'s shortlist and concave_edges."""
+    """Make a policy of a network; `deployment` is `QPolicy`'s shortlist and reflex_edges."""
     return QPolicy(lambda component: network(encoder.describe(component)).reshape(-1), **deployment)
 
 
@@ -211,7 +211,7 @@ class Validation:
         self._held_out = bool(listed.validation)
         self._criterion, self._most = Concavity(options.threshold), options.max_parts
         self._greedy = self._parts(make_policy("greedy-hull-sum"))
-        self._random = mean_ratio(self._parts(RandomShortlist(1, concave_edges=0)), self._greedy)
+        self._random = mean_ratio(self._parts(RandomShortlist(1, reflex_edges=0)), self._greedy)
 
     def ratios(self, network: nn.Module, encoder: Encoder) -> dict[str, float]:
         """Ratios of the network's own plane, its ten best, and of random planes."""

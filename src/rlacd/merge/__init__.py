@@ -1,7 +1,7 @@
 """Uniting parts, and dropping slivers."""
 
 from rlacd.merge.grow import grow_cover
-from rlacd.merge.merge import merge_lifted, merge_parts
+from rlacd.merge.merge import merge_parts, merge_transferred
 from rlacd.merge.slivers import drop_slivers
 
-__all__ = ["drop_slivers", "grow_cover", "merge_lifted", "merge_parts"]
+__all__ = ["drop_slivers", "grow_cover", "merge_parts", "merge_transferred"]

@@ -1,8 +1,8 @@
 """Growing: hulls grow through the solid, and few of them are chosen that cover it.
 
 Where bodies cross, cuts chop them, and merging, which unites two parts at a time, seldom finds a body again. A piece
-that kept some sides of its body finds it at once (`native/solid/grow.cpp`). That bodies cross shows in the merged
-parts: many of them share material with others. Other solids pay nothing.
+that kept some sides of its body grows back to it at once (`native/solid/grow.cpp`). Bodies are taken to cross if many
+merged parts share material with others; other solids pay nothing.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ CROSSING = 1 / 3
 """Bodies cross where at least this share of the parts share material with others."""
 
 DEPTH = 0.4
-"""How deep the solid's surface may come into what has grown, as a share of the criterion's overhang: at 0.1, the
+"""How deep the solid's surface may come into a grown hull, as a share of the criterion's outward deviation: at 0.1, the
 planted solids of research/search.md take 3 % more parts."""
 
 LEAST = 0.5
-"""What has grown is taken only if it holds as much more as this share of the volume of the piece it grew from: merging
-does the rest better. With 0, the planted solids take 4 % more parts."""
+"""A hull is taken only if it grew by at least this share of the volume of its piece: merging does the rest better. With
+0, the planted solids take 4 % more parts."""
 
 WORTH = 0.85
-"""The parts grown are kept if they are at most this share of the merged ones: what follows can save more of parts that
-were cut less. Of the 56 of a pot's proxy, 41 are left when they are carried back, but 47 of 55 grown ones."""
+"""Keep grown parts only if they number at most this share of the merged ones: later stages save more of parts that were
+cut less. Of the 56 merged parts of a pot's proxy, 41 are left on the solid; of 55 grown ones, 47."""
 
 
 def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
@@ -62,13 +62,13 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
 
 
 def _regrown(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
-    """Parts grown from the pieces and merged; the merged parts if points of the pieces tell that there are no fewer."""
+    """Parts grown from the pieces and merged; the merged parts if samples show that growing saves none."""
     pieces = [member for part in merged for member in part.members]
     corners = sum(len(piece.hull.vertices) for piece in pieces)
     if not run.work.pay(sum(work.growing(len(piece.hull.vertices), corners) for piece in pieces)):
         return merged
     depth = DEPTH * criterion.overhang
-    grown = run.map(lambda piece: solid.filling.grown(piece.hull.vertices, piece.hull.faces, depth), pieces)
+    grown = run.map(lambda piece: solid.filling.grown(piece.hull.body, depth), pieces)
     chosen = _chosen(pieces, grown)
     if len(chosen) > WORTH * len(merged):
         return merged
@@ -101,13 +101,13 @@ def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[in
 def _taken(
     pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run, solid: Component
 ) -> list[Part]:
-    """Parts that take what is in each intersection of half-spaces, as far as they meet the criterion; and the rest.
+    """Parts of what each intersection of half-spaces holds, if they meet the criterion, and parts of the rest.
 
     Empty if most do not.
     """
     rest, parts = list(pieces), list[Part]()
     for tried, spaces in enumerate(grown):
-        if tried > 2 * (len(parts) + 1):  # what has grown is mostly empty space
+        if tried > 2 * (len(parts) + 1):  # grown hulls are mostly empty space
             return []
         inside, outside, units = _divided(rest, spaces)
         hull = Hull.of(*(member.hull.vertices for member in inside)) if inside else None
@@ -130,7 +130,7 @@ def _heights(points: FloatArray, spaces: FloatArray) -> FloatArray:
 
 
 def _divided(components: Sequence[Component], spaces: FloatArray) -> tuple[list[Component], list[Component], float]:
-    """What of components is inside and outside of an intersection of half-spaces, and the work of cutting them."""
+    """Components cut by half-spaces: what lies in all of them, the rest, and the work of cutting."""
     inside: list[Component] = []
     outside: list[Component] = []
     units = 0.0

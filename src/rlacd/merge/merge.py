@@ -21,8 +21,8 @@ from rlacd.solid.component import LOST_VOLUME, ClippedPart, Component, Part
 from rlacd.solid.hull import Hull
 
 FEW_TO_PAIR = 100
-"""Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or near a
-common third part."""
+"""Up to this many parts, any pair may be united across other parts; with more, only pairs near each other or a third
+part."""
 
 PAIRS_AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the run."""
@@ -47,8 +47,7 @@ def merge_parts(
 
     First the criterion judges the glued union of each pair. When no more pairs can be united this way and `solid` is
     given, parts are united across what lies between them: there it judges the solid clipped to the joint hull
-    (`ClippedPart`). Pairs are tested in batches on all workers and united in order of their cost, whatever the number
-    of threads.
+    (`ClippedPart`). Pairs are tested in batches on all workers and united in order of cost, for any number of threads.
 
     Parameters
     ----------
@@ -70,23 +69,23 @@ def merge_parts(
     return alive if solid is None else _Merging(alive, _Bridged(criterion, run, solid), run).united()
 
 
-def merge_lifted(
+def merge_transferred(
     parts: Sequence[Part],
     proxy: Component,
     rehearsal: Criterion,
     confirmed: Callable[[Hull], Part | None],
     run: Run,
 ) -> list[Part]:
-    """Unite pairs of parts that were carried from a proxy to a solid, if their joint hull is tight on both.
+    """Unite pairs of parts transferred from a proxy to a solid, if their joint hull is tight on both.
 
     Parameters
     ----------
     parts : sequence of Part
         They may overlap, and need not consist of components.
     proxy : Component
-        Most pairs are rejected here, quickly.
+        Rejects most pairs quickly.
     rehearsal : Criterion
-        What the proxy clipped to a joint hull has to meet.
+        The criterion for the proxy clipped to a joint hull.
     confirmed : callable
         Returns the solid clipped to a hull, or None if it does not meet the criterion.
     run : Run
@@ -102,7 +101,7 @@ class _Adjoining:
     run: Run
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
-        """Pairs of a new part and another that may be united: here those that the volume bound allows.
+        """Pairs of a new part and another that may be united, by a bound on volumes.
 
         Incomplete if the run's work runs out.
         """
@@ -111,12 +110,12 @@ class _Adjoining:
         vertices, volumes, filled = alive.sums(pairs)
         if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
             return []
-        hulls = _native.joint_hull_volumes(alive.corners, pairs, self.run.threads)
+        hulls = _native.joint_hull_volumes(alive.bodies, pairs, self.run.threads)
         kept = ~screen.excludes(volumes, hulls)
         return _priced(pairs[kept], (hulls - filled)[kept])
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, float]:
-        """Unite two parts if that meets the criterion; with the work of finding out."""
+        """Unite two parts if the union meets the criterion; also returns the work of deciding."""
         union, price = Part.glued(first, second), price_of_uniting(first, second)
         is_met = union.size > 0 and self.criterion.is_met(union)  # without faces: it could not be clipped
         return union if is_met else None, price
@@ -134,7 +133,7 @@ class _Bridged(_Adjoining):
     confirmed: Callable[[Hull], Part | None] | None = None
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
-        """Pairs that may be feasible: how much of the joint hull the solid fills is not known yet."""
+        """Pairs whose joint hulls the solid may fill well enough, by an early-out test."""
         screen, run = self.criterion.screen, self.run
         reach = np.inf if len(alive.parts) <= self.few else screen.reach
         pairs = alive.boxes.pairs(new, reach, across=True)
@@ -144,7 +143,7 @@ class _Bridged(_Adjoining):
             vertices, _, filled = alive.sums(some)
             if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
                 break
-            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.corners, some, run.threads)
+            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.bodies, some, run.threads)
             may = verdicts == Feasibility.MAYBE
             found += _priced(some[may], (volumes - filled)[may])
         return found
@@ -174,8 +173,8 @@ class _Merging:
         self._run = run
         self._origin = list(range(len(parts)))  # the number of the first piece
         self._queue: list[_Pair] = []
-        self._next: list[_Pair] = []  # the cheapest, in their order
-        self._begun: dict[_Pair, Begun[tuple[Part | None, float]]] = {}  # more than are needed
+        self._next: list[_Pair] = []  # cheapest first
+        self._begun: dict[_Pair, Begun[tuple[Part | None, float]]] = {}  # tests under way, begun ahead of need
 
     def united(self) -> list[Part]:
         """Unite pairs until none is left that may be united."""
@@ -252,16 +251,17 @@ class Uniter:
             Index and volume. Empty if too little work is left.
         """
         screen = self.criterion.screen
-        corners = [part.hull.corners, *(other.hull.corners for other in others)]
-        pairs = Boxes(corners).pairs([0], screen.reach)
+        hulls = [part.hull, *(other.hull for other in others)]
+        bodies = [hull.body for hull in hulls]
+        pairs = Boxes(bodies).pairs([0], screen.reach)
         near = pairs[:, 1].tolist()
-        vertices = len(near) * len(corners[0]) + sum(len(corners[i]) for i in near)
+        vertices = sum(len(part.hull.vertices) + len(hulls[i].vertices) for i in near)
         if not self.account.pay(work.screening(vertices, len(near))):
             return []
         if not screen.looks_inside:
-            volumes = _native.joint_hull_volumes(corners, pairs, 1)
+            volumes = _native.joint_hull_volumes(bodies, pairs, 1)
             return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True)]
-        volumes, verdicts = screen.feasibilities(self.solid.filling, corners, pairs, 1)
+        volumes, verdicts = screen.feasibilities(self.solid.filling, bodies, pairs, 1)
         found = zip(near, volumes.tolist(), verdicts.tolist(), strict=True)
         return [(i - 1, volume) for i, volume, verdict in found if verdict == Feasibility.MAYBE]
 
@@ -357,7 +357,7 @@ def _bounded_pairs(
     alive: NumberedParts, new: Sequence[int], reach: float, criterion: Criterion, run: Run
 ) -> list[_BoundedPair]:
     pairs = alive.boxes.pairs(new, reach)
-    volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.corners, pairs, run.threads)
+    volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.bodies, pairs, run.threads)
     errors = map(criterion.screen.least_error, volumes.tolist(), hulls.tolist())
     queue = [_BoundedPair(error, i, j, False) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)

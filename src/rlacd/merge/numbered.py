@@ -1,4 +1,4 @@
-"""Parts under numbers, and what the prices and costs of their pairs are made of."""
+"""Active parts by number, with the sums that merge costs need."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ from rlacd.solid.component import Part
 
 
 class NumberedParts:
-    """Parts under ascending numbers that are never used again.
+    """Active parts by number; numbers ascend and are never reused.
 
     Parameters
     ----------
     parts : sequence of Part
         They get the numbers 0, 1, ...
     screen : Screen
-        Tells what a joint hull may fill for free on account of each part.
+        Tells the volume credited to each part.
 
     Attributes
     ----------
     parts : dict of int to Part
-    corners : list of HullCorners
-        Of the parts' hulls, by number, also of those that are gone.
+    bodies : list of ConvexBody
+        Hulls by number, also of removed parts.
     boxes : Boxes
     """
 
     def __init__(self, parts: Sequence[Part], screen: Screen) -> None:
         self.parts: dict[int, Part] = {}
-        self.corners: list[_native.HullCorners] = []
+        self.bodies: list[_native.ConvexBody] = []
         self.boxes = _native.Boxes([])
         self._screen = screen
-        self._summands = np.empty((3, 2 * len(parts)))  # unions of pairs never make more of them
+        self._summands = np.empty((3, 2 * len(parts)))  # uniting pairs makes fewer than twice as many
         for part in parts:
             self.add(part)
 
     def add(self, part: Part) -> int:
         """Add a part, and get its number."""
-        number, hull = len(self.corners), part.hull
+        number, hull = len(self.bodies), part.hull
         if number == self._summands.shape[1]:
             self._summands = np.concatenate([self._summands, np.empty((3, number + 1))], axis=1)
         self._summands[:, number] = len(hull.vertices), part.volume, self._screen.filled(part)
         self.parts[number] = part
-        self.corners.append(hull.corners)
-        self.boxes.add(number, hull.corners)
+        self.bodies.append(hull.body)
+        self.boxes.add(number, hull.body)
         return number
 
     def remove(self, numbers: Collection[int]) -> None:
@@ -57,5 +57,5 @@ class NumberedParts:
         self.boxes = self.boxes.without([*numbers])
 
     def sums(self, pairs: IntArray) -> FloatArray:
-        """Sums over both parts of each pair [P, 2]: hull vertices, volumes, and what may be filled for free [3, P]."""
+        """Sums over both parts of each pair [P, 2]: hull vertices, volumes, and credited volumes [3, P]."""
         return np.asarray(self._summands[:, pairs[:, 0]] + self._summands[:, pairs[:, 1]])

@@ -1,4 +1,4 @@
-"""Slivers: thin hulls shaved off by cuts, dropped if the other hulls stand in for them."""
+"""Slivers: thin hulls that cuts leave, dropped if the other hulls cover them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLIVER_LOSS = 2 * HALF_THICKNESS
 
 
 def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | None = None) -> list[Part]:
-    """Drop slivers and films that the other hulls stand in for; all others stay, such as those of thin solids.
+    """Drop slivers that the other hulls cover; all others stay, such as those of thin solids.
 
     Parameters
     ----------
@@ -41,27 +41,26 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     if not slivers:
         return parts
     boxes = np.array([part.box for part in parts])
-    union = hull_union([part.hull for part in parts], run.threads)
     kept = np.ones(len(parts), dtype=bool)
-    stood_in: dict[int, BoolArray] = {}  # what there was in place of each that was dropped
+    stood_in: dict[int, BoolArray] = {}  # the hulls near each sliver when it was dropped
 
     def is_missed(own: int) -> bool:
         others = stood_in[own] = kept & _near(boxes, boxes[own])
-        some = np.flatnonzero(others)
-        return len(some) == 0 or _misses(union.only(some.tolist()), parts[own], run.threads)
+        near = [parts[i].hull for i in np.flatnonzero(others)]
+        return not near or _misses(hull_union(near, run.threads), parts[own], run.threads)
 
     smallest_first = sorted(slivers, key=lambda i: parts[i].hull.volume)
     for own in smallest_first:
         kept[own] = False
         kept[own] = is_missed(own)
-    for own in reversed(smallest_first):  # of a stack of slivers, each would stand in for the next
+    for own in reversed(smallest_first):  # in a stack of slivers, each would cover the next
         if not kept[own] and (stood_in[own] & ~kept).any():
             kept[own] = is_missed(own)
     return [parts[i] for i in np.flatnonzero(kept)]
 
 
 def _misses(union: _native.HullUnion, sliver: Part, threads: int) -> bool:
-    """Whether some point of a sliver is too far from other hulls; most are told by their corners."""
+    """Whether a point of a sliver is too far from the other hulls; corners, tested first, decide most."""
     if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > SLIVER_LOSS).any():
         return True
     return union.under(sliver.vertices, sliver.faces, SLIVER_LOSS / 4, threads)[1] > SLIVER_LOSS

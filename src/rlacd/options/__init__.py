@@ -66,8 +66,8 @@ SIMPLE: Literal["simple"] = "simple"
 FAST: Literal["fast"] = "fast"
 
 RESOLUTIONS = (20, 400)
-"""The grid that repair looks for rooms on has this number cubed of cells: with fewer than 20 along a side, a wrap drawn
-onto the surface folds over itself; more than 400 would take over 4 GB."""
+"""Fewest and most cells along a side of the grid on which repair looks for voids: with fewer, a wrap drawn onto the
+surface folds over itself; more would take over 4 GB."""
 
 GAPS = (0.005, 0.15)
 """Shares of the longest side: smaller balls would need more than `RESOLUTIONS` cells, larger ones close what a body is
@@ -91,7 +91,7 @@ def _criterion(given: Any) -> Any:
 
 
 _OWN = {"threshold": ("threshold", "threshold_abs"), "volume_tolerance": ("volume_tolerance", "volume_of")}
-"""Options that only criteria with a certain number take."""
+"""Options that only criteria with the number of that name take."""
 
 NAMED = tuple(name for name in CRITERIA if name != "navigable")
 """Criteria whose numbers are options of a decomposition themselves."""
@@ -351,7 +351,7 @@ class Options:
 
     @property
     def default_policy(self) -> str:
-        """What cuts best: the networks do, but merging and searching gain less from their parts."""
+        """The policy if none is named: networks cut better, but merging and searching gain less from their parts."""
         return "greedy" if self.merge else "learned"
 
     @property
@@ -370,7 +370,7 @@ class Options:
         return self.keep_cavities or (isinstance(self.criterion, NavigableSpace) and self.criterion.sees_cavities)
 
     def as_plain(self) -> dict[str, Any]:
-        """All that has an effect as plain values, of which `of` makes the same options again, but for objects.
+        """All options with an effect as plain values; `of` makes the same options of them, but for objects.
 
         The criterion is its name or its own options; a policy and meshes to avoid are their names.
         """

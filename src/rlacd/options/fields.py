@@ -20,7 +20,7 @@ from typing import Any, TypeVar, get_args
 from rlacd.errors import OptionError
 
 LARGEST_INTEGER = 2**63 - 1
-"""Where no other bound is given: what kernels and files can hold."""
+"""Bound of integers without another: what kernels and files can hold."""
 
 LONGEST_SHOWN = 80
 """Characters of a value that a message shows."""
@@ -39,7 +39,7 @@ class Kind:
     values
         The same in a few characters, for tables; empty where the help says it.
     read
-        Turns a value into a plain one; raises any exception where it is no such value.
+        Turns a value into a plain one; raises any exception for a value of another kind.
     typed
         What the command line turns a word into.
     textual
@@ -122,7 +122,7 @@ def path_like() -> Kind:
 
 
 def custom(rule: str, read: Callable[[Any], Any], values: str = "", *, typed: type = str) -> Kind:
-    """Whatever `read` takes; it raises where it does not."""
+    """Any value for which `read` does not raise."""
     return Kind(rule, values, read, typed, textual=True)
 
 
@@ -181,7 +181,7 @@ def option(
     panel : str, optional
         The heading it stands under in the command's help.
     kind : Kind, optional
-        Told by the default where it is left out, within the bounds ``least`` and ``most`` or the words ``one_of``.
+        By default that of the default value, within the bounds ``least`` and ``most`` or the words ``one_of``.
     keyword : bool
         Whether it is given by its name only.
     **about
@@ -285,7 +285,7 @@ def read(kind: Kind, name: str, value: Any) -> Any:
     Raises
     ------
     OptionError
-        It is no value of this kind.
+        The value is not of this kind.
     """
     try:
         return kind.read(value)
@@ -325,7 +325,7 @@ def check_callback(name: str, value: Any, taken: str) -> None:
 
 
 LONGEST_SIDE = {"threshold": 2.0, "overlap": 1.0, "gap": 1.0, "radius": 1.0, "tolerance": 1.0, "keep_open": 1.0}
-"""What the longest side measures where each is given as a bare number."""
+"""Length of the longest side in the unit of each option's bare numbers."""
 
 LENGTH = number(above=0, rule="a positive length in the input's unit")
 
@@ -336,7 +336,7 @@ def relative(name: str, length: float, scale: float, bounds: tuple[float, float]
     Raises
     ------
     OptionError
-        That is out of bounds: the length is too small or too large for the object.
+        The length is too small or too large for the object.
     """
     side = LONGEST_SIDE[name]
     number, (least, most) = length * scale * side / 2, bounds

@@ -13,10 +13,10 @@ PRIMITIVE_KINDS: tuple[PrimitiveKind, ...] = get_args(PrimitiveKind)
 """Simplest first: in this order engines collide them fastest."""
 
 EDGES = "+edges"
-"""Ends the name of a policy that also cuts at concave edges."""
+"""Ends the name of a policy that also cuts at reflex edges."""
 
 SCORES = ("hull-sum", "max-excess", "excess-norm")
-"""What a greedy policy may order planes by."""
+"""Scores by which a greedy policy orders planes."""
 
 AS_PUBLISHED = (*(f"greedy-{score}" for score in SCORES), *(f"greedy-{score}{EDGES}" for score in SCORES), "navacd")
 """Policies of published methods, for comparison: one pass is cuts and merging, and nothing else."""

@@ -13,13 +13,13 @@ from rlacd.options.fields import LENGTH, check_fields, custom, number, option, r
 Point: TypeAlias = tuple[float, float, float]
 
 SHARES = (1e-4, 10.0)
-"""Shares of the longest side that radius and tolerance may be: less takes no end of balls, more fills everything."""
+"""Bounds of radius and tolerance, as shares of the longest side: less takes endless balls, more fills everything."""
 
 USUAL = {"radius": 0.025, "tolerance": 0.05}
-"""Where neither the share nor the length is given."""
+"""Defaults where neither the share nor the length is given."""
 
 LARGEST_COORDINATE = 1e100
-"""Coordinates: of larger ones, products would be infinite."""
+"""Largest coordinate: products of larger ones would be infinite."""
 
 
 _coordinate = number(-LARGEST_COORDINATE, LARGEST_COORDINATE).read

@@ -11,10 +11,10 @@ from rlacd.options.fields import check_fields, custom, flag, number, one_of, opt
 Axis = Literal["x", "y", "z"]
 
 DENSITY = 1000.0
-"""Water's, where the unit is a metre."""
+"""Density of water, where the unit is a metre."""
 
 PAGES = (".html", ".htm")
-"""What the name of a report that is a page ends in."""
+"""Endings of reports that are pages."""
 
 
 def _folders(given: Any) -> list[str]:

@@ -1,4 +1,4 @@
-"""What each engine takes: limits on its hulls, and the form it likes to read.
+"""The engines: their limits on hulls, and the format each reads.
 
 The numbers are the engines' own where they have any:
 
@@ -45,11 +45,11 @@ class Preset:
     Attributes
     ----------
     engine
-        Its name in sentences.
+        The engine's name in sentences.
     max_vertices, max_faces
         Limits on each hull; None is no limit.
     ending
-        What its files end in.
+        Ending of its files.
     file_format
         The format, where the ending does not tell it.
     slivers
@@ -74,7 +74,7 @@ PRESETS: dict[str, Preset] = {
     "bullet": Preset("Bullet", 64, None, ".urdf"),
     "godot": Preset("Godot", 32, None, ".glb", "godot"),
 }
-"""By the word that ``preset=`` and ``--preset`` take."""
+"""The engines by the word that ``preset=`` and ``--preset`` take."""
 
 
 def find_preset(name: str) -> Preset:

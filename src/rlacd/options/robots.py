@@ -50,8 +50,8 @@ class RobotOptions:
         Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
         extra rlacd[clear].
     exclude
-        Pairs of bodies of an MJCF model whose contacts MuJoCo need not find: adjacent, always or never in contact at
-        these positions.
+        Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD: adjacent,
+        always or never in contact at these positions.
     srdf
         Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.
 

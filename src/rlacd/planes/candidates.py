@@ -1,10 +1,10 @@
 """Candidate planes: the paper's, equidistant along the coordinate axes and the component's principal axes, and those at
-concave edges, where a component has to be cut anyway and equidistant planes only come close.
+reflex edges, where a component has to be cut anyway and equidistant planes only come close.
 
 A component with a reflex edge is not convex, and stays non-convex until a plane through (or close to) that edge
 separates its two faces. Each edge offers the plane that bisects the reflex angle and the planes of its two faces. Of
 the many edges of a mesh, a few are chosen: deep, sharp and long ones first, and spread out (Andrews,
-"Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024). Implemented in native/decompose/concave_edges.hpp.
+"Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024). Implemented in native/decompose/reflex_edges.hpp.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ OFFSETS_PER_AXIS = 25
 """25 planes along each of 6 axes make the paper's 150."""
 
 EDGES_PER_COMPONENT = 4
-"""Maximum number of concave edges whose planes are tried."""
+"""Maximum number of reflex edges whose planes are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def axis_and_principal(component: Component) -> Candidates:
 
 
 def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) -> Candidates:
-    """Candidates of one component: three planes for each of `count` concave edges, without near-duplicates.
+    """Candidates of one component: three planes for each of `count` reflex edges, without near-duplicates.
 
     Edges are deep, sharp ones of long creases first, and spread out. The first has the greatest depth x angle x length:
     the depth of its midpoint below the hull's surface, and the length of its whole crease. For each further edge, the
@@ -77,7 +77,7 @@ def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) 
     Each edge gives the plane that bisects the reflex angle, and the planes of its two faces. A face plane is moved
     outwards by 1e-9, so that its face and all that is coplanar with it in single precision lie below; planes normal to
     a coordinate axis stay in place, because such cuts are exact. In the plane of the face itself, rounding would decide
-    the side of each corner, and the piece beyond would carry the face along as a film.
+    the side of each corner, and the piece beyond would carry the face along as a sliver.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) 
 
 
 def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
-    """Those of `axis_and_principal` and of `concave_edge_planes`, one direction a plane."""
+    """The planes of `axis_and_principal` and `concave_edge_planes`, each with its own direction."""
     normals, offsets = _planes(component, per_axis, edges)
     return Candidates(normals, offsets[:, None])
 

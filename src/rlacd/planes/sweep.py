@@ -42,7 +42,7 @@ class Sweep:
     solid_below, solid_above : float64
         Volumes of the two sides.
     section_area, section_perimeter : float64
-        Of the solid's cross-section.
+        Area and perimeter of the solid's cross-section.
     thickness_below, thickness_above : float64
         Extents of the two sides along the plane's normal.
     extent_below, extent_above : float64
@@ -82,18 +82,18 @@ class SweepCache:
 
     Parameters
     ----------
-    concave_edges : int
-        Number of concave edges whose planes are added.
+    reflex_edges : int
+        Number of reflex edges whose planes are added.
     seed : sequence of int, optional
         Only half of the planes are candidates, drawn by this seed and the component's vertices.
     """
 
     def __init__(
         self,
-        concave_edges: int = EDGES_PER_COMPONENT,
+        reflex_edges: int = EDGES_PER_COMPONENT,
         seed: Sequence[int] | None = None,
     ) -> None:
-        self._concave_edges = concave_edges
+        self._reflex_edges = reflex_edges
         self._seed = seed
         self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
         self._sweeps: WeakKeyDictionary[Component, Sweep] = WeakKeyDictionary()
@@ -104,7 +104,7 @@ class SweepCache:
         return self._once(self._candidates, component, self._planes)
 
     def _planes(self, component: Component) -> Candidates:
-        planes = all_planes(component, OFFSETS_PER_AXIS, self._concave_edges)
+        planes = all_planes(component, OFFSETS_PER_AXIS, self._reflex_edges)
         if self._seed is None:
             return planes
         random = np.random.default_rng([*self._seed, zlib.crc32(component.vertices.tobytes())])
@@ -132,7 +132,7 @@ SLIVERS = (SLIVER, SLIVER / 100)
 
 
 def least_excess(component: Component, candidates: Candidates, exponent: float, threads: int = 1) -> Plane | None:
-    """Get the valid plane of least cost; None if every plane misses the solid or shaves off a film.
+    """Get the valid plane of least cost; None if every plane misses the solid or leaves a sliver.
 
     The cost is the `exponent`-norm of the two sides' |CH(m_i)| - |m_i|. It is computed only for planes that bounds do
     not rule out (native/decompose/least_excess.hpp). Of planes whose costs are equal up to rounding, as in symmetric
@@ -141,8 +141,7 @@ def least_excess(component: Component, candidates: Candidates, exponent: float, 
     Parameters
     ----------
     exponent : float
-        1 for the sum, which orders planes as the sum of hull volumes does (and is given that sum's tolerance for ties);
-        infinity for the maximum.
+        1 for the sum, which orders planes like the sum of hull volumes (with its tolerance); infinity for the maximum.
     """
     # No plane costs more than the whole component: the hulls of the two sides are disjoint and lie in its hull.
     most = component.hull.volume if exponent == 1 else max(component.hull.volume - component.volume, 0.0)

@@ -14,21 +14,21 @@ from rlacd.policies.policy import CheckedPolicy, Policy
 def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: float | None = None) -> Policy:
     """Build the policy called `name`; an object with a method `choose` is wrapped to check its answers.
 
-    - ``greedy``: the plane with the least p-norm of excess volumes, among 150 planes and those of four concave edges.
+    - ``greedy``: the plane with the least p-norm of excess volumes, among 150 planes and those of four reflex edges.
     - ``greedy-SCORE``: the plane with the least SCORE among the paper's 150 alone (``hull-sum`` is its baseline);
       ``greedy-SCORE+edges``: among those and the edges'.
-    - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four concave edges.
+    - ``navacd``: the plane with the least sum of hull volumes, among three planes and those of four reflex edges.
     - ``random-N+edges``: the plane with the least sum of hull volumes among N random ones of the 150 and those of four
-      concave edges; ``random-N``: among the random ones alone. Controls for learned policies.
+      reflex edges; ``random-N``: among the random ones alone. Controls for learned policies.
     - ``learned``: of the most promising planes, the one after which networks predict the fewest parts.
     - ``rl-acd``, or the path of a network as written by ``rlacd train`` (.npz): the paper's rule, the plane with
-      the least sum of hull volumes among the network's ten best planes and those of four concave edges.
+      the least sum of hull volumes among the network's ten best planes and those of four reflex edges.
 
     Parameters
     ----------
     name : str or Policy
     sweeps : SweepCache, optional
-        Sweeps over the 150 planes and those of four concave edges, shared with others.
+        Sweeps over the 150 planes and those of four reflex edges, shared with others.
     scale : float, optional
         The criterion's length in the frame, such as the concavity threshold; an input of networks.
 

@@ -52,7 +52,7 @@ class Greedy:
     sweeps : SweepCache, optional
         Provides the planes, to share them with other policies.
     planes : callable, optional
-        Provides them in its place.
+        Provides the planes in place of `sweeps`.
     """
 
     def __init__(
@@ -62,17 +62,17 @@ class Greedy:
         self._planes = planes or (sweeps or SweepCache()).candidates
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
+        """Choose the plane to cut a component by; None if every candidate misses it or leaves a sliver."""
         return least_excess(component, self._planes(component), self._exponent, threads)
 
 
 def paper_planes_and_edges(component: Component) -> Candidates:
-    """Candidates of one component: the paper's 150, and those of four concave edges."""
+    """Candidates of one component: the paper's 150, and those of four reflex edges."""
     return Candidates.joined(paper_planes(component), concave_edge_planes(component))
 
 
 def navacd_planes(component: Component) -> Candidates:
-    """Candidates of one component: the middle of its box along x, y and z, and those of four concave edges.
+    """Candidates of one component: the middle of its box along x, y and z, and those of four reflex edges.
 
     J. Andrews, "Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024, takes the one with the least sum of
     hull volumes. It cuts one part at a time, the largest |CH(m_i)| - |m_i| first, where here all unfinished components
@@ -87,9 +87,9 @@ def mid_planes(component: Component) -> Candidates:
 
 
 def least_hulls(
-    component: Component, candidates: Candidates, chosen: NDArray[np.intp], concave_edges: int, threads: int = 1
+    component: Component, candidates: Candidates, chosen: NDArray[np.intp], reflex_edges: int, threads: int = 1
 ) -> Plane | None:
-    """Get the plane with the least sum of hull volumes among some candidates and those of concave edges.
+    """Get the plane with the least sum of hull volumes among some candidates and those of reflex edges.
 
     Parameters
     ----------
@@ -97,19 +97,19 @@ def least_hulls(
         Candidates of this component, K directions with M planes each.
     chosen : int [N]
         Indices of the planes on the shortlist; the first is taken if none is valid.
-    concave_edges : int
-        Number of concave edges whose planes join the shortlist.
+    reflex_edges : int
+        Number of reflex edges whose planes join the shortlist.
     """
     directions = candidates.directions[chosen // candidates.offsets.shape[1]]
     short = Candidates(directions, candidates.offsets.ravel()[chosen][:, None])
-    if concave_edges:
-        short = Candidates.joined(short, concave_edge_planes(component, concave_edges))
+    if reflex_edges:
+        short = Candidates.joined(short, concave_edge_planes(component, reflex_edges))
     fallback = candidates.plane(int(chosen[0])) if len(chosen) else None
     return least_excess(component, short, SCORES["hull-sum"], threads) or fallback
 
 
 class RandomShortlist:
-    """Chooses the plane with the least sum of hull volumes among random planes and those of concave edges.
+    """Chooses the plane with the least sum of hull volumes among random planes and those of reflex edges.
 
     With ten planes and four edges, this is the paper's deployment of its network without the network.
 
@@ -117,15 +117,15 @@ class RandomShortlist:
     ----------
     planes : int
         Number of valid planes drawn from the 150.
-    concave_edges : int
-        Number of concave edges whose planes join them.
+    reflex_edges : int
+        Number of reflex edges whose planes join them.
     seed : int
-        What is drawn depends on it and the component's vertices, whatever was cut before.
+        The drawn planes depend on it and the component's vertices alone.
     """
 
-    def __init__(self, planes: int = 10, concave_edges: int = EDGES_PER_COMPONENT, seed: int = 0) -> None:
+    def __init__(self, planes: int = 10, reflex_edges: int = EDGES_PER_COMPONENT, seed: int = 0) -> None:
         self._planes = planes
-        self._concave_edges = concave_edges
+        self._reflex_edges = reflex_edges
         self._seed = seed
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
@@ -134,4 +134,4 @@ class RandomShortlist:
         valid = np.flatnonzero(distinct_planes(component, candidates))
         random = np.random.default_rng([self._seed, zlib.crc32(component.vertices.tobytes())])
         drawn = random.choice(valid, min(self._planes, len(valid)), replace=False)
-        return least_hulls(component, candidates, drawn, self._concave_edges, threads)
+        return least_hulls(component, candidates, drawn, self._reflex_edges, threads)

@@ -23,8 +23,7 @@ NETWORKS = 4
 """Size of the ensemble."""
 
 PROMISING = 40
-"""Number of planes of least excess among which the networks choose, and as many of least hull sum: the labels know few
-others."""
+"""Number of planes of least excess, and of least hull sum, among which the networks choose: training saw few others."""
 
 LEAST_GAIN = 0.02
 """Predicted saving in log(parts) for which the plane of least hull sum is given up: below it, predictions are noise."""
@@ -35,8 +34,8 @@ sweep takes three times as long as greedy's bounds. Of 68 meshes of `train/`, 8 
 parts of the least hull sum, in 1.6 and 1.3 times the time."""
 
 TYPICAL_LENGTH = 0.06
-"""Stands for the criterion's length if it has none: where `SIMPLE` is 8, 0.05, 0.07 and 0.09 leave 0.92, 0.90
-and 0.93 of them on 58 meshes of `train/` in navigable space (2.5 %, 5 %), in 2.0, 1.6 and 1.2 times the time."""
+"""Length of a criterion without one. With `SIMPLE` 8, lengths of 0.05, 0.07 and 0.09 leave 0.92, 0.90 and 0.93 of the
+raw parts on 58 meshes of `train/` in navigable space (2.5 %, 5 %), in 2.0, 1.6 and 1.2 times the time."""
 
 
 class Learned:
@@ -45,7 +44,7 @@ class Learned:
     Parameters
     ----------
     sweeps : SweepCache, optional
-        Provides the 150 planes and those of concave edges.
+        Provides the 150 planes and those of reflex edges.
     scale : float, optional
         The criterion's length in the frame, if it has one.
     """
@@ -57,7 +56,7 @@ class Learned:
         self._greedy = Greedy("hull-sum", sweeps=self._sweeps)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
-        """Choose the plane to cut a component by; None if every candidate misses it or shaves off a film."""
+        """Choose the plane to cut a component by; None if every candidate misses it or leaves a sliver."""
         excess = max(component.hull.volume - component.volume, 0.0)
         wide = SIMPLE * (self._scale or TYPICAL_LENGTH)
         if excess < wide * wide * wide:

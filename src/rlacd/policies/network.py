@@ -46,7 +46,7 @@ class Network:
     ----------
     layers : sequence of (weight [outputs, inputs], bias [outputs])
     about : mapping
-        What the file says of itself: ``kind``, and the length of the criterion it was trained with, ``threshold``.
+        Facts in the file: ``kind``, and ``threshold``, the length of the criterion it was trained with.
     """
 
     def __init__(
@@ -136,14 +136,14 @@ class QPolicy:
     values : callable
     shortlist : int
         Number of best planes from which the one with the least sum of hull volumes is taken (paper: 10).
-    concave_edges : int
-        Number of concave edges whose planes join the shortlist (paper: 4, three planes each).
+    reflex_edges : int
+        Number of reflex edges whose planes join the shortlist (paper: 4, three planes each).
     """
 
-    def __init__(self, values: QFunction, shortlist: int = 1, concave_edges: int = 0) -> None:
+    def __init__(self, values: QFunction, shortlist: int = 1, reflex_edges: int = 0) -> None:
         self._values = values
         self._shortlist = shortlist
-        self._concave_edges = concave_edges
+        self._reflex_edges = reflex_edges
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose the plane to cut a component by; None if no candidate is valid."""
@@ -152,9 +152,9 @@ class QPolicy:
         if not valid.any():
             return None
         best = best_planes(self._values(component), valid, self._shortlist)
-        if len(best) == 1 and not self._concave_edges:
+        if len(best) == 1 and not self._reflex_edges:
             return candidates.plane(int(best[0]))
-        return least_hulls(component, candidates, best, self._concave_edges, threads)
+        return least_hulls(component, candidates, best, self._reflex_edges, threads)
 
 
 def deployed(path: str, scale: float | None = None) -> QPolicy:

@@ -1,4 +1,4 @@
-"""What networks see of a plane, its neighbours and its component, as the sweep gives it."""
+"""Features of a plane, its neighbours and its component, which networks get from the sweep."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def plane_features(
     Parameters
     ----------
     s : Sweep
-        Of 25 planes along each of 6 directions, followed by those of concave edges.
+        The sweep of 25 planes along each of 6 directions, then those of reflex edges.
     valid : bool [K * M]
     hull, volume : float
-        Of the component's hull and of the component.
+        Volumes of the component's hull and of the component.
     box : float [3]
-        Its extents.
+        Extents of the component's box.
     length : float, optional
         The criterion's length, if it has one.
     """
@@ -94,7 +94,7 @@ PLANES = 6 * OFFSETS_PER_AXIS
 
 
 def sweep_features(component: Component, threshold: float) -> Float32Array:
-    """Features [150, 38] of the paper's planes of a component; the same component always has the same.
+    """Features [150, 38] of the paper's planes of a component; they depend on nothing else.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Decomposing a simpler copy of a dense solid, and carrying the parts back to the solid itself."""
+"""Decomposing a simpler copy of a dense solid, and transferring the parts to the solid itself."""

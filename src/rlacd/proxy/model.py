@@ -1,7 +1,7 @@
-"""What is cut in place of a solid: the solid itself, or a simpler copy of a dense one, whose parts are carried back.
+"""The model that is cut for a solid: the solid, or a simpler copy of a dense one, whose parts are transferred.
 
-Every hull takes in what of the solid's surface it misses (`Filling.uncovered`), so that together the hulls cover the
-solid; its part is then the solid clipped to it. Each part is tested on the solid itself; one that fails is cut there.
+Hulls grow to take in the surface of the solid that they miss (`Filling.uncovered`), so that together they cover the
+solid. The part of a hull is the solid clipped to it; a part that fails the criterion is cut on the solid.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import merge_lifted
+from rlacd.merge import merge_transferred
 from rlacd.policies import Policy
 from rlacd.proxy.simplify import Proxy, simplify
 from rlacd.run import Run
@@ -31,18 +31,18 @@ SIMPLE_FIRST = 2 * HALF_THICKNESS
 within half of it: noise gives them many corners."""
 
 MOST_CUTS = 2
-"""How often a part is cut on the solid: hulls of its pieces may grow to cover the surface until they fail again."""
+"""Most cuts of a part on the solid: hulls of its pieces may grow to cover the surface until they fail again."""
 
 
 @dataclass
-class _Lifted:
-    """A part on its way to the solid.
+class _Transferred:
+    """A part being transferred to the solid.
 
     Attributes
     ----------
     hull : Hull
     part : Part or None
-        Its part of the solid, if that is known for this hull.
+        The solid clipped to this hull, once it has been.
     is_met : bool
         Whether that is known to meet the goal.
     cuts : int
@@ -56,7 +56,7 @@ class _Lifted:
 
     @property
     def on_solid(self) -> Part:
-        """Its part of the solid, which is known."""
+        """The solid clipped to the hull; only once it has been."""
         assert self.part is not None, "clipped first"
         return self.part
 
@@ -74,8 +74,8 @@ class _Lifted:
 
 
 @dataclass(frozen=True)
-class Lift:
-    """Carries parts of a proxy to the solid.
+class Transfer:
+    """Transfers parts of a proxy to the solid.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Lift:
     run: Run
 
     def __call__(self, parts: Sequence[Part], mend: bool = True) -> tuple[list[Part], float]:
-        """Get the parts of the solid, which cover it, and the factor of the goal that they meet: 1 if not mended.
+        """Get parts that cover the solid, and the factor of the goal that they meet: 1 if not mended.
 
         Parameters
         ----------
@@ -107,10 +107,10 @@ class Lift:
         """
         covering: list[Hull] = []
         try:
-            lifted = [_Lifted(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
-            self._cover(lifted)
-            covering = [each.hull for each in lifted]
-            return self._tested(lifted) if mend else (self.run.map(self._clipped, covering), 1.0)
+            moved = [_Transferred(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
+            self._cover(moved)
+            covering = [each.hull for each in moved]
+            return self._tested(moved) if mend else (self.run.map(self._clipped, covering), 1.0)
         except Stopped:
             self.run.note_stop()
         with self.run.shielded():
@@ -118,73 +118,72 @@ class Lift:
             return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)], 1.0
 
     def _covering(self, parts: Sequence[Part]) -> list[Hull]:
-        """Get hulls that cover the solid, without the time to simplify them."""
-        lifted = [_Lifted(part.hull) for part in parts]
-        self._cover(lifted, simple=False)
-        return [each.hull for each in lifted]
+        """Get hulls that cover the solid, when there is no time to simplify them."""
+        moved = [_Transferred(part.hull) for part in parts]
+        self._cover(moved, simple=False)
+        return [each.hull for each in moved]
 
-    def _tested(self, lifted: list[_Lifted]) -> tuple[list[Part], float]:
+    def _tested(self, moved: list[_Transferred]) -> tuple[list[Part], float]:
         """Clip the solid to the hulls, and cut it there where one fails, until none is left to cut (see `_failing`)."""
-        self._clip(lifted)
-        while failing := self._failing(lifted):
+        self._clip(moved)
+        while failing := self._failing(moved):
             for i in reversed(failing):
-                lifted[i : i + 1] = self._cut_again(lifted[i])
-            self._cover(lifted)
-            self._clip(lifted)
-        errors = self.run.map(self.goal.error, [each.on_solid for each in lifted if not each.is_met])
-        return [each.on_solid for each in lifted], max([1.0, *(error / self.goal.overhang for error in errors)])
+                moved[i : i + 1] = self._cut_again(moved[i])
+            self._cover(moved)
+            self._clip(moved)
+        errors = self.run.map(self.goal.error, [each.on_solid for each in moved if not each.is_met])
+        return [each.on_solid for each in moved], max([1.0, *(error / self.goal.overhang for error in errors)])
 
-    def _cut_again(self, failing: _Lifted) -> list[_Lifted]:
-        """Cut a part of the solid; the second time with room for its pieces' hulls to grow."""
+    def _cut_again(self, failing: _Transferred) -> list[_Transferred]:
+        """Cut a part on the solid; the second time to a tighter goal, as the hulls of its pieces may grow."""
         part, tighter = failing.on_solid, 1 - failing.cuts * self.proxy.margin(self.goal)
         tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
         new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
         cuts = failing.cuts + 1
-        return [_Lifted(part.hull, part, True, cuts) for part in new] or [replace(failing, cuts=cuts)]
+        return [_Transferred(part.hull, part, True, cuts) for part in new] or [replace(failing, cuts=cuts)]
 
     def confirmed(self, hull: Hull) -> Part | None:
         """Get what the solid fills of a hull; None if it does not meet the goal."""
         part = self._clipped(hull)
         return part if self.goal.is_met(part) else None
 
-    def _cover(self, lifted: Sequence[_Lifted], simple: bool = True) -> None:
+    def _cover(self, moved: Sequence[_Transferred], simple: bool = True) -> None:
         """Grow hulls where necessary to cover the solid's surface; those that need not grow stay the same."""
         points = self.solid.filling.uncovered(
-            [each.hull.vertices for each in lifted],
-            [each.hull.faces for each in lifted],
+            [each.hull.body for each in moved],
             2 * self.proxy.deviation + SIMPLE_FIRST,
             GROWTH_TO_SPARE,
             self.run.threads,
         )
-        for each, own in zip(lifted, points, strict=True):
+        for each, own in zip(moved, points, strict=True):
             if len(own):
                 each.grow(own, simple)
 
-    def _clip(self, lifted: Sequence[_Lifted]) -> None:
+    def _clip(self, moved: Sequence[_Transferred]) -> None:
         """Get what the solid fills of hulls that have changed."""
-        changed = [each for each in lifted if each.part is None]
+        changed = [each for each in moved if each.part is None]
         for each, part in zip(changed, self.run.map(self._clipped, [each.hull for each in changed]), strict=True):
             each.part = part
 
     def _clipped(self, hull: Hull) -> Part:
-        """What the solid fills of a hull; the hull itself if that is nothing."""
+        """The solid clipped to a hull; the hull itself if nothing is left."""
         part = self.solid.inside(hull)
         return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
-    def _failing(self, lifted: list[_Lifted]) -> list[int]:
+    def _failing(self, moved: list[_Transferred]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there `MOST_CUTS` times."""
-        asked = [i for i, each in enumerate(lifted) if each.cuts < MOST_CUTS and not each.is_met]
-        for i, met in zip(asked, self.run.map(self._met, [lifted[i] for i in asked]), strict=True):
+        asked = [i for i, each in enumerate(moved) if each.cuts < MOST_CUTS and not each.is_met]
+        for i, met in zip(asked, self.run.map(self._met, [moved[i] for i in asked]), strict=True):
             if met is not None:
-                lifted[i] = replace(lifted[i], hull=met.hull, part=met, is_met=True)
-        return [i for i in asked if not lifted[i].is_met]
+                moved[i] = replace(moved[i], hull=met.hull, part=met, is_met=True)
+        return [i for i in asked if not moved[i].is_met]
 
-    def _met(self, lifted: _Lifted) -> Part | None:
-        """Its part if that meets the goal, if need be with the convex hull of the part in place of a simple one."""
-        part = lifted.on_solid
+    def _met(self, moved: _Transferred) -> Part | None:
+        """Its part of the solid if that meets the goal, with its simple hull or else its exact one."""
+        part = moved.on_solid
         if self.goal.is_met(part):
             return part
-        exact = Hull.of(part.vertices) if lifted.cuts == 0 else None
+        exact = Hull.of(part.vertices) if moved.cuts == 0 else None
         return tight if exact is not None and self.goal.is_met(tight := part.with_hull(exact)) else None
 
 
@@ -215,11 +214,11 @@ class Model:
 
     @property
     def component(self) -> Component:
-        """What is cut."""
+        """The component that is cut: the proxy, or else the solid."""
         return self.solid if self.proxy is None else self.proxy.component
 
     def tighter(self, goal: Criterion, factor: float = 1.0) -> Criterion:
-        """Get what parts of the model have to meet so that those of the solid meet the goal, scaled by a factor."""
+        """Get the tighter goal for parts of the model, so that those of the solid meet the goal, scaled by a factor."""
         if self.proxy is None:
             return goal if factor == 1.0 else goal.scaled(factor)
         return goal.alone.scaled(factor - self.proxy.margin(goal))
@@ -227,14 +226,14 @@ class Model:
     def lift(
         self, parts: list[Part], goal: Criterion, factor: float, policy: Policy, run: Run, *, merge: bool
     ) -> list[Part]:
-        """Carry parts of the model to the solid, where they meet the goal, scaled by a factor."""
+        """Transfer parts of the model to the solid, where they meet the goal, scaled by a factor."""
         assert self.proxy is not None
         scaled = goal if factor == 1.0 else goal.scaled(factor)
         with run.stage("lift"):
-            lift = Lift(self.solid, self.proxy, scaled, policy, run)
-            parts, worst = lift(parts, mend=run.stopped_by is None)
-            if merge and run.stopped_by is None:  # the margin may have kept some apart, and fewer may fail no more
-                lift = replace(lift, goal=scaled.scaled(worst))
-                looser = lift.goal.alone.scaled(1 + self.proxy.margin(goal))
-                parts = merge_lifted(parts, self.component, looser, lift.confirmed, run)
+            transfer = Transfer(self.solid, self.proxy, scaled, policy, run)
+            parts, worst = transfer(parts, mend=run.stopped_by is None)
+            if merge and run.stopped_by is None:  # the margin may have kept some from merging
+                transfer = replace(transfer, goal=scaled.scaled(worst))
+                looser = transfer.goal.alone.scaled(1 + self.proxy.margin(goal))
+                parts = merge_transferred(parts, self.component, looser, transfer.confirmed, run)
         return parts

@@ -41,7 +41,7 @@ STEP = 0.7
 are noisy, and tell nothing about points far from them."""
 
 COARSEST = 12
-"""No proxy, or piece of one, has fewer triangles, those of a box, if it had more before."""
+"""Fewest triangles of a proxy or a piece of one, unless the original has fewer: those of a box."""
 
 LOST_OF_SOLID, LOST_OF_PIECES = 0.02, 0.1
 """A proxy's volume may differ from the solid's by this share: thin walls would fold up sooner than they deviate. Pieces
@@ -72,7 +72,7 @@ class Proxy:
     deviation: float
 
     def margin(self, goal: Criterion) -> float:
-        """By which share of what a goal allows parts of the proxy have to be tighter than those of the solid."""
+        """Share of what the goal allows by which parts of the proxy have to be tighter than those of the solid."""
         return MARGIN * self.deviation / goal.overhang
 
 
@@ -141,8 +141,7 @@ def _smallest(
     samples: int = PLACES,
     lost: float = LOST_OF_SOLID,
 ) -> _Copy | None:
-    """The smallest copy that is near enough; None if none with at most `largest` triangles is, or so many are needed
-    that it is not worthwhile."""
+    """The smallest copy that is near enough; None if none with at most `largest` triangles is."""
     largest = min(largest, WORTHWHILE * len(mesh[1]))
     if largest < COARSEST:
         return None

@@ -14,7 +14,7 @@ from rlacd.solid.arrays import FloatArray, Int64Array, dots
 from rlacd.solid.topology import Edges, first_of_doubled, nondegenerate
 
 MOST_FREE_EDGES = 500_000
-"""A soup with more free edges is not a scan with holes: tracing loops is the one step that walks edge by edge."""
+"""A soup with more free edges keeps its cracks and holes: loops are traced edge by edge."""
 
 MOST_NEAR = 100 * MOST_FREE_EDGES
 """Pairs of a free edge and a free vertex near it; where there are more, none is split."""
@@ -69,9 +69,9 @@ def split_at_free_vertices(vertices: FloatArray, faces: Int64Array, tolerance: f
     Returns the faces ``[G, 3]``, split ones replaced by several, and ``[G]`` the old face each comes from.
     """
     edges = Edges.of(faces, len(vertices))
-    is_free = edges.valence == 1
+    is_free = edges.face_count == 1
     halfedge = np.flatnonzero(is_free[edges.of_halfedge])
-    # One edge per face and round, so that the pieces of a face do not depend on each other.
+    # Split one edge of a face per round, so that its pieces do not depend on each other.
     _, first = np.unique(halfedge // 3, return_index=True)
     face, corner = np.divmod(halfedge[first], 3)
     a, b, c = (faces[face, (corner + i) % 3] for i in range(3))
@@ -94,9 +94,9 @@ def split_at_free_vertices(vertices: FloatArray, faces: Int64Array, tolerance: f
 def _on_edges(
     vertices: FloatArray, corners: Int64Array, free: Int64Array, tolerance: float
 ) -> tuple[Int64Array, Int64Array]:
-    """Which of some vertices lie on which edges, from the first to the second of the corners ``[N, 3]`` of each face.
+    """Find the `free` vertices on the edge from the first to the second of the corners ``[N, 3]`` of each face.
 
-    Returns pairs of an edge and a vertex, in the order in which they follow each other along the edges.
+    Returns pairs of an edge and a vertex, in order along each edge.
     """
     none = np.empty((2, 0), dtype=np.int64)
     poll_stop()
@@ -123,5 +123,5 @@ def _on_edges(
 
 def free_edges(faces: Int64Array, edges: Edges) -> Int64Array:
     """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them."""
-    face, corner = np.divmod(np.flatnonzero((edges.valence == 1)[edges.of_halfedge]), 3)
+    face, corner = np.divmod(np.flatnonzero((edges.face_count == 1)[edges.of_halfedge]), 3)
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)

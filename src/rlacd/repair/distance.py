@@ -16,11 +16,11 @@ from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.topology import first_of_doubled
 
-# Points of a triangle at which it is looked whether it lies inside a body: near its corners, its edges, its middle.
+# Points at which a triangle is tested for lying inside a body: near its corners, its edges, its middle.
 _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
 MOST_POINTS = 160_000
-"""Points spread over a surface in the usual spacing are fewer, unless it is a stack of hundreds of sheets."""
+"""Most points spread over a surface: at the usual spacing, only stacks of hundreds of sheets need so many."""
 
 
 class SurfaceQuery:
@@ -40,7 +40,7 @@ class SurfaceQuery:
 
     @property
     def index(self) -> Surface | None:
-        """What the queries so far were answered by."""
+        """The index that answered the queries so far; None before the first."""
         return self.__dict__.get("_surface")
 
     def distance(self, points: FloatArray) -> FloatArray:
@@ -113,11 +113,10 @@ BESIDE = HALF_THICKNESS / 5
 """Distance from a face at which the winding number is evaluated."""
 
 TANGLED = 0.02
-"""Share of a surface that is inside out from which it is a tangle. Of 600 meshes that people have made, all have up to
-0.012 but for one with 0.042, which became 1,408 hulls; tangles found by fuzzing have 0.027 and more. Dense bodies are
-none: noise turns some of their triangles over, and their proxies average that. Both sides of a cut are closed along
-rims; where a solid is inside out, rims cross each other, and caps add as many faces as the cut has removed, so that
-none of the pieces becomes convex."""
+"""A surface with a larger share inside out is a tangle. Of 600 meshes made by people, all have up to 0.012 but for one
+with 0.042, which became 1,408 hulls; tangles found by fuzzing have 0.027 and more. Dense bodies are exempt: noise turns
+some of their triangles over, and their proxies average that. Where a solid is inside out, the rims of a cut cross each
+other, and caps add as many faces as the cut has removed: no piece becomes convex."""
 
 
 def is_tangle(solid: SurfaceQuery) -> bool:

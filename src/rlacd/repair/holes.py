@@ -4,17 +4,16 @@ A body is closed only if every one of its holes may be closed: a cap that leaves
 sheet. Whether a hole may be closed is decided by the first of these questions that is answered with yes:
 
 - Does its cap stay near the surface, or where the ball cannot reach it?
-- Is it a wound? It has few edges, and its cap smoothly continues the faces around it, as at missing faces. Around the
-  mouth of a bottle, faces turn away from the cap. A mesh with many wounds gets its other small holes closed too. A hole
-  with another body all along its rim, such as a counter's with a basin in it, is no wound, nor is a round ring.
+- Is it damage? Where faces are missing, few edges surround a cap that smoothly continues the faces around it. Around
+  the mouth of a bottle, faces turn away from the cap. In a damaged mesh, other small holes are damage too; elsewhere, a
+  round ring is not. A hole with another body all along its rim, such as a counter's with a basin in it, never is.
 - Is it small beside its body, and its cap not far from the surface? Where a tube ends, it may be larger if it is the
   only hole: one end of a bar may be open where it was joined to something. A pipe has two.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,26 +30,25 @@ from rlacd.solid.solid import Hole
 from rlacd.solid.topology import first_of_doubled, marked
 
 HOLE, HOLE_SHARE = 0.1, 0.02
-"""A nearly closed body, with holes of at most this share of its area, is closed with caps up to this far away: a scan
-with a few holes is meant as a solid, a cup is not. The caps are reported."""
+"""A body is closed if its caps lead at most this far away from the surface and have at most this share of its area: a
+scan with a few holes is meant as a solid, a cup is not. The caps are reported."""
 
-# The same share for the ends of a bar: it is four times as long as wide if one is open.
+# The same share for the one open end of a bar, which is then four times as long as wide.
 _END = 3 * HOLE_SHARE
-# A ring of more edges than this is a mouth, not a wound, if its corners lie on a circle to this accuracy.
+# A ring of more edges than this is a mouth, not damage, if its corners lie on a circle to this accuracy.
 _RING, _ROUND = 6, 0.1
-# The volume per area of a tube is half the radius of a hole at its end, to this accuracy; that of a bottle, which is
-# wider than its neck, is more, and that of folded sheets less.
+# A tube's volume per area is half the radius of the hole at its end, to this accuracy; a bottle, wider than its neck,
+# has more, and folded sheets have less.
 _TUBE = 2 * _ROUND
-# Limits on a wound's edges and on its share of the area of its body.
-_WOUND_EDGES, _WOUND = 2 * _RING, 5 * HOLE_SHARE
-# If there are this many wounds, the mesh is damaged.
+# Limits on the edges of damage and on its share of the area of its body.
+_DAMAGE_EDGES, _DAMAGE = 2 * _RING, 5 * HOLE_SHARE
+# A mesh is damaged if at least this many of its holes, and `_GOOD_PART` of them, are damage.
 _DAMAGED = 4
-# So much is a good part: of a wound's rim, along which its cap continues the faces; of all holes of a damaged mesh,
-# which are wounds.
+# Share of the rim along which the cap of damage continues the faces.
 _GOOD_PART = 0.3
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Hole:
     """One hole and the cap that would close it.
 
@@ -62,13 +60,14 @@ class _Hole:
         The first of the bodies that share it.
     share, of_all
         Area of its cap, and of all caps of its body, as shares of the body's.
-    depth, reached
-        How far the cap leads away from the surface: anywhere; where the ball can reach it, 0 if that is near.
-    is_smooth, is_ring, is_tube
-        Whether the cap continues the faces around it; whether it is a round ring; whether its body is a tube that ends
-        here.
-    is_end, is_wound
-        Whether it is an end of a bar; whether missing faces left it. Both depend on the other holes.
+    depth, reached, hidden
+        How far the cap leads away from the surface: anywhere; where the ball can, and cannot, reach it (0 if near).
+    is_smooth, is_ring
+        Whether the cap continues the faces around it; whether it is a round ring.
+    is_tube, is_end
+        Whether a tube ends here; whether it has no other hole, as a bar: a pipe has two.
+    is_damage
+        Whether missing faces left it.
     """
 
     loop: Int64Array
@@ -77,20 +76,34 @@ class _Hole:
     of_all: float
     depth: float
     reached: float
+    hidden: float
     is_smooth: bool
     is_ring: bool
     is_tube: bool
-    is_end: bool = False
-    is_wound: bool = False
+    is_end: bool
+    is_damage: bool = False
+
+    @property
+    def looks_damaged(self) -> bool:
+        """Whether it looks as if faces were missing: small, with few edges, and smooth or a single triangle."""
+        is_small = len(self.loop) <= _DAMAGE_EDGES and self.share <= _DAMAGE
+        return is_small and (self.is_smooth or len(self.loop) == 3)
+
+    def may_be_damage(self, is_damaged: bool) -> bool:
+        """Whether missing faces may have left it, in a mesh that is damaged or not."""
+        if not is_damaged:
+            return self.looks_damaged and not self.is_ring
+        is_harmless = self.share <= HOLE_SHARE or self.depth <= HOLE or self.is_smooth
+        return self.looks_damaged or (is_harmless and self.share <= _DAMAGE)
 
     def may_lead(self, depth: float) -> bool:
-        """Whether its cap may lead so far away from the surface where the ball can reach it."""
+        """Whether its cap may lead so far away from the surface."""
         is_no_mouth = self.is_smooth or not self.is_ring or self.is_tube
         is_small = is_no_mouth and self.of_all <= (_END if self.is_end else HOLE_SHARE)
-        return self.is_wound or (is_small and depth <= HOLE)
+        return self.is_damage or (is_small and depth <= HOLE)
 
     def described(self, is_closed: bool, vertices: FloatArray) -> Hole:
-        """What the report says of it."""
+        """The hole as the report lists it."""
         corners = vertices[self.loop]
         centre = corners.mean(axis=0)
         width = 2 * float(np.linalg.norm(corners - centre, axis=1).max())
@@ -99,7 +112,7 @@ class _Hole:
 
 
 class _Caps:
-    """The holes of a soup, their caps, and points of these."""
+    """The holes of a soup, the caps that would close them, and points spread over the caps."""
 
     def __init__(self, state: State, rims: Rims) -> None:
         soup, bodies = state.soup, state.bodies
@@ -118,56 +131,60 @@ class _Caps:
         spacing = affordable(self._gap / 2, float(cap_area.sum()))
         self._points, self._on = spread_points(soup.vertices, self._faces, spacing)
         self._distance, self._is_reached = self._looked_at()
-        self.holes = self._told_apart()
+        self.holes = self._classified()
 
     def _looked_at(self) -> tuple[FloatArray, BoolArray]:
         """The distance ``[N]`` of each point from the surface, and whether the ball can reach it."""
         gap, points = self._gap, self._points
-        # Corners lie on the surface, and how far points are matters only beyond a certain distance.
+        # Only points far from their face's corners are measured: corners lie on the surface.
         corners = self._soup.vertices[self._faces[self._on]]
         beyond = (np.linalg.norm(points[:, None] - corners, axis=2) > min(gap, HOLE)).all(axis=1)
         distance = np.zeros(len(points))
         distance[beyond] = self._state.surface.distance(points[beyond])
         is_reached = distance > gap
-        # If cavities are kept, everything connected to them is open.
+        # Where cavities are kept, balls start in them too, and every point counts as reached.
         if is_reached.any() and not self._fill and not self._state.wanted.keep_cavities:
             is_reached[is_reached] = self._state.reach.covers(points[is_reached])
         return distance, is_reached
 
     @cached_property
     def _volume(self) -> FloatArray:
-        """The volume ``[bodies]`` that all caps together would enclose, by the windings found."""
+        """The volume ``[bodies]`` that each body would enclose with all its caps."""
         soup, rims, own = self._soup, self._rims, self._body_of_hole[self._hole_of]
         sign = np.where(rims.inverted, -1, 1) * ~rims.flap
         volume = np.bincount(self._body, sign * signed_tetrahedra(soup.vertices, soup.faces), self._bodies)
         volume += np.bincount(own, signed_tetrahedra(soup.vertices, self._faces), self._bodies)
         return np.asarray(np.abs(volume))
 
-    def _told_apart(self) -> list[_Hole]:
-        """The holes, and what each of them is."""
+    def _classified(self) -> list[_Hole]:
+        """The holes, each with whether it is damage."""
+        holes = self._measured()
+        is_damaged = sum(hole.looks_damaged for hole in holes) >= max(_DAMAGED, _GOOD_PART * len(holes))
+        return [
+            replace(hole, is_damage=hole.may_be_damage(is_damaged) and not self._is_plugged(hole)) for hole in holes
+        ]
+
+    def _measured(self) -> list[_Hole]:
+        """The holes, each measured by itself."""
         loops, own, tiny = self._rims.loops, self._body_of_hole, np.finfo(float).tiny
         body_area = np.maximum(self._area[own], tiny)
         of_all = np.bincount(own, self._cap_area, self._bodies)[own]
         radius = np.sqrt(np.maximum(self._cap_area, tiny) / np.pi)
         is_tube = np.abs(self._volume[own] / body_area / radius - 0.5) <= _TUBE
-        depth, reached = np.zeros((2, len(loops)))
-        np.maximum.at(depth, self._hole_of[self._on], self._distance)
-        there = self._is_reached
-        np.maximum.at(reached, self._hole_of[self._on[there]], self._distance[there])
+        is_end = is_tube & (np.bincount(own)[own] == 1)
+        is_far, hole = self._distance > self._gap, self._hole_of[self._on]
+        depths = np.zeros((3, len(loops)))
+        for depth, some in zip(depths, (is_far | True, self._is_reached, is_far & ~self._is_reached), strict=True):
+            np.maximum.at(depth, hole[some], self._distance[some])
         smooth = smooth_share(self._soup, self._rims, self._faces, self._hole_of) >= _GOOD_PART
         ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
-        columns = (own, self._cap_area / body_area, of_all / body_area, depth, reached, smooth, ring, is_tube)
-        holes = [_Hole(*row) for row in zip(loops, *(column.tolist() for column in columns), strict=True)]
-        count = Counter(hole.body for hole in holes)
-        for hole in holes:
-            hole.is_end = hole.is_tube and count[hole.body] == 1  # a pipe has two
-        _find_wounds(holes)
-        for hole in holes:
-            hole.is_wound &= hole.depth <= self._gap or not self._is_plugged(hole)
-        return holes
+        columns = (own, self._cap_area / body_area, of_all / body_area, *depths, smooth, ring, is_tube, is_end)
+        return [_Hole(*row) for row in zip(loops, *(column.tolist() for column in columns), strict=True)]
 
     def _is_plugged(self, hole: _Hole) -> bool:
-        """Whether another body, such as a basin in a counter, lies all along a hole."""
+        """Whether the cap leads away from the surface, and another body, such as a basin, lies all along the hole."""
+        if hole.depth <= self._gap:
+            return False
         others = self._soup.faces[self._body != hole.body]
         corners = self._soup.vertices[hole.loop]
         middles = (corners + np.roll(corners, -1, axis=0)) / 2
@@ -191,8 +208,8 @@ class _Caps:
         owners = np.concatenate([np.where(whole, self._body, soup.body), own[some]])
         no_cap = np.zeros(int(some.sum()), dtype=bool)
         kept = first_of_doubled(faces, len(soup.vertices))
-        # Where more than two faces met before, which of them continue each other is a guess: caps did not cause that.
-        sure = whole & ~rims.flap & ~soup.at_valence(soup.edges.valence > 2)
+        # Where more than two faces met without caps, which of them continue each other is a guess.
+        sure = whole & ~rims.flap & ~soup.at_edges(soup.edges.face_count > 2)
         before = ~whole & (False if soup.trusted is None else soup.trusted)
         trusted = np.concatenate([sure | before, ~no_cap])
         flap = np.concatenate([rims.flap, no_cap])[kept]
@@ -210,27 +227,24 @@ class _Caps:
             has_inside[one] = not is_tangle(SurfaceQuery(closed.vertices, outward))
         return has_inside
 
-    def by_room(self) -> BoolArray:
-        """Return ``[bodies]`` the bodies with caps that may lead where they do only because nothing can reach them."""
-        hole = self._hole_of[self._on]
-        far = np.flatnonzero((self._distance > self._gap) & ~self._is_reached)
-        may = np.array([one.may_lead(HOLE) for one in self.holes])[hole[far]] & (self._distance[far] <= HOLE)
-        may |= np.array([one.is_wound for one in self.holes])[hole[far]]
-        return marked(self._body_of_hole[hole[far[~may]]], self._bodies)
+    def by_hidden_caps(self) -> BoolArray:
+        """Return ``[bodies]`` the bodies that are closed only because nothing can reach some of their caps."""
+        hidden = [hole.body for hole in self.holes if hole.hidden and not hole.may_lead(hole.hidden)]
+        return marked(np.array(hidden, dtype=np.int64), self._bodies)
 
     def bodies_of(self, chosen: BoolArray) -> Int64Array:
-        """The bodies that belong to chosen ones ``[bodies]``: all that share a hole."""
+        """The numbers of all bodies that share a hole with a chosen one ``[bodies]``."""
         return np.flatnonzero(chosen[self._joined])
 
     def described(self, chosen: BoolArray) -> list[Hole]:
         """The holes of chosen bodies ``[bodies]``, and those of bodies to which caps would give an inside."""
-        said = chosen | (self._volume > self._gap * self._area)  # with less it is a leaf or cloth
+        said = chosen | (self._volume > self._gap * self._area)  # less is a leaf or cloth
         return [one.described(bool(chosen[one.body]), self._soup.vertices) for one in self.holes if said[one.body]]
 
 
 def may_have_holes(state: State) -> bool:
     """Whether bodies have free edges, and may be closed."""
-    free = int((state.soup.edges.valence == 1).sum())
+    free = int((state.soup.edges.face_count == 1).sum())
     return 0 < free <= MOST_FREE_EDGES and state.wanted.open_bodies != "thin"
 
 
@@ -246,22 +260,10 @@ def close_holes(state: State) -> None:
     if (useful != chosen).any():
         closed, _ = caps.added(useful)
     state.note(caps.bodies_of(useful), "capped")
-    state.by_room |= useful & caps.by_room()
+    state.by_hidden_caps |= useful & caps.by_hidden_caps()
     state.holes = caps.described(useful)
     if useful.any():
         state.soup = closed
-
-
-def _find_wounds(holes: list[_Hole]) -> None:
-    """Mark those that missing faces left."""
-    for hole in holes:
-        has_few_edges = len(hole.loop) <= _WOUND_EDGES
-        hole.is_wound = has_few_edges and (hole.is_smooth or len(hole.loop) == 3) and hole.share <= _WOUND
-    is_damaged = sum(hole.is_wound for hole in holes) >= max(_DAMAGED, _GOOD_PART * len(holes))
-    for hole in holes:
-        is_harmless = hole.share <= HOLE_SHARE or hole.depth <= HOLE or hole.is_smooth
-        hole.is_wound |= is_damaged and is_harmless and hole.share <= _WOUND
-        hole.is_wound &= is_damaged or not hole.is_ring
 
 
 def _is_round(points: FloatArray) -> bool:

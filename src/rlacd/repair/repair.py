@@ -1,8 +1,8 @@
 """From any soup of triangles to one closed, oriented solid, by the least change that works.
 
 Input: an `InputMesh`. Output: a `Solid`, with the step that changed each body most. Equal vertices are merged,
-degenerate and doubled faces dropped. One closed body is taken as it is unless much of it is inside out. Everything else
-goes through `STEPS`, once.
+degenerate and doubled faces dropped. One closed body stays as it is unless largely inside out. All else goes through
+`STEPS`.
 
 The watertight-manifold algorithm of Huang et al. (2018) could replace most of them, but it grows every sheet by a voxel
 and turns a dozen exact faces into tens of thousands of approximate ones; these steps keep the faces of the input.
@@ -28,12 +28,12 @@ from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.wraps import (
-    fill_rooms,
     fill_slits,
+    fill_voids,
     is_crowd,
     is_inside_out,
-    may_have_rooms,
     may_have_slits,
+    may_have_voids,
     rebuild_tangles,
     wrap_all,
     wrap_sheets,
@@ -43,10 +43,10 @@ from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import BodyRepair, Solid
-from rlacd.solid.topology import NO_FILM, bodies_of, compacted, detach_films, marked
+from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, marked
 
 CELLS_ACROSS = 1.5
-"""Least radius of a ball, in cells of the grid that it rolls on."""
+"""Least radius of a ball, in cells of its grid."""
 
 
 def _always(state: State) -> bool:
@@ -55,7 +55,7 @@ def _always(state: State) -> bool:
 
 def _are_crowded(state: State) -> bool:
     """Whether more than two faces meet in an edge."""
-    return bool((state.soup.edges.valence > 2).any())
+    return bool((state.soup.edges.face_count > 2).any())
 
 
 def _sort_out(state: State) -> None:
@@ -100,16 +100,16 @@ STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (has_sheets, build_slabs),
     (_always, State.unite_parts),
     (is_inside_out, rebuild_tangles),
-    (may_have_rooms, fill_rooms),
+    (may_have_voids, fill_voids),
     (may_have_slits, fill_slits),
 )
-"""What is done, in this order, and when."""
+"""Conditions and actions of a repair, in their order."""
 
 AT_LAST: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (_is_nothing, _take_hull),
     (_always, _keep_lost),
 )
-"""What is done then, even if the bodies cross too often to be united."""
+"""The last ones, also where bodies cross too often to be united."""
 
 
 def repair(
@@ -128,7 +128,7 @@ def repair(
     mesh
         The loaded mesh.
     resolution
-        Cells along the longest side of the grid on which enclosed rooms are searched.
+        Cells along the longest side of the grid on which voids are searched.
     open_bodies
         ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else it
         is a shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are
@@ -152,7 +152,7 @@ def repair(
     EmptyMeshError
         There are no points.
     Stopped
-        There is no time left: `rlacd.solid.cover` needs next to none.
+        The run ended before the repair; `rlacd.solid.cover` takes next to no time.
     """
     poll_stop()
     points, corners = compacted(mesh.vertices, mesh.faces) if len(mesh.faces) else (mesh.vertices, mesh.faces)
@@ -176,18 +176,18 @@ def _repaired(
     """Repair the vertices and faces of a mesh in its frame."""
     points, corners = soup
     poll_stop()
-    welded_vertices, welded_faces, is_film = _native.weld(points, corners)
+    welded_vertices, welded_faces, is_sliver = _native.weld(points, corners)
     taken = one_body(welded_vertices, welded_faces)
     if taken is not None and not (len(corners) <= DENSE and is_tangle(query_of(taken[0], threads))):
         shape, was_inward = taken
         row = BodyRepair(0, "reoriented" if was_inward else "closed", len(welded_faces), len(welded_faces), 0.0)
         return Solid(shape, (welded_vertices, welded_faces), frame, (row,), mesh.warnings, is_as_given=True)
     require_memory(len(welded_faces), BYTES_REPAIRED, mesh.name)
-    vertices, faces = detach_films(welded_vertices, welded_faces.astype(np.int64), is_film)
+    vertices, faces = detach_slivers(welded_vertices, welded_faces.astype(np.int64), is_sliver)
     detached = np.asarray(faces[:, 0] >= len(welded_vertices))
     faces = faces[~_is_inside(vertices, faces, detached, threads)]
     surface = (vertices, faces.astype(np.int32))
-    if len(faces) == 0 or face_areas(vertices, faces).max() < NO_FILM:
+    if len(faces) == 0 or face_areas(vertices, faces).max() < NO_AREA:
         what = "edges" if len(mesh.specks) else "points"
         said = f"No face has an area, so the convex hull of all {what} is used instead."
         solid = hull_of_points(points)
@@ -211,13 +211,13 @@ def _take_steps(state: State) -> None:
             step(state)
 
 
-def _is_inside(vertices: FloatArray, faces: Int64Array, film: BoolArray, threads: int | None) -> BoolArray:
-    """Return ``[F]`` which films lie inside the other faces: where two bodies touch."""
-    inside = film.copy()
-    if film.any():
-        query = SurfaceQuery(vertices, faces[~film], threads)
-        still = np.ones(int(film.sum()), dtype=bool)
-        for points in probes(vertices, faces[film]).swapaxes(0, 1):  # most films fail at the first
+def _is_inside(vertices: FloatArray, faces: Int64Array, sliver: BoolArray, threads: int | None) -> BoolArray:
+    """Return ``[F]`` which slivers lie inside the other faces: where two bodies touch."""
+    inside = sliver.copy()
+    if sliver.any():
+        query = SurfaceQuery(vertices, faces[~sliver], threads)
+        still = np.ones(int(sliver.sum()), dtype=bool)
+        for points in probes(vertices, faces[sliver]).swapaxes(0, 1):  # most slivers fail at the first
             still[still] = np.abs(query.winding(points[still])) > 0.75
-        inside[film] = still
+        inside[sliver] = still
     return inside

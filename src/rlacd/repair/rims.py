@@ -1,15 +1,13 @@
-"""Open boundaries of a surface: flaps, as opposed to the surface they stick to, the loops of edges around holes, and
-caps for these.
+"""Open boundaries of a surface: flaps that stick to it, the loops of edges around its holes, and caps for these.
 
 Input: a soup. Output: its flaps, loops of vertices around its holes, and triangles that close these without new
 vertices; nothing is decided or changed here.
 
-Faces are mated across edges: if two share an edge, with each other; if more do, those that continue each other best.
-Faces connected by mates form a patch, and all faces of a patch are wound alike, whatever the file says. A small patch
-attached to others by edges that those mate without it is a flap, as is a flat one of any size with one loop around it:
-its free edges bound no hole. At a vertex where several holes meet, a loop turns from a free edge to the next one across
-the hole, so loops never run around existing faces. An island that touches its hole's rim at a vertex joins that hole's
-loop, which visits the vertex twice.
+Two faces that share an edge are mates; where more share it, those that continue each other best. Faces connected by
+mates form a patch, and all faces of a patch are wound alike, whatever the file says. A flap is a small patch attached
+to others at edges that these mate without it, or a flat patch within one loop: its free edges bound no hole. At a
+vertex where several holes meet, a loop turns from a free edge to the next one across the hole, so loops never run
+around existing faces. An island that touches its hole's rim joins that hole's loop, which visits the vertex twice.
 """
 
 from __future__ import annotations
@@ -66,8 +64,8 @@ def rims_of(soup: Soup) -> Rims:
     weighted[flap] = 0
     rim = np.flatnonzero((mate < 0) & np.repeat(~flap, 3))
     tail, follower = _continued(soup, mate, rim, inverted[rim // 3], weighted)
-    # Faces between bodies are open at free edges; a hole is free all around, or nearly.
-    free = soup.edges.valence[soup.edges.of_halfedge[rim]] == 1
+    # Most edges around a hole are free: a loop of edges that touch other bodies bounds none.
+    free = soup.edges.face_count[soup.edges.of_halfedge[rim]] == 1
     loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
     return Rims([tail[loop] for loop in loops], [rim[loop] // 3 for loop in loops], normals, inverted, flap)
@@ -93,7 +91,7 @@ def _continued(
 ) -> tuple[Int64Array, Int64Array]:
     """Return the vertex ``[N]`` where each free halfedge begins, seen from outside, and the one that continues it.
 
-    Halfedges of faces that are wound the other way are to be swapped; normals ``[F, 3]`` are as long as areas.
+    `swap` marks halfedges of inverted faces; the normals ``[F, 3]`` are as long as areas.
     """
     corners, following = soup.faces.ravel(), rim - rim % 3 + _NEXT[rim % 3]
     tail, head = corners[rim], corners[following]
@@ -133,17 +131,17 @@ def _mates(soup: Soup) -> Int64Array:
     """Return ``[3F]`` the halfedge that continues each across its edge, -1 for none."""
     edge = soup.edges
     mate = np.full(3 * len(soup.faces), -1, dtype=np.int64)
-    first, last = edge.halfedges[:, edge.valence == 2]
+    first, last = edge.halfedges[:, edge.face_count == 2]
     mate[first], mate[last] = last, first
-    valence = edge.valence[edge.of_halfedge]
-    if (valence <= 2).all():
+    face_count = edge.face_count[edge.of_halfedge]
+    if (face_count <= 2).all():
         return mate
-    order = np.flatnonzero(valence > 2)
+    order = np.flatnonzero(face_count > 2)
     order = order[np.argsort(edge.of_halfedge[order], kind="stable")]
-    valence = valence[order]
-    free = soup.at_valence(edge.valence == 1)
-    for number in np.unique(valence).tolist():
-        around = order[valence == number].reshape(-1, number)
+    face_count = face_count[order]
+    free = soup.at_edges(edge.face_count == 1)
+    for number in np.unique(face_count).tolist():
+        around = order[face_count == number].reshape(-1, number)
         away = across(soup.vertices, soup.faces, around.ravel()).reshape(-1, number, 3)
         folded = dots(away[:, :, None], away[:, None])
         # A flap attached to the others has free edges.
@@ -164,8 +162,8 @@ def _flaps(soup: Soup, patch: Int64Array) -> BoolArray:
     """Return ``[F]`` whether a face belongs to a small patch with free edges that is attached to other patches."""
     count = int(patch.max(initial=-1)) + 1
     hangs, free = (
-        np.bincount(patch[soup.at_valence(some)], minlength=count) > 0
-        for some in (soup.edges.valence > 2, soup.edges.valence == 1)
+        np.bincount(patch[soup.at_edges(some)], minlength=count) > 0
+        for some in (soup.edges.face_count > 2, soup.edges.face_count == 1)
     )
     small = np.bincount(patch, soup.area, count)[patch] <= FLAPS * np.bincount(soup.body, soup.area)[soup.body]
     return np.asarray(small & hangs[patch] & free[patch])

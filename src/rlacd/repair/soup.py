@@ -10,19 +10,19 @@ import numpy as np
 from rlacd._native import components, face_areas, long_normals, poll_stop
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.hull import TOLERANCE
-from rlacd.solid.topology import NO_FILM, Edges, Sides, has_marked, is_balanced, marked, sides_of
+from rlacd.solid.topology import NO_AREA, Edges, Sides, has_marked, is_balanced, marked, sides_of
 
 FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
 
 FLAPS = 0.05
-"""A solid may have a few faces sticking out of it, up to this share of its area, beside flaps."""
+"""Greatest share of a solid's area that faces sticking out of it may have, flaps not counted."""
 
 MOST_UNITED = 4000
-"""Uniting takes time per mesh even without overlaps; above this number, disjoint meshes are composed instead."""
+"""Most meshes united: more are composed, since uniting takes time for each even if none overlap."""
 
-# Sheets of a body are thickened one by one if there are at most so many, and they are no layers: of a body with more
-# faces than are united, each lies in the boxes of more than so many sheets, on average. Layers take minutes to unite.
+# Most sheets of a body that are thickened one by one; and average number of sheets in whose boxes a face lies above
+# which a body of more than `MOST_UNITED` faces is layers, which would take minutes to unite.
 MOST_PATCHES, _LAYERS = 100, 1.5
 # Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
 _FOLD = 0.94
@@ -30,10 +30,9 @@ _FOLD = 0.94
 
 @dataclass(frozen=True)
 class Soup:
-    """Faces during the repair steps; `body` numbers the body of each, from the input to the end.
+    """Faces during repair; `body` ``[F]`` is the body of each, by numbers that stay the same throughout.
 
-    The windings of `trusted` faces have been checked and corrected. `known_edges` are those of the faces, if they have
-    been collected already.
+    The windings of `trusted` faces have been checked and corrected. `known_edges` are those of the faces, if known.
     """
 
     vertices: FloatArray
@@ -57,8 +56,8 @@ class Soup:
         """Areas of the faces [F]."""
         return face_areas(self.vertices, self.faces)
 
-    def at_valence(self, marked: BoolArray) -> BoolArray:
-        """Return ``[F]`` whether a face has an edge of marked valence, given ``[E]`` marks."""
+    def at_edges(self, marked: BoolArray) -> BoolArray:
+        """Return ``[F]`` whether a face has a marked edge, given ``[E]`` marks."""
         return has_marked(marked, self.edges.of_halfedge.reshape(-1, 3))
 
     @cached_property
@@ -71,7 +70,7 @@ class Soup:
     def sheet_share(self, bodies: int, flap: BoolArray | bool = False) -> FloatArray:
         """Return ``[bodies]`` the share of the area of each body that has no inside and is no flap."""
         sheet = np.bincount(self.body, self.area * (self.sides.sheet & ~np.asarray(flap)), bodies)
-        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_FILM)
+        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
         return share
 
     def in_patches(self) -> Soup:
@@ -81,7 +80,7 @@ class Soup:
         others, or face both ways, no vertex would be left to give it thickness.
         """
         halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
-        halfedge = halfedge[self.edges.valence[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
+        halfedge = halfedge[self.edges.face_count[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
         away = [across(self.vertices, self.faces, some) for some in halfedge.T]
         poll_stop()
         halfedge = halfedge[dots(*away) < _FOLD]
@@ -121,11 +120,11 @@ def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> S
     flap
         Faces ``[F]`` that need no inside.
     """
-    is_crowded = soup.edges.valence > 2
+    is_crowded = soup.edges.face_count > 2
     if not is_crowded.any():
         return soup
-    crowded = marked(soup.body[soup.at_valence(is_crowded)], bodies)
-    uneven = marked(soup.body[soup.at_valence(~is_balanced(soup.faces, soup.edges))], bodies)
+    crowded = marked(soup.body[soup.at_edges(is_crowded)], bodies)
+    uneven = marked(soup.body[soup.at_edges(~is_balanced(soup.faces, soup.edges))], bodies)
     if not (crowded & ~uneven).any():
         return soup
     share = soup.sheet_share(bodies, flap)

@@ -1,4 +1,4 @@
-"""What is known of an input, and of the repairs of its bodies, while the steps of repair turn it into one solid."""
+"""The state of a repair: the input, and what the steps so far have made of its bodies."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ _WELDS = (2e-5, 5e-4)
 # A warning names this many holes.
 _NAMED = 5
 
-# Share of the solid's volume that filled cavities have to have for a word: crevices where walls meet, up to hundreds in
-# a mesh, have up to 0.0005, rooms from 0.0024.
+# Filled cavities are reported from this share of the solid's volume on: crevices where walls meet, up to hundreds in a
+# mesh, have up to 0.0005, rooms from 0.0024.
 _CREVICES = 1e-3
 
 
@@ -45,7 +45,7 @@ class Wanted:
     open_bodies : str
     gap : float
     cells : int
-        Along the longest side of the grid on which a ball of this radius rolls.
+        Cells along the longest side of the grid on which a ball of radius `gap` rolls.
     keep_cavities : bool
     """
 
@@ -90,19 +90,19 @@ class State:
     step : int64 [bodies]
         The step that changed a body most, an index of `OUTCOMES`.
     beyond, lost : float64 [bodies]
-        Greatest distance of the repaired surface from the input's, and of the input's outside the solid from it.
+        Greatest distance of the repaired surface from the input, and of input outside the solid from the solid.
     soup : Soup
-        Its faces, with the caps.
+        The faces of the input, with the caps.
     sheets : Soup
-        Those of them that become slabs, in patches.
+        The faces that become slabs, in patches.
     parts : list of Piece
-        What was built so far.
+        The solids built so far.
     solid : Manifold or (vertices, faces)
-        Their union, but for cavities.
+        The union of `parts`, with cavities filled or kept.
     cavities : Cavities
-        Those of them that windings bound and that were filled.
-    by_room, is_tangled : bool [bodies]
-        Whether a body was capped only because nothing can reach the caps; was built from the place of its faces alone.
+        Filled cavities that windings bound.
+    by_hidden_caps, is_tangled : bool [bodies]
+        Whether a body was capped only because nothing can reach the caps; whether it was built without its windings.
     holes : list of Hole
     warnings : list of str
     """
@@ -124,7 +124,7 @@ class State:
         self.parts: list[Piece] = []
         self.solid: Shape = Manifold()
         self.cavities = Cavities()
-        self.by_room, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
+        self.by_hidden_caps, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
         self.holes: list[Hole] = []
         self.warnings: list[str] = []
         self._asked: tuple[Shape, SurfaceQuery] | None = None
@@ -242,7 +242,7 @@ class State:
 
 
 def measure(state: State) -> Int64Array:
-    """Record, for the changed bodies, how far the solid and the input deviate; returns faces that lead out of it."""
+    """Record how far the solid and changed bodies deviate; returns the input's faces that lead out of the solid."""
     surface, solid = state.surface, state.query()
     if state.step.max() < OUTCOMES.index("outer skin"):
         return np.empty(0, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Solids as they are handed on, and their union: overlapping ones united, enclosed cavities filled."""
+"""Forms of solids, and their union: overlapping ones united, enclosed cavities filled."""
 
 from __future__ import annotations
 
@@ -49,8 +49,7 @@ def to_arrays(solid: Shape) -> tuple[FloatArray, Int64Array]:
 def one_body(vertices: FloatArray, faces: IntArray) -> tuple[tuple[FloatArray, IntArray], bool] | None:
     """One closed and oriented body as it is, and whether it was wound inside out; None for anything else.
 
-    The vertices and faces are those that manifold3d would make of it, in its order, as long as it would leave all edges
-    alone; it takes twenty times as long.
+    Where manifold3d moves no edge, it makes the same vertices and faces in the same order, in twenty times the time.
     """
     found = _native.closed_bodies(vertices, faces)
     if found is None:
@@ -123,7 +122,7 @@ class Cavities:
     ----------
     count : int
     walls : (vertices, faces), optional
-        What was dropped to fill them, as it was wound: with the faces of the filled solid, the surface that was there.
+        The faces dropped to fill them, as they were wound: with those of the filled solid, the surface before.
     """
 
     count: int = 0
@@ -140,7 +139,7 @@ def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Shape:
 
 
 def unite_and_fill(solids: Sequence[Shape]) -> tuple[Shape, Cavities]:
-    """Unite solids and fill the cavities nothing can reach; one that is no manifold has none (`one_body`).
+    """Unite solids and fill the cavities that nothing can reach; one given as arrays has none (`one_body`).
 
     Raises
     ------
@@ -168,15 +167,14 @@ def _all_united(solids: Sequence[Shape]) -> Shape:
 
 
 def hollowed(shapes: Sequence[Shape], inward: Sequence[bool]) -> Sequence[Shape]:
-    """Cut out of solids the cavities that others of them bound; what stands in a cavity stays.
+    """Cut cavities out of solids where others, wound inside out, bound them; what stands in a cavity stays.
 
     Parameters
     ----------
     shapes : sequence of Manifold or (vertices, faces)
         Each with positive volume.
     inward : sequence of bool
-        Which of them the input winds inside out. A solid is a cavity if it is wound opposite to the outermost solid
-        around it.
+        Which of them the input winds inside out: cavities are wound opposite to the outermost solid around them.
 
     Returns
     -------

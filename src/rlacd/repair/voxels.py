@@ -19,8 +19,7 @@ from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.frame import ROUNDING
 
 DEFAULT_GAP = 0.03
-"""Greatest distance of a cap from the input's surface, and the radius of the ball a gap must stop, in frame units, by
-default."""
+"""Default radius of the ball, and greatest distance of a cap from the input's surface, in the frame."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,8 @@ class Reach:
         ``[X, Y, Z]``, cells the ball can cover.
     occupied
         ``[X, Y, Z]``, cells of the surface.
-    room
-        ``[X, Y, Z]``, label of every connected set of cells where the ball fits but which it cannot enter; 0 elsewhere.
+    void
+        ``[X, Y, Z]``, label of each void: connected cells where the ball fits but which it cannot enter; 0 elsewhere.
     """
 
     origin: FloatArray
@@ -48,7 +47,7 @@ class Reach:
     radius: float
     reached: BoolArray
     occupied: BoolArray
-    room: Int64Array
+    void: Int64Array
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: Int64Array, radius: float, resolution: int) -> Reach:
@@ -61,8 +60,8 @@ class Reach:
         label = label_cells(~_grown(occupied, radius / pitch)).reshape(occupied.shape)
         outside = label == label[0, 0, 0]
         reached = _grown(outside, radius / pitch)
-        room = np.where(outside, 0, label)
-        return cls(origin, pitch, radius, reached, occupied, room)
+        void = np.where(outside, 0, label)
+        return cls(origin, pitch, radius, reached, occupied, void)
 
     def covers(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
@@ -71,34 +70,34 @@ class Reach:
     def _cells(self, points: FloatArray) -> Int64Array:
         """The cells ``[N, 3]`` of points, nearest ones for those off the grid."""
         cells = np.rint((points - self.origin) / self.pitch).astype(np.int64)
-        return np.clip(cells, 0, np.array(self.room.shape) - 1)
+        return np.clip(cells, 0, np.array(self.void.shape) - 1)
 
-    def rooms_outside(self, rooms: Int64Array, solid: SurfaceQuery) -> Int64Array:
-        """Return the cells ``[N]`` of some rooms that lie outside a solid: of every fourth one along each axis."""
-        cells = np.flatnonzero(np.isin(self.room, rooms))
-        at = np.stack(np.unravel_index(cells, self.room.shape), axis=1)
+    def voids_outside(self, voids: Int64Array, solid: SurfaceQuery) -> Int64Array:
+        """Return cells ``[N]`` of `voids` that lie outside a solid, of one in four cells."""
+        cells = np.flatnonzero(np.isin(self.void, voids))
+        at = np.stack(np.unravel_index(cells, self.void.shape), axis=1)
         some = at.sum(axis=1) % 4 == 0  # some in each layer of cells
         outside: Int64Array = cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
         return outside
 
-    def volumes(self, rooms: Int64Array) -> FloatArray:
-        """Return the volume of the cells of each of some rooms: where the ball's centre may be."""
-        return np.asarray(np.bincount(self.room.ravel())[rooms] * self.pitch**3)
+    def volumes(self, voids: Int64Array) -> FloatArray:
+        """Return the volume of each of `voids`, as far as the ball's centre can be there."""
+        return np.asarray(np.bincount(self.void.ravel())[voids] * self.pitch**3)
 
     def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
         """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
-        reached = self.reached.astype(self.room.dtype)
+        reached = self.reached.astype(self.void.dtype)
         return np.asarray(nearest_labels(reached, self._cells(points), depth / self.pitch + ROUNDING) == 0)
 
-    def rooms_near(self, points: FloatArray) -> Int64Array:
-        """Return ``[N]`` the label of a room whose walls may contain each point, 0 for none."""
-        return nearest_labels(self.room, self._cells(points), self.radius / self.pitch + 2 + ROUNDING)
+    def voids_near(self, points: FloatArray) -> Int64Array:
+        """Return ``[N]`` the label of a void whose walls may contain each point, 0 for none."""
+        return nearest_labels(self.void, self._cells(points), self.radius / self.pitch + 2 + ROUNDING)
 
     def around_cells(self, cells: Int64Array) -> BoolArray:
-        """Return ``[X, Y, Z]`` the unreachable cells of rooms at and between some cells, and of their walls there."""
-        mark = np.zeros(self.room.shape, dtype=bool)
+        """Return ``[X, Y, Z]`` the unreachable cells of voids at and between some cells, and of their walls there."""
+        mark = np.zeros(self.void.shape, dtype=bool)
         mark.ravel()[cells] = True
-        between = _grown(mark, 2) & (self.room > 0)
+        between = _grown(mark, 2) & (self.void > 0)
         return _grown(between, self.radius / self.pitch + 2) & ~self.reached
 
     def around_points(self, points: FloatArray) -> BoolArray:
@@ -158,7 +157,7 @@ def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, Int64Array]:
     squares = []
     for axis in range(3):
         ends = np.diff(solid.astype(np.int8), axis=axis, prepend=0, append=0)
-        for outward in (-1, 1):  # what ends shows upwards, what begins downwards
+        for outward in (-1, 1):  # -1: the set ends there, so its squares face up; 1: it begins
             at = np.unravel_index(np.flatnonzero(ends == outward), ends.shape)
             corner, along = np.ravel_multi_index(at, shape), (steps[(axis + 1) % 3], steps[(axis + 2) % 3])
             loop = np.array([(0, 0), (1, 0), (1, 1), (0, 1)][::-outward]) @ along

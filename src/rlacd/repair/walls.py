@@ -1,8 +1,7 @@
-"""Solids from the faces of bodies: skins of what has an inside, exactly as it is, slabs of sheets.
+"""Solids from the faces of bodies: exact skins of what has an inside, slabs of sheets.
 
 Every fan of corners that meets at a vertex within one region of space becomes a separate vertex, so surfaces that
-merely touch at a vertex or an edge come apart. Fans on a sheet are moved away from it; the free edges of sheets get a
-rim.
+merely touch at a vertex or an edge come apart. Fans on a sheet move away from it; free edges of sheets get a rim.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import numpy as np
 
 from rlacd._native import angles, components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
-from rlacd.repair.soup import FLAT, Soup, on_repeated_edge
+from rlacd.repair.soup import FLAT, Soup, face_normals, on_repeated_edge
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
@@ -71,7 +70,7 @@ def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup
 
     state.note(soup.body[solid[back] & wall], "reoriented")
     state.note(soup.body[~wall & ~sheet], "outer skin")
-    state.note(soup.body[soup.at_valence(soup.edges.valence > 2)], "outer skin")
+    state.note(soup.body[soup.at_edges(soup.edges.face_count > 2)], "outer skin")
     state.note(soup.body[sheet], "slab")
     poll_stop()
     mixed = np.bincount(soup.body[sheet], minlength=state.bodies) > 0
@@ -100,13 +99,13 @@ def skins(soup: Soup) -> list[Piece]:
 
 
 def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int64Array, Int64Array]:
-    """Build side components; those that pass an edge twice from their insides.
+    """Build side components; a skin that passes an edge twice is built from its insides.
 
-    Where parts touch along an edge, their common outer skin passes the edge twice. Their insides are simple: those are
-    built, turned inside out, and the union joins them.
+    Where parts touch along an edge, their common outer skin passes the edge twice. The skins of their insides do not:
+    these are built, turned around, and joined by the union.
     """
     vertices, faces, label = _skin(soup, keep, flat)
-    if not (soup.edges.valence > 2).any():
+    if not (soup.edges.face_count > 2).any():
         return vertices, faces, label
     sides, bodies = soup.sides, int(soup.body.max()) + 1
     pinched = marked(soup.body_of_side[label[on_repeated_edge(faces, len(vertices))]], bodies)
@@ -116,14 +115,14 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     if not pinched.any():
         return vertices, faces, label
     at = pinched[soup.body_of_side]
-    rooms = at & (sides.volume < -FLAT * sides.area)
-    vertices, faces, label = _skin(soup, (keep & ~at) | rooms, flat)
-    faces[rooms[label]] = faces[rooms[label]][:, ::-1]
+    insides = at & (sides.volume < -FLAT * sides.area)
+    vertices, faces, label = _skin(soup, (keep & ~at) | insides, flat)
+    faces[insides[label]] = faces[insides[label]][:, ::-1]
     return vertices, faces, label
 
 
 def _solid(soup: Soup, mesh: tuple[FloatArray, Int64Array], side: int, is_thin: bool) -> Shape:
-    """A side component as a solid; sheets narrower than they become thick can cross themselves and be inside out."""
+    """A side component as a solid; a sheet narrower than thick may come out inside out: it is built face by face."""
     solid = to_manifold(*mesh)
     if is_thin and volume_of(solid) <= 0:
         some = (soup.sides.label.reshape(-1, 2) == side).any(axis=1)
@@ -182,7 +181,7 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
 
 
 def _corners_at(faces: Int64Array, halfedge: Int64Array, slot: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """Slots of the corners of sides at the smaller and the larger end of halfedges, given where those of each begin."""
+    """Slots of the corners at the smaller and the larger end of halfedges; `slot` is the first of each side."""
     face, here = np.divmod(halfedge, 3)
     there = (here + 1) % 3
     forward = faces[face, here] < faces[face, there]
@@ -194,8 +193,7 @@ def _rims(
 ) -> tuple[Int64Array, Int64Array, Int64Array]:
     """Close rims: the faces ``[M, 3]``, their labels, and for every new vertex (from `number` on) a fan at its place.
 
-    A rim edge runs from low to high; its face shows one side to the wedge's beginning, fans ``low[0]`` and ``high[0]``,
-    and the other to its end.
+    A rim edge runs from low to high; one side of its face is at the wedge's beginning (fans ``[0]``), one at its end.
     """
     quads = [np.stack([high[0], low[0], low[1]], axis=1), np.stack([high[0], low[1], high[1]], axis=1)]
     caps, cap_label, centers = _rim_caps(
@@ -210,33 +208,26 @@ def _rims(
 def _fan_offsets(
     vertices: FloatArray, corners: Int64Array, back: BoolArray, thin: BoolArray, fan: Int64Array, number: int
 ) -> FloatArray:
-    """Direction ``[number, 3]`` that leaves every face of a fan at speed 1; zero for fans without a sheet."""
-    a, b, c = (vertices[corners[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
-    normal[back] *= -1
-    poll_stop()
-    weight = np.empty((len(corners), 3))
-    for i, (p, q, r) in enumerate(((a, b, c), (b, c, a), (c, a, b))):
-        poll_stop()
-        along, across = q - p, r - p
-        weight[:, i] = angles(np.linalg.norm(np.cross(along, across), axis=1), dots(along, across))
-    poll_stop()
-    corner_normal = np.repeat(normal, 3, axis=0)
-    total = np.stack([np.bincount(fan, weight.ravel() * corner_normal[:, k], number) for k in range(3)], axis=1)
-    poll_stop()
+    """Return the way ``[number, 3]`` of each fan that leads 1 off all its faces; zero for fans without a sheet."""
+    normal = np.repeat(face_normals(vertices, corners) * np.where(back, -1, 1)[:, None], 3, axis=0)
+    angle = _corner_angles(vertices[corners])
+    total = np.stack([np.bincount(fan, angle * normal[:, k], number) for k in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean = np.where(length > 1e-6, total / np.maximum(length, np.finfo(float).tiny), 0.0)
     # The miter: far enough along the mean normal to be at distance 1 from the steepest face that has a direction.
-    cosine = np.where(weight.ravel() > 0, dots(corner_normal, mean[fan]), 1.0)
-    poll_stop()
     steepest = np.ones(number)
-    np.minimum.at(steepest, fan, cosine)
-    poll_stop()
+    np.minimum.at(steepest, fan, np.where(angle > 0, dots(normal, mean[fan]), 1.0))
     sees_sheet = np.bincount(fan, np.repeat(thin, 3), number) > 0
-    speed = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
-    offsets: FloatArray = mean * speed[:, None]
-    return offsets
+    far = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
+    return np.asarray(mean * far[:, None])
+
+
+def _corner_angles(points: FloatArray) -> FloatArray:
+    """Return ``[3 F]`` the angle at each corner of triangles ``[F, 3, 3]``."""
+    poll_stop()
+    along, across = (np.roll(points, -k, axis=1) - points for k in (1, 2))
+    sines = np.linalg.norm(np.cross(along, across), axis=2)
+    return np.asarray(angles(sines.ravel(), dots(along, across).ravel()))
 
 
 def _rim_caps(

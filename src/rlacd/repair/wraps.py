@@ -1,4 +1,4 @@
-"""Wraps: what only a ball can tell from a solid is closed on a grid and projected onto the surface."""
+"""Wraps: space that a ball cannot reach, closed on a grid and projected onto the surface."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
-# A room of an outer skin is filled from this share of the solid's volume on, slits up to it: rooms in furniture have
-# 0.04 and more, crevices at most 0.0023.
+# Least share of the solid's volume of a void of an outer skin that is filled, and greatest of slits: voids in furniture
+# have 0.04 and more, crevices at most 0.0023.
 _SLIT_VOLUME = 0.01
-# A slit is filled from this depth on, up to this width (multiples of the gap): what is shallower needs no cut, and what
-# is wider leaves steps of the grid. Between caps it may be wider, as in a fridge whose bodies close each other. It may
-# have no volume, but this share of the surface has to go with the slits.
+# Least depth of a slit that is filled, and its greatest width, elsewhere and between caps, as in a fridge whose bodies
+# close each other (multiples of the gap): what is shallower needs no cut, and what is wider leaves steps of the grid.
+# Filling has to remove the last share of the surface.
 _DEEP, _BESIDE, _BETWEEN_CAPS, _BARED = 1.5, 1 / 16, 1 / 4, 0.004
-# Noise leaves slits between walls of dense bodies that touch, full of bridges: a union with so many tunnels has them.
+# A union with more tunnels has slits full of bridges: noise leaves them where walls of dense bodies touch.
 _TUNNELS = 25
-# Where a filled room has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
-# the corpus with filled rooms, those that meet this have 0.73 of the hulls without filling, the others 1.04.
+# Where a filled void has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
+# the corpus with filled voids, those that meet this have 0.73 of the hulls without filling, the others 1.04.
 _TRIANGLES = 0.05
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
 # are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
@@ -106,24 +106,24 @@ def rebuild_tangles(state: State) -> None:
     )
 
 
-def may_have_rooms(state: State) -> bool:
-    """Whether faces that do not touch each other may enclose rooms that the ball cannot enter."""
+def may_have_voids(state: State) -> bool:
+    """Whether faces that do not touch each other may enclose voids that the ball cannot enter."""
     return _may_fill(state) and any(_is_large(state, walls) for walls in _walls(state))
 
 
 def _walls(state: State) -> tuple[Soup, Soup]:
-    """What may be walls of rooms: sheets and caps that nothing can reach; outer skins."""
-    sheets = (state.has("slab") | state.by_room) & ~state.is_tangled
+    """Faces that may be walls of voids: sheets and caps that nothing can reach; outer skins."""
+    sheets = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
     return state.of_bodies(sheets), state.of_bodies(state.has("outer skin") & ~state.is_tangled)
 
 
-def fill_rooms(state: State) -> None:
-    """Fill rooms with openings too narrow for the ball: all rooms that sheets enclose, large ones in outer skins."""
+def fill_voids(state: State) -> None:
+    """Fill voids with openings too narrow for the ball: all voids that sheets enclose, large ones in outer skins."""
     reach = state.reach
-    (in_sheets, body), (in_shells, _) = (_rooms_near(state, walls) for walls in _walls(state))
+    (in_sheets, body), (in_shells, _) = (_voids_near(state, walls) for walls in _walls(state))
     large = np.unique(in_shells)
     large = large[reach.volumes(large) >= _SLIT_VOLUME * state.volume]
-    cells = reach.rooms_outside(np.setdiff1d(np.union1d(in_sheets, large), 0), state.query())
+    cells = reach.voids_outside(np.setdiff1d(np.union1d(in_sheets, large), 0), state.query())
     if len(cells) == 0:
         return
     wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
@@ -131,18 +131,18 @@ def fill_rooms(state: State) -> None:
     triangles = size_of(filled) / size_of(state.solid)
     if volume_of(filled) <= state.volume or area_of(filled) * triangles**_TRIANGLES >= area_of(state.solid):
         return
-    wrapped = np.unique(body[np.isin(in_sheets, reach.room.ravel()[cells])])
+    wrapped = np.unique(body[np.isin(in_sheets, reach.void.ravel()[cells])])
     state.note(wrapped, "wrapped")
     state.solid = filled
     state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
 
 
-def _rooms_near(state: State, walls: Soup) -> tuple[Int64Array, Int64Array]:
-    """The rooms that points of faces may be walls of, 0 for none, and the body of each point."""
-    if not state.reach.room.any() or not _is_large(state, walls):
+def _voids_near(state: State, walls: Soup) -> tuple[Int64Array, Int64Array]:
+    """For points of faces, the void whose wall each may be, 0 for none, and its body."""
+    if not state.reach.void.any() or not _is_large(state, walls):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
-    return state.reach.rooms_near(points).astype(np.int64), walls.body[on]
+    return state.reach.voids_near(points).astype(np.int64), walls.body[on]
 
 
 def may_have_slits(state: State) -> bool:
@@ -154,7 +154,7 @@ def may_have_slits(state: State) -> bool:
 
 def _with_slits(state: State) -> BoolArray:
     has = state.has
-    return (has("outer skin") | has("wrapped") | state.by_room) & ~state.is_tangled
+    return (has("outer skin") | has("wrapped") | state.by_hidden_caps) & ~state.is_tangled
 
 
 def fill_slits(state: State) -> None:
@@ -192,7 +192,7 @@ def _is_large(state: State, walls: Soup) -> bool:
 
 
 def _wrapped(state: State, soup: Soup) -> Manifold:
-    """What the ball cannot reach from outside some faces."""
+    """A solid of all that the ball cannot reach from outside some faces."""
     reach = Reach.of(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
     faces = SurfaceQuery(soup.vertices, soup.faces, state.surface.threads)
     return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)

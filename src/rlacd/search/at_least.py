@@ -2,8 +2,8 @@
 
 Every hull of a valid decomposition keeps its surface within a reach of the solid. A hull that holds two points holds
 the segment between them. If the segment meets the exterior, from where a path leads to infinity farther from the solid
-than the reach, the path leaves the hull too far from the solid: such points are *apart*, and points that are apart from
-each other need a hull each (`native/solid/apart.hpp`).
+than the reach, the path leaves the hull too far from the solid: such points are *independent*, and of points that
+are independent of each other, each needs its own hull (`native/solid/apart.hpp`).
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ def at_least(solid: Component, parts: Sequence[Part], reach: float, run: Run) ->
     samples, _ = _native.sample_surface(solid.vertices, solid.faces, CANDIDATES, 0)
     corners, _ = surface.closest(np.concatenate([part.hull.vertices for part in parts]), run.threads)
     points = np.concatenate([corners, samples])
-    points = points[_far_apart(points, POINTS + POINTS_PER_PART * len(parts))]
+    points = points[_spread(points, POINTS + POINTS_PER_PART * len(parts))]
     found = _native.apart_points(surface, points, reach + UNCOVERED, len(parts))
     return max(1, len(found))
 
 
-def _far_apart(points: FloatArray, count: int) -> list[int]:
-    """Farthest-point sampling, from the point farthest from the centre on."""
+def _spread(points: FloatArray, count: int) -> list[int]:
+    """Choose `count` points by farthest-point sampling, from the one farthest from the centre on."""
     gaps = points - points.mean(axis=0)
     chosen = [int(dots(gaps, gaps).argmax())]
     away = np.full(len(points), np.inf)

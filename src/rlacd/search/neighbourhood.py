@@ -3,7 +3,7 @@
 A state is a set of parts, all of which meet the criterion. Two operators change it:
 
 - redistribute: a part is divided among the parts around it and disappears.
-- give: a part gives what the parts around can take; what is left of it is smaller, and they are different.
+- give: the parts around take what they can of a part, and a smaller part stays.
 
 The next trial is always one of the operator that has done the least work since it last saved a part.
 
@@ -37,12 +37,12 @@ class SearchContext:
     Attributes
     ----------
     root : Component
-        What is cut: the solid, or its proxy.
+        The component that is cut: the solid or its proxy.
     criterion : Criterion
         Every new part meets it.
     seed : int
     enough : callable
-        Returns the least number of parts of any decomposition: the search ends there. May wait for that.
+        Returns a lower bound on the number of parts, at which the search ends; may wait for it.
     """
 
     root: Component
@@ -52,8 +52,8 @@ class SearchContext:
 
 
 LAG = 4
-"""A trial starts from the state that all trials but the `LAG` - 1 before it have left, so that several can be under way
-at a time. It does not depend on the number of threads, so neither does the result."""
+"""A trial starts from the state before the latest `LAG` - 1 trials, which may still be under way. The lag does not
+depend on the number of threads, so neither does the result."""
 
 MOST_TRIES = 3
 """How often a part is divided between the same parts: of 470 further trials none saved one."""
@@ -68,7 +68,7 @@ class Operator(Enum):
 
 @dataclass(frozen=True)
 class _Trial:
-    """An operator applied to the part of a number."""
+    """An operator, and the number of the part it changes."""
 
     operator: Operator
     part: int
@@ -98,9 +98,9 @@ class Neighbourhood:
     best : list of Part
         The best parts so far.
     gained : float
-        When they became so few, by `time.perf_counter`.
+        When their number last fell, by `time.perf_counter`.
     steps, accepted : int
-        Trials made after each part was offered, and trials accepted.
+        Trials made after the first of each part, and trials accepted.
     """
 
     def __init__(self, context: SearchContext, parts: Sequence[Part], run: Run) -> None:
@@ -114,7 +114,7 @@ class Neighbourhood:
         self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
         self._around: dict[int, tuple[int, ...]] = {}
         self._begun: deque[_UnderWay] = deque()
-        self._again: deque[_Trial] = deque()  # what they found came too late
+        self._again: deque[_Trial] = deque()  # to be repeated: what they found came too late
         self._tries: dict[tuple[Operator, int, tuple[int, ...]], int] = {}
         self._in_vain = dict.fromkeys(Operator, 0)  # units since each last saved a part
 
@@ -125,12 +125,11 @@ class Neighbourhood:
 
     @property
     def is_least(self) -> bool:
-        """Whether no fewer parts can do."""
+        """Whether the parts are as few as the lower bound."""
         return len(self.best) <= self._context.enough()
 
     def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
-        """Search until the run is over, `most` trials are made in total, so many units have saved nothing, or no fewer
-        parts can do."""
+        """Search until the run or `most` trials are over, `patience` units save nothing, or no fewer parts can do."""
         self._in_vain = dict.fromkeys(Operator, 0)
         self._make(self._trials(patience), most)
 
@@ -152,7 +151,7 @@ class Neighbourhood:
                 return
 
     def _least_tried(self, operator: Operator) -> _Trial | None:
-        """The part that was tried the fewest times between the same parts, of those the smallest."""
+        """The part tried least often between the same neighbours; the smallest of several."""
         around = self._neighbours()
         tries = {i: self._tries.get((operator, i, around[i]), 0) for i in self._by_size() if around[i]}
         which = min(tries, key=tries.__getitem__, default=None)
@@ -173,7 +172,7 @@ class Neighbourhood:
         return self._around
 
     def _exchange(self, trial: _Trial) -> Callable[[Run], Exchange | None] | None:
-        """What finds an exchange of the parts as they are; None if that of the trial has gone."""
+        """Make the function that finds the exchange of a trial; None if the trial's part has gone."""
         parts, context, operator = self._now.parts, self._context, trial.operator
         if trial.part not in parts:
             return None

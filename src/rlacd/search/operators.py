@@ -82,7 +82,7 @@ def redistribute(
     run : Run
         Give up when it is over.
     again : bool
-        It was tried before: pieces are halved along axes drawn at random, not between the parts that can take most.
+        Whether it was tried before: then pieces are halved along random axes, not between the parts that can take most.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def redistribute(
     division = _Division(around, Uniter(criterion, solid, run.work), random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
     if not all(division.takers(piece) or division.may_go(piece) for piece in pieces):
-        return None  # quick, and what most end with
+        return None  # a quick test that ends most trials
     if any(division.left_of(piece, stop=True) for piece in pieces):
         return None
     return _exchanged(part, around, division.now, criterion)
@@ -126,7 +126,7 @@ def give(
 
 
 def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) -> Part:
-    """Get disjoint pieces as a part, with all that the solid fills of their hull if the criterion looks at that."""
+    """Join disjoint pieces into a part, with all the solid fills of their hull if the criterion looks inside."""
     if not criterion.screen.looks_inside:
         parts: Sequence[Part] = pieces
         return reduce(Part.glued, parts)
@@ -178,7 +178,7 @@ class _Division:
         return all(self.may_go(half, halvings - 1) for half in smaller) if smaller else bool(self.takers(piece))
 
     def left_of(self, piece: _Piece, halvings: int = PIECE_HALVINGS, stop: bool = False) -> list[Component]:
-        """Give away what the parts can take of a piece: what is left, or the first of it that is found."""
+        """Give parts what they can take of a piece; returns the rest, or with `stop` the first of the rest."""
         for i in self.takers(piece):
             union = self._uniter.unite_feasible(self.now[i], piece.component)
             if union is not None:

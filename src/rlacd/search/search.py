@@ -18,13 +18,13 @@ from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
 from rlacd.solid.component import Part
 
 BEST_SECONDS = 5.0
-"""What ``best`` may take by default, more if its first search takes longer."""
+"""Seconds of ``best`` by default; more if its first search takes longer."""
 
 TIMES_FIRST_PASS = 4.5
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 8e6
-"""Absolute limits on that limit, in units: about 0.15 and 8 seconds of one core."""
+"""Least and greatest limit on the work of a bounded search, in units: about 0.15 and 8 seconds of one core."""
 
 WORK_OF_A_STEP = 1e5
 """Where only the number of steps is limited, the work allowed for each: far more than most take."""
@@ -37,13 +37,13 @@ STARTS = ("excess-norm", "hull-sum")
 """Scores of the greedy policy for further passes over the whole solid, in turn, each among other planes."""
 
 ANOTHER_PASS = 1.5
-"""Another pass is abandoned when it exceeds this multiple of the work of the first, ..."""
+"""Another pass is abandoned when it exceeds this multiple of the work of the first."""
 
 HOPELESS = 5
-"""... or when its pieces outnumber the parts by this factor: merging will not make up for that."""
+"""Another pass is abandoned when its pieces outnumber the parts by this factor: merging will not make up for that."""
 
 IN_VAIN = 8
-"""A search ends when so many starts in a row have found nothing better."""
+"""A search ends after so many starts in a row without a gain."""
 
 
 @dataclass
@@ -100,8 +100,7 @@ def search(
 ) -> tuple[list[list[Part]], SearchSummary]:
     """Search for fewer parts, or for equally many with a smaller total hull volume.
 
-    Without limits of its own, the search does a bounded multiple of the work of the first pass; ``best`` then goes on
-    until its seconds are over.
+    Without other limits, the search does a bounded multiple of the first pass's work; ``best`` goes on for its seconds.
 
     Parameters
     ----------
@@ -109,7 +108,7 @@ def search(
     parts : sequence of Part
         A decomposition of the solid.
     run : Run
-        Its work so far is taken as the work of the first pass.
+        The work it has done so far counts as the first pass.
     quality : "balanced" or "best"
     seconds : float, optional
         Wall time of the search, in place of that bound.
@@ -119,12 +118,11 @@ def search(
     Returns
     -------
     found : list of list of Part
-        What ``fast`` and ``balanced`` find, and the best; never worse than the given parts. They depend on the seed and
-        the steps, and on time only if `seconds` or the run ends the search.
+        The parts that ``fast`` and ``balanced`` find, and the best; never worse than the given ones. They depend on the
+        seed and the steps, and on time only if `seconds` or the run ends the search.
     summary : SearchSummary
     """
-    # Slivers would be dropped at the end anyway; if they counted here, a level could end with more hulls than the one
-    # below it.
+    # Slivers are dropped at the end anyway; if they counted here, a level could end with more hulls than the last.
     parts = drop_slivers(parts, run)
     begin, first_pass = time.perf_counter(), run.work.done
     allowed, bounded = math.inf, seconds is None and steps is None
@@ -183,9 +181,9 @@ class _Search:
     Attributes
     ----------
     early, best : list of Part
-        What ``fast`` ends with, and the best parts so far.
+        The parts that ``fast`` ends with, and the best so far.
     gained : float
-        When they became so few, by `time.perf_counter`.
+        When the best parts last became fewer, by `time.perf_counter`.
     starts, steps, accepted : int
         Starts searched from, trials made and trials accepted.
     """
@@ -200,10 +198,10 @@ class _Search:
         self._most = HOPELESS * len(parts)
         self._passes = 1
         self._state: Neighbourhood | None = None
-        self._ahead = 0  # parts of that when each had been offered to others
+        self._ahead = 0  # number of its parts once each had been offered to others
 
     def go_on(self, most: float) -> None:
-        """Search until the run is over, `most` trials are made, or no fewer parts can do."""
+        """Search until the run is over, `most` trials are made, or parts are as few as the lower bound."""
         run, enough, in_vain = self._run, self._context.enough, 0
         while self.steps < most and not run.is_over and len(self.best) > enough() and in_vain < IN_VAIN:
             before = len(self.best)

@@ -57,9 +57,13 @@ class Part:
         A convex polytope that contains the solid.
     piece_hulls : float, optional
         Sum of the volumes of the hulls of the pieces it was glued from; its own hull's volume by default.
+    members : tuple of Component
+        The components it consists of; empty if it was not made from components.
 
     Attributes
     ----------
+    size : int
+        Triangles of the surface, counting those where its pieces touch.
     within : Part or None
         A part whose hull contains this one's: the one it was cut from.
     exact : Hull or None
@@ -75,23 +79,24 @@ class Part:
         volume: float,
         hull: Hull,
         piece_hulls: float | None = None,
+        members: tuple[Component, ...] = (),
     ) -> None:
-        self._surface: tuple[FloatArray, IntArray] | None = (vertices, faces)
+        self._surface = vertices, faces
+        self._members = members
+        self.size = len(faces)
         self.volume = volume
         self.hull = hull
         self.piece_hulls = hull.volume if piece_hulls is None else piece_hulls
         self.within: Part | None = None
         self.exact: Hull | None = None
         self.tree: _native.TreeCache | None = None
-        self._size = len(faces)
-        self._members: tuple[Component, ...] = ()
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}(volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
 
     @property
     def members(self) -> tuple[Component, ...]:
-        """The components it consists of; empty if it was not made from components."""
+        """The components it consists of."""
         return self._members
 
     @property
@@ -108,11 +113,6 @@ class Part:
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
         return self.hull.box
-
-    @property
-    def size(self) -> int:
-        """Triangles of the surface, counting those where its pieces touch."""
-        return self._size
 
     def with_hull(self, hull: Hull) -> Part:
         """Return the same solid with another hull around it."""
@@ -137,7 +137,6 @@ class Part:
         return _Union(first, second, hull)
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:
-        assert self._surface is not None
         return self._surface
 
 
@@ -145,26 +144,18 @@ class _Union(Part):
     """The union of two parts. They are glued when the surface is first needed: some criteria look at the hull only."""
 
     def __init__(self, first: Part, second: Part, hull: Hull) -> None:
-        self._surface = None
+        volume, piece_hulls = first.volume + second.volume, first.piece_hulls + second.piece_hulls
+        super().__init__(*first._surface, volume, hull, piece_hulls, (*first.members, *second.members))
+        self.size = first.size + second.size
         self._operands: tuple[Part, Part] | None = (first, second)
-        self.volume = first.volume + second.volume
-        self.hull = hull
-        self.piece_hulls = first.piece_hulls + second.piece_hulls
-        self.within = None
-        self.exact = None
-        self.tree = None
-        self._size = first.size + second.size
-        self._members = (*first.members, *second.members)
 
     def _resolved(self) -> tuple[FloatArray, IntArray]:
-        if self._surface is None:
-            for union in reversed(self._unresolved()):  # a loop: a thousand nested unions are too deep to recurse
-                operands = union._operands
-                if operands is not None:  # another thread may have done it already
-                    (a, b), (c, d) = (part._resolved() for part in operands)
-                    union._surface = _native.glue(a, b, c, d)
-                    union._operands = None
-        assert self._surface is not None
+        for union in reversed(self._unresolved()):  # a loop: a thousand nested unions are too deep to recurse
+            operands = union._operands
+            if operands is not None:  # another thread may have done it already
+                (a, b), (c, d) = (part._resolved() for part in operands)
+                union._surface = _native.glue(a, b, c, d)
+                union._operands = None
         return self._surface
 
     def _unresolved(self) -> list[_Union]:
@@ -201,10 +192,11 @@ class ClippedPart(Part):
 
     def __init__(self, solid: Component, parts: Sequence[Part], hull: Hull) -> None:
         inside = solid.inside(hull)
-        super().__init__(inside.vertices, inside.faces, inside.volume, hull, sum(part.piece_hulls for part in parts))
+        piece_hulls = sum(part.piece_hulls for part in parts)
+        members = tuple(member for part in parts for member in part.members)
+        super().__init__(inside.vertices, inside.faces, inside.volume, hull, piece_hulls, members)
         self.tree = inside.tree
         self.solid = solid
-        self._members = tuple(member for part in parts for member in part.members)
 
     @property
     def is_whole(self) -> bool:
@@ -275,14 +267,14 @@ class Component(Part):
 
         The smaller side comes first; an empty list if one would be empty.
         """
-        corners, volumes = [hull.corners for hull in hulls], [hull.volume for hull in hulls]
-        sides = _native.halve(self.vertices, self.faces, self.hull.corners, corners, volumes, share, NEGLIGIBLE_VOLUME)
+        around = [hull.body for hull in hulls]
+        sides = _native.halve(self.vertices, self.faces, self.hull.body, around, share, NEGLIGIBLE_VOLUME)
         halves = [Component.of(side, self) for side in sides if side is not None]
         return sorted(halves, key=lambda half: half.volume) if len(halves) == 2 else []
 
     def inside(self, hull: Hull) -> Part:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
-        vertices, faces, volume = self.filling.clipped(hull.vertices, hull.faces)
+        vertices, faces, volume = self.filling.clipped(hull.body)
         part = Part(vertices, faces, volume, hull)
         part.tree = _native.TreeCache()
         return part

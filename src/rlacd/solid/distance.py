@@ -93,4 +93,4 @@ def hull_distances(
 
 def hull_union(hulls: Sequence[Hull], threads: int | None = None) -> _native.HullUnion:
     """Prepare the union of hulls for queries: ``distance(points)``, ``exposed()``, ``over(...)``, ``under(...)``."""
-    return _native.HullUnion([hull.vertices for hull in hulls], [hull.faces for hull in hulls], threads or 0)
+    return _native.HullUnion([hull.body for hull in hulls], threads or 0)

@@ -38,12 +38,12 @@ class Hull:
     @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
-        return self.corners.box
+        return self.body.box
 
     @cached_property
-    def corners(self) -> _native.HullCorners:
-        """The vertices, prepared for tests of joint hulls."""
-        return _native.HullCorners(self.vertices)
+    def body(self) -> _native.ConvexBody:
+        """The same for kernels, which keep what they make of it."""
+        return _native.ConvexBody(self.vertices, self.faces)
 
     @classmethod
     def of(cls, *points: FloatArray) -> Hull | None:
@@ -116,7 +116,7 @@ def limit_hull(
     stick out about equally (``native/convex/even_out.hpp``).
     """
     most, most_faces = (min(limit or _NO_LIMIT, _NO_LIMIT) for limit in limits)
-    vertices, faces = _native.simplify_hull(hull.vertices, hull.faces, most, most_faces, tolerance, sides, enough)
+    vertices, faces = _native.simplify_hull(hull.body, most, most_faces, tolerance, sides, enough)
     if len(vertices) == len(hull.vertices) and (vertices == hull.vertices).all():
         return hull
     return Hull(vertices, faces, _native.mesh_volume(vertices, faces))

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from rlacd._native import HullUnion, poll_stop, sample_surface
+from rlacd._native import ConvexBody, HullUnion, poll_stop, sample_surface
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import Frame
@@ -44,15 +44,14 @@ def owners(
         return [int(label_of[0])] * len(hulls)
     frame = Frame.of(vertices)  # areas and squares of any finite coordinates fit in a double there
     points, labels = _spread(frame.to_frame(vertices), faces, label_of)
-    shapes = [(frame.to_frame(hull.vertices), hull.faces.astype(np.int32)) for hull in hulls]
-    union = HullUnion([vertices for vertices, _ in shapes], [faces for _, faces in shapes])
     found = []
-    for number, (corners, _) in enumerate(shapes):
+    for hull in hulls:
         poll_stop()
-        lower, upper = corners.min(axis=0), corners.max(axis=0)
+        body = ConvexBody(frame.to_frame(hull.vertices), hull.faces.astype(np.int32))
+        lower, upper = body.box
         slack = OUTSIDE_HULL * float((upper - lower).max())
         near = np.flatnonzero(((points >= lower - slack) & (points <= upper + slack)).all(axis=1))
-        inside = near[union.only([number]).distance(points[near], 1) <= slack]
+        inside = near[HullUnion([body]).distance(points[near], 1) <= slack]
         if len(inside) == 0:
             inside = np.array([((points - (lower + upper) / 2) ** 2).sum(axis=1).argmin()])
         found.append(int(np.bincount(labels[inside]).argmax()))

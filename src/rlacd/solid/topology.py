@@ -8,7 +8,7 @@ counter-clockwise) and ``2f + 1`` its back. Around an edge with k faces there ar
 the facing sides of two neighbouring faces (for k = 1, between both sides of the same face). Joining sides across wedges
 gives the boundary of every region of space the faces separate: a closed surface that is oriented by construction,
 whatever windings, doubled edges or missing orientability the soup has. The side component of the outside has positive
-volume, those of enclosed rooms negative; a face with both sides in one component is a sheet, without inside.
+volume, those of enclosed spaces negative; a face with both sides in one component is a sheet, without inside.
 """
 
 from __future__ import annotations
@@ -85,13 +85,13 @@ class Edges:
         ``[3F]``, the edge of halfedge ``3f + c``, which runs from corner c of face f to its next corner.
     vertices
         ``[E, 2]``, the end vertices, smaller index first.
-    valence
+    face_count
         ``[E]``, how many faces use the edge.
     """
 
     of_halfedge: Int64Array
     vertices: Int64Array
-    valence: Int64Array
+    face_count: Int64Array
 
     @classmethod
     def of(cls, faces: Int64Array, count: int) -> Edges:
@@ -102,7 +102,7 @@ class Edges:
     def halfedges(self) -> Int64Array:
         """The first and the last halfedge of each edge, ``[2, E]``."""
         number = np.arange(len(self.of_halfedge))
-        first, last = ends = np.empty((2, len(self.valence)), dtype=np.int64)
+        first, last = ends = np.empty((2, len(self.face_count)), dtype=np.int64)
         first[self.of_halfedge[::-1]], last[self.of_halfedge] = number[::-1], number
         return ends
 
@@ -110,31 +110,31 @@ class Edges:
 def bodies_of(faces: Int64Array, edges: Edges) -> tuple[int, Int64Array]:
     """Group faces that share edges: the number of bodies, and ``[F]`` the body of each face."""
     face = np.repeat(np.arange(len(faces)), 3)
-    first = np.empty(len(edges.valence), dtype=np.int64)
+    first = np.empty(len(edges.face_count), dtype=np.int64)
     first[edges.of_halfedge[::-1]] = face[::-1]
     return components(len(faces), face, first[edges.of_halfedge])
 
 
 def is_balanced(faces: Int64Array, edges: Edges) -> BoolArray:
     """Return ``[E]`` whether as many faces run along an edge in one direction as in the other."""
-    forward = np.bincount(edges.of_halfedge, (faces < faces[:, _NEXT]).ravel(), len(edges.valence))
-    return np.asarray(2 * forward == edges.valence)
+    forward = np.bincount(edges.of_halfedge, (faces < faces[:, _NEXT]).ravel(), len(edges.face_count))
+    return np.asarray(2 * forward == edges.face_count)
 
 
-NO_FILM = TOLERANCE**2
-"""Films of less area than this are folds that rounding has closed."""
+NO_AREA = TOLERANCE**2
+"""Faces of less area than this are folds that rounding has closed."""
 
 
-def detach_films(vertices: FloatArray, faces: Int64Array, is_film: BoolArray) -> tuple[FloatArray, Int64Array]:
-    """Give films vertices of their own if the bodies they hang on are closed without them; drop those without an area.
+def detach_slivers(vertices: FloatArray, faces: Int64Array, is_sliver: BoolArray) -> tuple[FloatArray, Int64Array]:
+    """Give slivers their own vertices if the bodies they hang on are closed without them; drop those without an area.
 
-    A film stands for as many faces wound one way as the other: a sheet with two sides, or a pocket closed by rounding.
+    A sliver stands for equally many faces of either winding: a sheet with two sides, or a pocket closed by rounding.
 
     Parameters
     ----------
     vertices, faces
         ``[V, 3]`` and ``[F, 3]``.
-    is_film
+    is_sliver
         ``[F]``.
 
     Returns
@@ -142,27 +142,27 @@ def detach_films(vertices: FloatArray, faces: Int64Array, is_film: BoolArray) ->
     tuple
         The vertices, copies last, and the faces.
     """
-    if is_film.all() or not is_film.any():
+    if is_sliver.all() or not is_sliver.any():
         return vertices, faces
     edges = Edges.of(faces, len(vertices))
     halfedge = edges.of_halfedge.reshape(-1, 3)
-    rest_edges = Edges.of(faces[~is_film], len(vertices))
-    bodies, body = bodies_of(faces[~is_film], rest_edges)
+    rest_edges = Edges.of(faces[~is_sliver], len(vertices))
+    bodies, body = bodies_of(faces[~is_sliver], rest_edges)
     is_open = np.zeros(bodies, dtype=bool)
-    uneven = ~is_balanced(faces[~is_film], rest_edges)
+    uneven = ~is_balanced(faces[~is_sliver], rest_edges)
     is_open[body[uneven[rest_edges.of_halfedge].reshape(-1, 3).any(axis=1)]] = True
-    beside_body, beside_open = np.zeros((2, len(edges.valence)), dtype=bool)
-    beside_body[halfedge[~is_film]] = True
-    beside_open[halfedge[~is_film][is_open[body]]] = True
-    patches, patch = bodies_of(faces[is_film], Edges.of(faces[is_film], len(vertices)))
-    hangs = np.bincount(patch, beside_body[halfedge[is_film]].any(axis=1), patches) > 0
-    needed = np.bincount(patch, beside_open[halfedge[is_film]].any(axis=1), patches) > 0
-    detached = np.flatnonzero(is_film)[(hangs & ~needed)[patch]]
+    beside_body, beside_open = np.zeros((2, len(edges.face_count)), dtype=bool)
+    beside_body[halfedge[~is_sliver]] = True
+    beside_open[halfedge[~is_sliver][is_open[body]]] = True
+    patches, patch = bodies_of(faces[is_sliver], Edges.of(faces[is_sliver], len(vertices)))
+    hangs = np.bincount(patch, beside_body[halfedge[is_sliver]].any(axis=1), patches) > 0
+    needed = np.bincount(patch, beside_open[halfedge[is_sliver]].any(axis=1), patches) > 0
+    detached = np.flatnonzero(is_sliver)[(hangs & ~needed)[patch]]
     corners, index = np.unique(faces[detached], return_inverse=True)
     result = faces.copy()
     result[detached] = len(vertices) + index.reshape(-1, 3)
     a, b, c = vertices[faces[detached]].transpose(1, 0, 2)
-    nothing = detached[np.linalg.norm(np.cross(b - a, c - a), axis=1) < 2 * NO_FILM]
+    nothing = detached[np.linalg.norm(np.cross(b - a, c - a), axis=1) < 2 * NO_AREA]
     return np.concatenate([vertices, vertices[corners]]), np.delete(result, nothing, axis=0)
 
 
@@ -202,7 +202,7 @@ def _sums(group: Int64Array, values: FloatArray, number: int) -> FloatArray:
 
 def sides_of(vertices: FloatArray, faces: Int64Array, edges: Edges, trusted: BoolArray | None = None) -> Sides:
     """Join the sides of all faces across their wedges, except where ``trusted`` ``[F]`` faces meet by their angles."""
-    wedges, facing = _native.wedges(vertices, faces, edges.of_halfedge, len(edges.valence), trusted)
+    wedges, facing = _native.wedges(vertices, faces, edges.of_halfedge, len(edges.face_count), trusted)
     number, label = components(2 * len(faces), *np.ascontiguousarray(facing.T))
     poll_stop()
     tetrahedra = signed_tetrahedra(vertices, faces)

@@ -21,8 +21,8 @@ TOO_CLOSE_TO_SEE = 2e-3
 def color_hulls(hulls: Sequence[trimesh.Trimesh]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
     """Choose colours by which hulls touch: neighbours differ in hue, and hulls that share a hue differ in shade.
 
-    Hulls are coloured greedily in smallest-last order (Matula & Beck 1983): each gets the least used hue that its
-    neighbours leave free.
+    Hulls are coloured greedily in smallest-last order (Matula & Beck 1983): each gets its neighbours' least used free
+    hue.
 
     Returns
     -------

@@ -1,8 +1,7 @@
 """Connections of the viewer's server, with bounds on their number and duration.
 
 Every connection has a thread, so their number is bounded; one more is answered 503 at once, without a thread. Each has
-a deadline: a request that trickles in, a client that does not read and an idle connection are closed when it has
-passed.
+a deadline, at which slow requests, clients that do not read and idle connections are closed.
 """
 
 from __future__ import annotations
@@ -123,7 +122,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer with a head also what is no HTTP, which the base class takes for a version without heads."""
+        """Send a head even if the request is no HTTP: the base class takes it for HTTP/0.9, which has no heads."""
         self.request_version = self.protocol_version
         super().send_error(code, message, explain)
 

@@ -112,7 +112,7 @@ STANDING = 0.005
 
 
 def guessed_up(mesh: InputMesh) -> Axis:
-    """Guess y if the mesh stands on y = 0 and not on z = 0, else z, which files are taken for elsewhere."""
+    """Guess y if the mesh stands on y = 0 and not on z = 0, else z, the default elsewhere."""
     points = used_points(mesh.vertices, mesh.faces)
     low = points.min(axis=0)
     stands = np.abs(low) <= STANDING * (points.max(axis=0) - low).max()

@@ -24,7 +24,7 @@ def draw_curve(
     Raises
     ------
     MissingExtraError, OutputError, OptionError
-        As `rlacd.view.picture.check_picture`.
+        See `rlacd.view.picture.check_picture`.
     """
     place = check_picture(path)
     image, pen = (import_extra(f"PIL.{part}", "a picture", "view") for part in ("Image", "ImageDraw"))
@@ -60,7 +60,7 @@ def draw_curve(
 
 
 def _step(most: int) -> int:
-    """Between lines of the grid: 1, 2 or 5 times a power of ten, for at most six of them."""
+    """Spacing of at most six lines of the grid: 1, 2 or 5 times a power of ten."""
     power = 1
     while True:
         for step in (power, 2 * power, 5 * power):

@@ -67,12 +67,12 @@ def heat_map(decomposition: Result, *, triangles: int = 60_000, threads: int | N
     # Equilateral triangles of edge h have the area sqrt(3)/4 h²; narrow facets give smaller ones, hence more of them.
     area = sum(float(trimesh.triangles.area(corners[faces]).sum()) for corners, faces in hulls)
     edge = max(FINEST, float(np.sqrt(4.0 * area / max(triangles, 1))))
-    union = _native.HullUnion([corners for corners, _ in hulls], [faces.astype(np.int32) for _, faces in hulls])
+    bodies = [_native.ConvexBody(corners, faces.astype(np.int32)) for corners, faces in hulls]
     result = []
     for index, hull in enumerate(hulls):
         vertices, faces = _divided(*hull, edge)
         distance = surface.distance(vertices, threads or 0)
-        others = union.only([other for other in range(len(hulls)) if other != index])
+        others = _native.HullUnion(bodies[:index] + bodies[index + 1 :])
         distance[others.distance(vertices, threads or 0) <= ON_HULL] = INNER
         result.append(HeatMesh(vertices, faces, distance))
     return result

@@ -31,7 +31,7 @@ POLICY = (
 
 
 def live_page(title: str, config: dict[str, Any]) -> tuple[str, str]:
-    """Build the viewer's page, which loads the scripts of `module` and its data from its server; and its policy.
+    """Build the viewer's page, which loads scripts and data from its server, and its content security policy.
 
     Parameters
     ----------

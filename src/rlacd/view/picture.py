@@ -26,7 +26,7 @@ INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
 PAPER, INK, FADED = (255, 255, 255), (28, 30, 34), (120, 124, 132)
 BALLS_AT_ONCE = 256
-"""Of which all pairs are looked at when balls are chosen; the others are searched once for all chosen ones."""
+"""Balls compared pair by pair when balls are chosen; the others are compared with all chosen ones at once."""
 
 TO_Z_UP = {  # rows: the source of the drawing's x, y, z axes
     "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -125,7 +125,7 @@ def picture_bytes(
         ("pulled apart", _hull_bodies(decomposition, up, pull=0.55), None),
     ]
     if decomposition.balls is not None:
-        some = apart(decomposition.balls)
+        some = disjoint(decomposition.balls)
         spheres = Spheres(some.centres @ TO_Z_UP[up].T, some.radii, BALL_COLOR)
         panels.insert(2, ("some of the balls they leave free", _hull_bodies(decomposition, up, pull=0.0), spheres))
     columns, rows = (3, 1) if len(panels) == 3 else (2, 2)
@@ -152,7 +152,7 @@ def picture_bytes(
     return encoded.getvalue()
 
 
-def apart(balls: Balls) -> Balls:
+def disjoint(balls: Balls) -> Balls:
     """Choose balls that do not overlap, smallest first; all of them together would look like one cloud."""
     left, shown = np.argsort(balls.radii, kind="stable"), list[int]()
     while len(left):

@@ -24,8 +24,7 @@ def save_report_page(
 ) -> Path:
     """Write a report; see `rlacd.Decomposition.save_report`.
 
-    It may leave out the picture, which takes a few seconds to render. Without the extra ``view`` it always does, and a
-    note says so.
+    It may leave out the picture, which takes a few seconds to render. Without the extra ``view`` it does, and says so.
     """
     check_up(up)
     place = checked_place(path, "the report", PAGES)

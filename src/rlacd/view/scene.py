@@ -17,7 +17,7 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
 from rlacd.view.coloring import color_hulls
 from rlacd.view.heat import HeatMesh, frame_of
-from rlacd.view.picture import apart
+from rlacd.view.picture import disjoint
 from rlacd.view.robot import RobotResult, robot_scene
 
 
@@ -50,7 +50,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     rgb, ranks = color_hulls(decomposition.hulls)
     balls = None
     if decomposition.balls is not None and len(decomposition.balls):
-        some = apart(decomposition.balls)
+        some = disjoint(decomposition.balls)
         shown = min(len(some), 4000)  # more are slow to draw
         centres, radii = frame.to_frame(some.centres[:shown]), some.radii[:shown] * frame.scale
         balls = {"centres": floats(centres), "radii": floats(radii), "shown": shown, "of": len(decomposition.balls)}

@@ -113,8 +113,7 @@ class Session:
     def close(self, patience: float = 1.0) -> bool:
         """Cancel the work and release all waiting threads; tells whether the work ended within `patience` seconds.
 
-        If it has not, Python waits for its thread on exit, since no objects of C++ libraries may be held beyond
-        that.
+        If it has not, Python waits for its thread on exit: no object of a C++ library may outlive that.
         """
         with self._changed:
             if self._state.state != "closed":

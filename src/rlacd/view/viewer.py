@@ -42,7 +42,7 @@ def open_viewer(
     decompose : callable
         `rlacd.decompose`.
     read : callable
-        What reads the file; `rlacd.io.robots.shown` has both for robots too.
+        Reads the file; `rlacd.io.robots.shown` has both functions for robots too.
     options : dict, optional
         Initial values of the page's controls, by their names.
     up : {"x", "y", "z"}, optional

@@ -1,27 +1,68 @@
-"""Decomposing the bodies of a robot: each solid once, with lengths relative to the robot."""
+"""Decomposing the bodies of a robot: each solid once, with lengths relative to the robot, clear where it was clear."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import trimesh
 
+from rlacd.clear import Body as Moving
+from rlacd.clear import (
+    Cleared,
+    CrowdedError,
+    LinkPair,
+    Motion,
+    Surface,
+    at_rest,
+    kept_clear,
+    link_pairs,
+    warnings_of,
+)
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshError, OptionError
-from rlacd.io.robots.bodies import Body, Collider, size_of
+from rlacd.errors import MeshError, MissingExtraError, OptionError
+from rlacd.io.robots.robot import Body, Collider, Results, Robot
 from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import LONGEST_SIDE, shown
 from rlacd.options.robots import RobotOptions
 from rlacd.solid.frame import ROUNDING, Frame
+from rlacd.solid.obstacle import Obstacle
+from rlacd.solid.poses import inverse, moved
 from rlacd.solid.topology import used_points
 
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
+
+MOST_SAID = 5
+"""Pairs that touch, each with a warning of its own."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """The hulls of all colliders, finer where links would touch; where these were looked at, and what they do there.
+
+    Of links that were not checked against each other there is no motion, and no `cleared`.
+    """
+
+    results: dict[Collider, Decomposition]
+    warnings: list[str] = field(default_factory=list)
+    motion: Motion | None = None
+    cleared: Cleared | None = None
+
+    @property
+    def pairs(self) -> list[LinkPair]:
+        """What each two links do; empty if nothing was checked."""
+        return [] if self.cleared is None or self.motion is None else link_pairs(self.cleared, self.motion)
+
+    @property
+    def samples(self) -> int:
+        """Joint positions looked at, with that at rest."""
+        return 0 if self.cleared is None or self.motion is None else len(self.motion.poses)
 
 
 def check_options(options: Mapping[str, Any]) -> None:
@@ -44,15 +85,8 @@ def check_options(options: Mapping[str, Any]) -> None:
     Options.of({name: value for name, value in options.items() if name not in ("progress", "relative_to")})
 
 
-def decompose_bodies(
-    bodies: Sequence[Body], options: Mapping[str, Any], robot: RobotOptions
-) -> dict[Collider, Decomposition]:
-    """Decompose every collider, those that are the same solid once.
-
-    Returns
-    -------
-    dict
-        The hulls of each, in the frame of its first mesh's element.
+def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> Checked:
+    """Decompose all colliders, those that are the same solid once, and again what touches as hulls only.
 
     Raises
     ------
@@ -61,53 +95,83 @@ def decompose_bodies(
     OptionError
         An option is out of range, or a pattern of `links` matches none.
     """
-    each = options_of_bodies(bodies, options, robot)
+    bodies, each = robot.bodies, options_of_bodies(robot, options, asked)
+    results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
-    results = {}
     for body, own in zip(bodies, each, strict=True):
         for collider in body.colliders:
-            key = collider.key, own.get("threshold_abs")
-            if key not in done:
+            if (key := (collider.key, own.get("threshold_abs"))) not in done:
                 done[key] = decomposed(body, collider, own)
             results[collider] = done[key]
-    return results
+    if len(bodies) < 2:
+        return Checked(results)
+    if not all(result.report["complete"] for result in results.values()):
+        return Checked(results, ["Links were not checked against each other: the work was stopped before."])
+
+    def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
+        again = results | _clear_of(obstacles, bodies[number], results, each[number])
+        hulls = _moving(bodies[number], again).hulls
+        if len(hulls) > most:
+            return None
+        results.update(again)
+        return hulls
+
+    try:
+        motion, said = _motion(robot, asked.samples, options.get("seed") or 0)
+        cleared = kept_clear([_moving(body, results) for body in bodies], motion, redo)
+    except (MissingExtraError, CrowdedError) as error:
+        if asked.exclude or asked.srdf:
+            raise
+        return Checked(results, [f"Links were not checked against each other: {error}"])
+    found = warnings_of(cleared, motion, robot.in_mm)
+    more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
+    ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in motion.warnings]
+    return Checked(results, [*said, *ranges, *found[:MOST_SAID], *more], motion, cleared)
 
 
-def options_of_bodies(bodies: Sequence[Body], options: Mapping[str, Any], robot: RobotOptions) -> list[dict[str, Any]]:
-    """The options of each body; raises as `decompose_bodies`."""
-    whole, lengths = relative_to_robot(options, bodies), _lengths(bodies, robot.links or {})
-    return [whole | ({"threshold_abs": lengths[body.name]} if body.name in lengths else {}) for body in bodies]
+def _motion(robot: Robot, samples: int, seed: int) -> tuple[Motion, list[str]]:
+    """Where bodies can be, or at least are; and what to say of that."""
+    try:
+        return robot.motion(samples, seed), []
+    except MissingExtraError:
+        raise
+    except Exception as error:  # MuJoCo reads fewer meshes than we do; a URDF may say anything
+        reader = {".urdf": "yourdfpy"}.get(robot.source.suffix.lower(), "MuJoCo")
+        said = f"{reader} cannot place the links of {robot.source.name} ({' '.join(str(error).split())[:80]})"
+        rest = at_rest([body.name for body in robot.bodies], (), [body.pose for body in robot.bodies])
+        return rest, [f"Links were checked against each other at rest only: {said}."]
 
 
-def relative_to_robot(options: Mapping[str, Any], bodies: Sequence[Body]) -> dict[str, Any]:
-    """Options with lengths in the robot's unit, where they are shares of its longest side; by default a distance."""
-    given = {name: value for name, value in options.items() if value is not None}
-    if given.pop("relative_to", "scene") == "mesh" or not bodies:
-        return given
-    size = size_of(bodies)
-    if given.setdefault("criterion", "distance") in ("distance", "concavity") and "threshold_abs" not in given:
-        share = given.pop("threshold") / LONGEST_SIDE["threshold"] if "threshold" in given else None
-        given["threshold_abs"] = float(f"{SHARE * size:.3g}") if share is None else share * size
-    if given.get("overlap") and "overlap_abs" not in given:
-        given["overlap_abs"] = given.pop("overlap") * size
-    return given
-
-
-def _lengths(bodies: Sequence[Body], links: Mapping[str, float]) -> dict[str, float]:
-    """The distance of each body that has one of its own."""
+def options_of_bodies(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> list[dict[str, Any]]:
+    """The options of each body; raises as `decomposed_robot`."""
+    names = [body.name for body in robot.bodies]
     lengths: dict[str, float] = {}
-    for pattern, length in links.items():
-        matched = [body.name for body in bodies if re.fullmatch(pattern, body.name)]
+    for pattern, length in (asked.links or {}).items():
+        matched = [name for name in names if re.fullmatch(pattern, name)]
         if not matched:
-            known = ", ".join(body.name for body in bodies)
+            known = ", ".join(names)
             raise OptionError(f"no link with a collision mesh matches the regular expression {pattern!r}: {known}.")
         lengths |= dict.fromkeys(matched, length)
-    return lengths
+    whole = _relative_to_robot(options, robot)
+    return [whole | ({"threshold_abs": lengths[name]} if name in lengths else {}) for name in names]
+
+
+def _relative_to_robot(options: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
+    """Options with lengths in the robot's unit, where they are shares of its longest side; by default a distance."""
+    given = {name: value for name, value in options.items() if value is not None}
+    if given.pop("relative_to", "scene") == "mesh" or not robot.bodies:
+        return given
+    if given.setdefault("criterion", "distance") in ("distance", "concavity") and "threshold_abs" not in given:
+        share = given.pop("threshold") / LONGEST_SIDE["threshold"] if "threshold" in given else None
+        given["threshold_abs"] = float(f"{SHARE * robot.size:.3g}") if share is None else share * robot.size
+    if given.get("overlap") and "overlap_abs" not in given:
+        given["overlap_abs"] = given.pop("overlap") * robot.size
+    return given
 
 
 def decomposed(body: Body, collider: Collider, options: Mapping[str, Any]) -> Decomposition:
     """Decompose one collider of a body, with lengths that are larger than it cut to it."""
-    mesh, path = collider.mesh(), collider.meshes[0].surface.path
+    mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
         return decompose((mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
     except OptionError as error:
@@ -128,3 +192,31 @@ def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> d
             length = max(length, least / unit * (1 + ROUNDING)) if body.is_world else length
             fitting[f"{name}_abs"] = min(length, most / unit * (1 - ROUNDING))
     return fitting
+
+
+def _moving(body: Body, results: Results) -> Moving:
+    mesh, hulls = body.mesh(), body.hulls(results)
+    surfaces = [Surface(np.asarray(hull.vertices), np.asarray(hull.faces)) for hull in hulls]
+    return Moving(body.name, Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces)), surfaces)
+
+
+def _clear_of(
+    obstacles: Sequence[Obstacle], body: Body, results: Results, options: Mapping[str, Any]
+) -> dict[Collider, Decomposition]:
+    """Decompose the colliders of a body again that come near obstacles."""
+    again = {}
+    for collider in body.colliders:
+        back = inverse(collider.meshes[0].to_body)
+        placed = [Obstacle(o.name, moved(back, o.vertices), o.faces, o.margin, is_told=False) for o in obstacles]
+        near = [obstacle for obstacle in placed if _is_near(obstacle, results[collider])]
+        if near:
+            again[collider] = decomposed(body, collider, {**options, "avoid": near})
+    return again
+
+
+def _is_near(obstacle: Obstacle, result: Decomposition) -> bool:
+    if not len(obstacle.vertices):
+        return False
+    lower, upper = obstacle.vertices.min(axis=0) - obstacle.margin, obstacle.vertices.max(axis=0) + obstacle.margin
+    boxes = [hull.bounds for hull in result.hulls]
+    return any(bool((box[0] <= upper).all() and (box[1] >= lower).all()) for box in boxes)

@@ -14,7 +14,8 @@ only visible one of its body; unless another geom shows the same mesh there, it 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+import os
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -22,11 +23,14 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from rlacd.io.robots.bodies import Body, Collider, PlacedMesh
-from rlacd.io.robots.mjcf_model import FILES, Compiler, Defaults
-from rlacd.io.robots.plan import HullFiles, Plan, Sources, colliders, read_scale
-from rlacd.io.robots.poses import Angles
+from rlacd.clear import LinkPair, Motion, mjcf_motion
+from rlacd.io.robots.document import Document, Files, HullFiles, opened, unused_stem
+from rlacd.io.robots.matrix import excludes
+from rlacd.io.robots.mjcf_model import FILES, Compiler, Defaults, mujoco_reads, read_model
+from rlacd.io.robots.poses import Angles, read_scale
+from rlacd.io.robots.robot import Body, Collider, MeshFile, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
+from rlacd.options.robots import RobotOptions
 from rlacd.solid.poses import inverse
 
 SHOWN, HIDDEN = ("0", "1", "2"), "3"
@@ -46,21 +50,13 @@ LEAST_VOLUME = 1e-14
 
 @dataclass(frozen=True)
 class _Geom:
-    """A geom that collides as a mesh.
-
-    Attributes
-    ----------
-    attributes
-        Its own, completed by those of its classes.
-    is_seen, is_weighed
-        Whether it is the only one to show its mesh; whether the mass of its body follows from it.
-    """
+    """A geom that collides as a mesh."""
 
     element: Element
-    attributes: Mapping[str, str]
+    attributes: Mapping[str, str]  # its own, completed by those of its classes
     mesh: str
-    is_seen: bool
-    is_weighed: bool
+    is_seen: bool  # whether it is the only one to show its mesh
+    is_weighed: bool  # whether the mass of its body follows from it
 
     @property
     def is_kept(self) -> bool:
@@ -96,9 +92,64 @@ class _Mesh(NamedTuple):
     placed: PlacedMesh
 
 
-def plan_mjcf(compiler: Compiler, sources: Sources) -> Plan:
-    """Find the collision meshes of an MJCF model; the rest is as for `rlacd.io.robots.urdf.plan_urdf`."""
-    root = compiler.root
+@dataclass(frozen=True, eq=False)
+class Mjcf(Document):
+    """An MJCF model, the names of its assets, the meshes that are replaced, and the geoms of each collider."""
+
+    compiler: Compiler
+    assets: Sequence[str]
+    meshes_of: Mapping[str, _Mesh]
+    found: Mapping[Collider, Sequence[_Geom]]
+
+    kind = "mjcf"
+
+    def motion(self, samples: int, seed: int) -> Motion:
+        """See `Robot`."""
+        return mjcf_motion(self.source, samples, seed, [body.name for body in self.bodies])
+
+    def copied(self, stem: str) -> dict[MeshFile, str]:
+        """See `Document`."""
+        files = [mesh.file for body in self.bodies for collider in body.colliders for mesh in collider.meshes]
+        unread, taken = [file for file in dict.fromkeys(files) if not mujoco_reads(file.path)], set[str]()
+        return {file: f"{stem}_{unused_stem(file.path.stem, taken)}_visual.obj" for file in unread}
+
+    def paired(self, pairs: Sequence[LinkPair], asked: RobotOptions, said: list[str]) -> list[Edit]:
+        """See `Document`."""
+        return excludes(self.root, [pair for pair in pairs if pair.kind in asked.exclude], said)
+
+    def edits(
+        self, place: Path, folder: Path, hulls: HullFiles, copies: Mapping[Path, str], said: list[str]
+    ) -> list[Edit]:
+        """See `Document`."""
+        within = os.path.relpath(self.root.file.folder / self.compiler.mesh_folder, self.root.file.folder)
+        there = os.path.abspath(place.absolute().parent / within)  # the folder of meshes, seen from the new file
+        target = Path(os.path.relpath(folder.absolute(), there))
+        taken = {*self.assets, *(str(e.attributes.get("name")) for e in self.root.walk() if e.tag == "geom")}
+        names, edits = _hull_assets(self.found, self.meshes_of, hulls, target, {*taken})
+        for mesh in self.meshes_of.values():
+            values = {"file": moved} if (moved := self.compiler.relocated(mesh.asset)) is not None else {}
+            path = mesh.placed.file.path
+            if path in copies:
+                values["file"] = (target / copies[path]).as_posix()
+            if _lacks_volume(mesh.placed, mesh.full.get("inertia", "legacy")):
+                values["inertia"] = "shell"
+                weighed = any(
+                    geom.mesh == mesh.name and geom.is_weighed and "mass" not in geom.attributes
+                    for geoms in self.found.values()
+                    for geom in geoms
+                )
+                more = " Its mass is its area times the density." if weighed else ""
+                said.append(f'{path.name} has no volume, so its mesh got inertia="shell".{more}')
+            edits += [mesh.asset.replaced(mesh.asset.with_attributes(values))] if values else []
+        for collider, together in self.found.items():
+            edits += _geom_edits(together, names[collider], taken)
+        return edits + _relocations(self.compiler, edits, {mesh.asset for mesh in self.meshes_of.values()})
+
+
+def read_mjcf(source: Path, files: Files, *, apart: bool) -> Mjcf:
+    """Find the collision meshes of an MJCF model, as `rlacd.io.robots.urdf.read_urdf` does."""
+    root = opened(source, "mujoco")
+    compiler = read_model(root, files.references)
     defaults = Defaults.of(root)
     assets = {_mesh_name(mesh, defaults): mesh for section in root.named("asset") for mesh in section.named("mesh")}
     warnings: list[str] = []
@@ -107,36 +158,19 @@ def plan_mjcf(compiler: Compiler, sources: Sources) -> Plan:
     for name in dict.fromkeys(geom.mesh for geom in geoms):
         full = defaults.full(assets[name]) if name in assets else {}
         if "file" in full:
-            meshes[name] = _Mesh(name, assets[name], full, _unplaced(assets[name], full, compiler, sources))
+            meshes[name] = _Mesh(name, assets[name], full, _unplaced(assets[name], full, compiler, files))
         else:
             why = "has no file of its own" if name in assets else "is not in the file"
             warnings.append(f"The mesh {name} is left unchanged: it {why}.")
     geoms = [geom for geom in geoms if geom.mesh in meshes]
     warnings += _caveats(root, geoms)
     rewritten = {mesh.asset for mesh in meshes.values()}
-    files = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
-    relative = [file for file in files if file and not Path(file).is_absolute()]
-    bodies, found = _bodies(geoms, meshes, compiler, apart=sources.apart)
-
-    def edit(hulls: HullFiles, copies: Mapping[Path, str]) -> list[Edit]:
-        taken = {*assets, *(str(e.attributes.get("name")) for e in root.walk() if e.tag == "geom")}
-        names, edits = _hull_assets(found, meshes, hulls, sources.named, {*taken})
-        for mesh in meshes.values():
-            values = {"file": moved} if (moved := compiler.relocated(mesh.asset)) is not None else {}
-            path = mesh.placed.surface.path
-            if path in copies:
-                values["file"] = sources.named(mesh.full["file"], copies[path])
-            if _lacks_volume(mesh.placed, mesh.full.get("inertia", "legacy")):
-                values["inertia"] = "shell"
-                weighed = any(g.mesh == mesh.name and g.is_weighed and "mass" not in g.attributes for g in geoms)
-                said = " Its mass is its area times the density." if weighed else ""
-                warnings.append(f'{path.name} has no volume, so its mesh got inertia="shell".{said}')
-            edits += [mesh.asset.replaced(mesh.asset.with_attributes(values))] if values else []
-        for collider, together in found.items():
-            edits += _geom_edits(together, names[collider], taken)
-        return edits + _relocations(compiler, edits, rewritten)
-
-    return Plan(bodies, edit, relative, warnings)
+    names = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
+    relative = [name for name in names if name and not Path(name).is_absolute()]
+    bodies, found = _bodies(geoms, meshes, compiler, apart=apart)
+    return Mjcf(
+        source, bodies, warnings, 1.0, "z", root, files.references, relative, compiler, [*assets], meshes, found
+    )
 
 
 def _bodies(
@@ -164,7 +198,7 @@ def _hull_assets(
     found: Mapping[Collider, Sequence[_Geom]],
     meshes: Mapping[str, _Mesh],
     hulls: HullFiles,
-    named: Callable[[str, str], str],
+    target: Path,
     taken: set[str],
 ) -> tuple[dict[Collider, list[str]], list[Edit]]:
     """Name the hulls, and add their assets behind those of the meshes whose place they take."""
@@ -177,7 +211,7 @@ def _hull_assets(
             stem = mesh.name if len(geoms) == 1 else collider.name
             done[key] = [_unused(f"{stem}_{i:03d}", taken) for i in range(len(hulls[collider]))]
             own = zip(done[key], hulls[collider], strict=True)
-            values = [{"name": name, "file": named(mesh.full["file"], file)} for name, file in own]
+            values = [{"name": name, "file": (target / file).as_posix()} for name, file in own]
             if "inertia" in mesh.full:  # hulls weigh nothing, and may be too thin for the others
                 values = [each | {"inertia": "shell"} for each in values]
             behind.setdefault(mesh.name, []).extend(mesh.asset.with_attributes(each) for each in values)
@@ -276,13 +310,13 @@ def _collides(attributes: Mapping[str, str]) -> bool:
     return any(attributes.get(name, "1").strip() != "0" for name in ("contype", "conaffinity"))
 
 
-def _unplaced(asset: Element, full: Mapping[str, str], compiler: Compiler, sources: Sources) -> PlacedMesh:
+def _unplaced(asset: Element, full: Mapping[str, str], compiler: Compiler, files: Files) -> PlacedMesh:
     """Read the file of an asset; its coordinates are taken from ``refpos`` and ``refquat``, then scaled."""
     where = f"mesh {full.get('name', full['file'])} of {asset.file.path}"
     folder = compiler.root.file.folder / compiler.mesh_folder
-    place = sources.references.find(compiler.relocated(asset) or full["file"], folder)
+    file = files.mesh(compiler.relocated(asset) or full["file"], folder)
     turned = Angles().pose({"pos": full.get("refpos", "0 0 0"), "quat": full.get("refquat", "1 0 0 0")}, where)
-    return PlacedMesh(sources.load(place), read_scale(full.get("scale"), where), np.eye(4), inverse(turned))
+    return PlacedMesh(file, read_scale(full.get("scale"), where), np.eye(4), inverse(turned))
 
 
 def _mesh_name(mesh: Element, defaults: Defaults) -> str:

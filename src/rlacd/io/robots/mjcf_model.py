@@ -7,15 +7,16 @@ nothing is there, to that of the file that names them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read.open_file import read_named
 from rlacd.io.robots.poses import Angles
 from rlacd.io.robots.references import References
-from rlacd.io.robots.spans import Element, expand
+from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, expand
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.poses import product
 
@@ -137,7 +138,7 @@ class Compiler:
         return _numbers(geom, full, "mass" if "mass" in full else "density", "1000")[0] != 0
 
 
-def read_model(root: Element, references: References, read: Callable[[Path], bytes]) -> Compiler:
+def read_model(root: Element, references: References) -> Compiler:
     """Bring in what the model includes, and return the settings of the whole.
 
     Raises
@@ -150,7 +151,7 @@ def read_model(root: Element, references: References, read: Callable[[Path], byt
         main = root.file.folder
         return references.find(name, main if (main / name).is_file() else element.file.folder)
 
-    expand(root, find, read)
+    expand(root, find, lambda path: read_named(path, LARGEST_DESCRIPTION))
     return Compiler.of(root)
 
 

@@ -42,6 +42,24 @@ def numbers(attributes: Mapping[str, str], name: str, count: int, where: str) ->
     return values
 
 
+def read_scale(text: str | None, where: str) -> FloatArray:
+    """Read three factors, or one for all axes.
+
+    Raises
+    ------
+    MeshFileError
+        They are not numbers, or one of them is zero.
+    """
+    try:
+        values = [float(word) for word in (text or "1 1 1").split()]
+    except ValueError:
+        values = []
+    values = values * 3 if len(values) == 1 else values
+    if len(values) != 3 or not all(0 < abs(value) < float("inf") for value in values):
+        raise MeshFileError(f"the scale {text!r} in {where} is not three numbers other than zero.")
+    return np.array(values)
+
+
 def urdf_origin(attributes: Mapping[str, str], where: str) -> FloatArray:
     """The pose that an ``<origin>`` of a URDF states: roll, pitch and yaw about fixed axes."""
     angles = numbers(attributes, "rpy", 3, where) or [0.0] * 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,8 @@ from rlacd.clear import LinkPair
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError
 from rlacd.fit import Fit
-from rlacd.io.robots.bodies import Body, Collider, size_of
-from rlacd.io.robots.clearance import Checked, Robot
-from rlacd.io.robots.shown import shown
-from rlacd.view.robot import RobotResult
+from rlacd.io.robots.decomposed import Checked
+from rlacd.io.robots.robot import Body, Collider, Results, Robot, Written
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +45,9 @@ class RewrittenLink:
     results: Sequence[Decomposition]
 
     @classmethod
-    def of(
-        cls, body: Body, results: Mapping[Collider, Decomposition], names: Mapping[Collider, Sequence[str]]
-    ) -> RewrittenLink:
+    def of(cls, body: Body, results: Results, names: Mapping[Collider, Sequence[str]]) -> RewrittenLink:
         """What became of a body."""
-        meshes = [mesh.surface.path for collider in body.colliders for mesh in collider.meshes]
+        meshes = [mesh.file.path for collider in body.colliders for mesh in collider.meshes]
         files = [name for collider in body.colliders for name in names[collider]]
         return cls(body.name, meshes, body.hulls(results), files, [results[collider] for collider in body.colliders])
 
@@ -85,8 +81,6 @@ class Rewritten:
         What each two of the links do at the joint positions that were looked at; empty if none were.
     samples
         How many those are.
-    as_result
-        Makes of it what the viewer and the report show.
     """
 
     path: Path
@@ -98,7 +92,7 @@ class Rewritten:
     metres: float = 1.0
     pairs: Sequence[LinkPair] = ()
     samples: int = 0
-    as_result: Callable[[], RobotResult] | None = None
+    _source: tuple[Robot, Checked] | None = None
 
     @property
     def complete(self) -> bool:
@@ -118,11 +112,12 @@ class Rewritten:
         MeshError
             No link has a collision mesh.
         """
-        if self.as_result is None:
+        if self._source is None or not self.links:
             raise MeshError(f"{self.path} has no collision mesh, so there is nothing to show.")
+        from rlacd.io.robots.viewed import shown
         from rlacd.view.report import save_report_page
 
-        return save_report_page(self.as_result(), path)
+        return save_report_page(shown(*self._source, self.warnings, self.seconds), path)
 
     def report(self) -> dict[str, Any]:
         """All measurements as plain values; lengths named ``_abs`` are in the robot's unit."""
@@ -152,25 +147,16 @@ class Rewritten:
         }
 
 
-def rewritten(
-    robot: Robot,
-    done: Checked,
-    names: Mapping[Collider, Sequence[str]],
-    places: tuple[Path, Path],
-    warnings: list[str],
-    began: float,
-) -> Rewritten:
-    """What became of a robot that was written, with hulls of these names, to a file and a folder."""
-    links, seconds = [RewrittenLink.of(body, done.results, names) for body in robot.bodies], time.perf_counter() - began
-
-    def as_result() -> RobotResult:
-        return shown(robot, done, warnings, seconds)
-
-    size, show = size_of(robot.bodies), as_result if links else None
-    return Rewritten(*places, links, warnings, seconds, size, robot.metres, done.pairs, done.samples, show)
+def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began: float) -> Rewritten:
+    """What became of a robot that was written, since a time of `time.perf_counter`."""
+    links = [RewrittenLink.of(body, done.results, written.names) for body in robot.bodies]
+    said = [] if links else [f"{robot.source} has no collision mesh, so this is a copy."]
+    said += [*robot.warnings, *written.warnings, *warnings_of(robot, done.results), *done.warnings]
+    seconds, of_links = time.perf_counter() - began, (done.pairs, done.samples)
+    return Rewritten(place, written.folder, links, said, seconds, robot.size, robot.metres, *of_links, (robot, done))
 
 
-def warnings_of(robot: Robot, results: Mapping[Collider, Decomposition]) -> list[str]:
+def warnings_of(robot: Robot, results: Results) -> list[str]:
     """What the reports of all solids warn of; the worst lost the widest passage, or has hulls that reach farthest."""
     solids = {id(result): (collider.name, result) for collider, result in results.items()}
     each = [(name, result, said) for name, result in solids.values() for said in result.report["warnings"]]

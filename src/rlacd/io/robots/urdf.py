@@ -5,16 +5,24 @@ Links that fixed joints connect stay apart: programs name them, and attach senso
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+import os
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
+import networkx
 import numpy as np
 
+from rlacd.clear import LinkPair, Motion, urdf_motion
 from rlacd.errors import MeshFileError
-from rlacd.io.robots.bodies import Body, Collider, PlacedMesh
-from rlacd.io.robots.plan import HullFiles, Plan, Sources, colliders, read_scale
-from rlacd.io.robots.poses import urdf_origin
+from rlacd.io.robots.document import Document, Files, HullFiles, opened
+from rlacd.io.robots.matrix import srdf
+from rlacd.io.robots.poses import read_scale, urdf_origin
+from rlacd.io.robots.robot import Body, Collider, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
+from rlacd.io.write import write_file
+from rlacd.options.robots import RobotOptions
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.poses import product
 
@@ -37,42 +45,70 @@ class _Collision(NamedTuple):
         return (*own.items(), *about.items(), *said, *inner)
 
 
-def plan_urdf(root: Element, sources: Sources) -> Plan:
-    """Find the collision meshes of a URDF.
+@dataclass(frozen=True, eq=False)
+class Urdf(Document):
+    """A URDF, and what it says of the meshes of each collider."""
+
+    found: Mapping[Collider, Sequence[_Collision]]
+
+    kind = "urdf"
+
+    def motion(self, samples: int, seed: int) -> Motion:
+        """See `Robot`."""
+        return urdf_motion(self.source, samples, seed, [body.name for body in self.bodies])
+
+    def edits(self, place: Path, folder: Path, hulls: HullFiles, *_: object) -> list[Edit]:
+        """See `Document`."""
+        edits = []
+        for collider, (first, *others) in self.found.items():
+            names = [self._reference(first.mesh.attributes["filename"], hull, folder) for hull in hulls[collider]]
+            pieces = [_with_mesh(first, name, index) for index, name in enumerate(names)]
+            edits.append(first.element.replaced(first.element.indent.join(pieces)))
+            edits += [other.element.removed() for other in others]
+        return edits
+
+    def paired(self, pairs: Sequence[LinkPair], asked: RobotOptions, said: list[str]) -> list[Edit]:
+        """See `Document`."""
+        if asked.srdf is not None:
+            write_file(Path(asked.srdf), srdf(self.root.attributes.get("name", "robot"), pairs))
+        return []
+
+    def _reference(self, old: str, hull: str, folder: Path) -> str:
+        """Refer to a hull the way the mesh was: by its package if it lies in that, else relative to the file."""
+        package, target = self.references.package_of(old), Path(os.path.abspath(folder)) / hull
+        if package is not None and target.is_relative_to(package):
+            scheme, rest = old.split("://", 1)
+            return f"{scheme}://{rest.split('/', 1)[0]}/{target.relative_to(package).as_posix()}"
+        return f"{folder.name}/{hull}"
+
+
+def read_urdf(source: Path, files: Files, *, apart: bool) -> Urdf:
+    """Find the collision meshes of a URDF, to be decomposed each for itself or, not `apart`, as links.
 
     Raises
     ------
     MeshFileError
-        A mesh cannot be found or read, a number is none, or the file still holds macros.
+        It or a mesh cannot be found or read, a number is none, or it still holds macros.
     """
+    root = opened(source, "robot")
     if any(element.tag.startswith("xacro:") for element in root.walk()):
-        raise MeshFileError(f"{root.file.path} holds xacro macros: expand it with the tool xacro first.")
+        raise MeshFileError(f"{source} holds xacro macros: expand it with the tool xacro first.")
     poses, bodies = _link_poses(root), []
     found: dict[Collider, list[_Collision]] = {}
     for link in root.named("link"):
         name = link.attributes.get("name", "?")
-        collisions = [each for element in link.named("collision") if (each := _collision(element, link, sources))]
-        own = colliders(name, [(None if sources.apart else each.kind, each.placed, each) for each in collisions])
+        collisions = [each for element in link.named("collision") if (each := _collision(element, link, files))]
+        own = colliders(name, [(None if apart else each.kind, each.placed, each) for each in collisions])
         found |= own
         bodies += [Body(name, poses.get(name, np.eye(4)), [*own])] if own else []
     replaced = {collision.mesh for collisions in found.values() for collision in collisions}
     others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced]
     names = [each.attributes.get("filename", "") for each in others]
     relative = [name for name in names if name and "://" not in name and not name.startswith("/")]
-
-    def edit(hulls: HullFiles, _: object) -> list[Edit]:
-        edits = []
-        for collider, (first, *others) in found.items():
-            references = [sources.named(first.mesh.attributes["filename"], hull) for hull in hulls[collider]]
-            pieces = [_with_mesh(first, name, index) for index, name in enumerate(references)]
-            edits.append(first.element.replaced(first.element.indent.join(pieces)))
-            edits += [other.element.removed() for other in others]
-        return edits
-
-    return Plan(bodies, edit, relative)
+    return Urdf(source, bodies, [], 1.0, "z", root, files.references, relative, found)
 
 
-def _collision(element: Element, link: Element, sources: Sources) -> _Collision | None:
+def _collision(element: Element, link: Element, files: Files) -> _Collision | None:
     """What collides as a mesh, if it does."""
     mesh = next((mesh for geometry in element.named("geometry") for mesh in geometry.named("mesh")), None)
     if mesh is None:
@@ -81,9 +117,8 @@ def _collision(element: Element, link: Element, sources: Sources) -> _Collision 
     reference = mesh.attributes.get("filename", "")
     if not reference:
         raise MeshFileError(f"a collision mesh of {where} has no filename: give it one.")
-    surface = sources.load(sources.references.find(reference, link.file.folder))
-    scale = read_scale(mesh.attributes.get("scale"), where)
-    return _Collision(element, mesh, PlacedMesh(surface, scale, _origin(element, where), np.eye(4)))
+    scale, file = read_scale(mesh.attributes.get("scale"), where), files.mesh(reference, link.file.folder)
+    return _Collision(element, mesh, PlacedMesh(file, scale, _origin(element, where), np.eye(4)))
 
 
 def _origin(element: Element, where: str) -> FloatArray:
@@ -93,24 +128,20 @@ def _origin(element: Element, where: str) -> FloatArray:
 
 def _link_poses(root: Element) -> dict[str, FloatArray]:
     """Where links stand with all joints at zero; those that no joint carries stand at the origin."""
-    joints: dict[str, tuple[str, FloatArray]] = {}
+    tree = networkx.DiGraph()
     for joint in root.named("joint"):
         ends = {end.tag: end.attributes.get("link", "") for end in joint.named("parent", "child")}
-        if len(ends) == 2:
+        if len(ends) == 2 and not (ends["child"] in tree and tree.in_degree(ends["child"])):
             where = f"joint {joint.attributes.get('name', '?')} of {root.file.path}"
-            joints.setdefault(ends["child"], (ends["parent"], _origin(joint, where)))
-
-    def pose(link: str) -> FloatArray:
-        chain, seen = [], {link}
-        while link in joints:
-            link, origin = joints[link]
-            if link in seen:
-                raise MeshFileError(f"in {root.file.path}, joints carry the link {link} around in a loop.")
-            chain.append(origin)
-            seen.add(link)
-        return product(*reversed(chain))
-
-    return {child: pose(child) for child in joints}
+            tree.add_edge(ends["parent"], ends["child"], origin=_origin(joint, where))
+    if not networkx.is_directed_acyclic_graph(tree):
+        (link, _), *_ = networkx.find_cycle(tree)
+        raise MeshFileError(f"in {root.file.path}, joints carry the link {link} around in a loop.")
+    poses: dict[str, FloatArray] = {}
+    for link in networkx.topological_sort(tree):
+        carried = [product(poses[up], at) for up, _, at in tree.in_edges(link, data="origin")]
+        poses[link] = carried[0] if carried else np.eye(4)
+    return poses
 
 
 def _with_mesh(collision: _Collision, reference: str, index: int) -> bytes:

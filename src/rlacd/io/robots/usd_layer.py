@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,7 @@ def rewrite(values: Values, blobs: Blobs) -> Answered:
             hulls[prim.GetPath()] = _hulls(stage, prim, shapes) if lead == index else hulls[colliders[lead].GetPath()]
             UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)
         left = _retarget(stage, hulls)
+        _filter(stage, values["filtered"], hulls)
         files: list[str] = []
         if values["sublayer"] is None:
             layer, files = _flat(stage, path.absolute().parent)
@@ -76,7 +77,7 @@ def rewrite(values: Values, blobs: Blobs) -> Answered:
         nodes.append({**said, **_place(prim)})
         arrays |= {f"{index}.points": points.tobytes(), f"{index}.faces": faces.tobytes()}
     whole = {"metres": float(UsdGeom.GetStageMetersPerUnit(stage)), "up": str(UsdGeom.GetStageUpAxis(stage)).lower()}
-    return {"nodes": nodes, "warnings": warnings, **whole}, arrays
+    return {"nodes": nodes, "warnings": warnings, "joints": _joints(stage), **whole}, arrays
 
 
 def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:
@@ -237,6 +238,34 @@ def _retarget(stage: Any, hulls: Mapping[Any, list[Any]]) -> list[str]:
             elif named and OF_COLLISIONS.match(link.GetName()) and not TO_FRAMES.match(link.GetName()):
                 left.append(f"{link.GetPath()} names {named[0]}, which no longer collides: its hulls do.")
     return left
+
+
+def _joints(stage: Any) -> list[tuple[str, str]]:
+    """The rigid bodies that each joint connects."""
+    from pxr import UsdPhysics
+
+    pairs = []
+    for prim in stage.Traverse():
+        if prim.IsA(UsdPhysics.Joint):
+            joint = UsdPhysics.Joint(prim)
+            ends = [end for rel in (joint.GetBody0Rel(), joint.GetBody1Rel()) for end in rel.GetTargets()[:1]]
+            bodies = [_body(end) for path in ends if (end := stage.GetPrimAtPath(path))]
+            if len(bodies) == 2 and all(bodies) and bodies[0] != bodies[1]:
+                pairs.append((str(bodies[0].GetPath()), str(bodies[1].GetPath())))
+    return pairs
+
+
+def _filter(stage: Any, pairs: Sequence[tuple[str, str]], hulls: Mapping[Any, list[Any]]) -> None:
+    """Let pairs of bodies not collide; of meshes without a body, their hulls."""
+    from pxr import UsdPhysics
+
+    for pair in pairs:
+        first, second = sorted(
+            map(stage.GetPrimAtPath, pair), key=lambda prim: not prim.HasAPI(UsdPhysics.RigidBodyAPI)
+        )
+        named = [second.GetPath()] if second.HasAPI(UsdPhysics.RigidBodyAPI) else hulls[second.GetPath()]
+        for path in named:
+            UsdPhysics.FilteredPairsAPI.Apply(first).CreateFilteredPairsRel().AddTarget(path)
 
 
 def _mass(points: Any, faces: Any, scale: list[float]) -> dict[str, Any]:

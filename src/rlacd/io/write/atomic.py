@@ -9,8 +9,6 @@ import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
-from filelock import FileLock, Timeout
-
 from rlacd.errors import OutputError, OutputNameError
 
 _OF_NAMES = (errno.EISDIR, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP)
@@ -91,21 +89,3 @@ def _reason(error: OSError) -> str:
         errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
     }
     return known.get(error.errno or 0, f"{error.strerror or error}; choose another place")
-
-
-def lock_folder(folder: Path, file: Path) -> FileLock:
-    """Lock `folder` for this run by holding `file`; the system releases it when the process ends, however it does.
-
-    Raises
-    ------
-    OutputError
-        Another run holds it.
-    OSError
-        The file cannot be created.
-    """
-    lock = FileLock(file, blocking=False, thread_local=False)
-    try:
-        lock.acquire()
-    except Timeout as error:
-        raise OutputError(f"another run is writing to {folder}; wait for it or choose another folder.") from error
-    return lock

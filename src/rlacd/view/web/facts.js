@@ -56,8 +56,8 @@ export function summary(scene, { draft = false } = {}) {
     report.primitives && term(plural(parts.filter((part) => part.primitive).length, "primitive"), HINTS.primitives),
     scene.robot && term(plural(scene.robot.links.length, "link"), HINTS.links),
     term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
-    concavity && term(`concavity\u00a0${digits(concavity.max)}`, HINTS.concavity),
-    distance && term(`distance\u00a0${digits(distance.max)}`, HINTS.concavity),
+    concavity && term(`concavity at most\u00a0${digits(concavity.max)}`, HINTS.concavity),
+    distance && term(`distance at most\u00a0${digits(distance.max)}`, HINTS.concavity),
     volume?.max != null && term(`${percent(volume.max)} of volume added`, HINTS.added),
     navigable && term(`${plural(navigable.balls, "ball")} left free`, HINTS.balls),
     !draft && seconds?.total != null && term(`${seconds.total.toFixed(2)}\u00a0s`, HINTS.seconds),
@@ -97,8 +97,8 @@ export function fitTable(report, scene) {
   const add = (name, value, hint) => {
     if (value != null) rows.push([term(name, hint), measure(value, scene), `${digits(50 * value, 2)}\u00a0%`]);
   };
-  add("Largest concavity", report.concavity?.max, HINTS.concavity);
-  add("Largest distance", report.distance?.max, HINTS.concavity);
+  add("Concavity, at most", report.concavity?.max, HINTS.concavity);
+  add("Distance, at most", report.distance?.max, HINTS.concavity);
   if (report.volume?.max != null) rows.push([term("Largest added volume", HINTS.added), percent(report.volume.max), ""]);
   add("Deepest intrusion", report.navigable?.intrusion?.max, HINTS.intrusion);
   add("Hulls beyond the input", report.hausdorff?.over, HINTS.over);
