@@ -260,7 +260,7 @@ def test_pairs_of_bodies_that_a_joint_connects_are_filtered_where_asked(tmp_path
     done = rlacd.rewrite_robot(source, tmp_path / "out.usda", threads=1, quality="fast", exclude=how)
     shown = decompose_viewed(source, quality="fast", threads=1)
     assert (shown.links, shown.joints) == (["/robot", "/arm", "/floor"], ()), "the page shows a stage as it stands"
-    assert shown.touching([]) == []
+    assert [contact[:2] for contact in shown.touching([])] == [(0, 2), (1, 2)], "but for what a joint connects"
     kinds = {(pair.first, pair.second): pair.kind for pair in done.pairs}
     assert kinds[("/robot", "/arm")] == "adjacent"
     assert kinds[("/robot", "/floor")] == kinds[("/arm", "/floor")] == "sometimes"
