@@ -64,10 +64,8 @@ class _Hole:
         How far the cap leads away from the surface: anywhere; where the ball can, and cannot, reach it (0 if near).
     is_smooth, is_ring
         Whether the cap continues the faces around it; whether it is a round ring.
-    is_tube, is_end
-        Whether a tube ends here; whether it has no other hole, as a bar: a pipe has two.
-    is_damage
-        Whether missing faces left it.
+    is_tube, is_end, is_damage
+        Whether a tube ends here; whether it is the tube's only hole; whether missing faces left it.
     """
 
     loop: Int64Array
@@ -159,10 +157,8 @@ class _Caps:
     def _classified(self) -> list[_Hole]:
         """The holes, each with whether it is damage."""
         holes = self._measured()
-        is_damaged = sum(hole.looks_damaged for hole in holes) >= max(_DAMAGED, _GOOD_PART * len(holes))
-        return [
-            replace(hole, is_damage=hole.may_be_damage(is_damaged) and not self._is_plugged(hole)) for hole in holes
-        ]
+        damaged = sum(one.looks_damaged for one in holes) >= max(_DAMAGED, _GOOD_PART * len(holes))
+        return [replace(one, is_damage=one.may_be_damage(damaged) and not self._is_plugged(one)) for one in holes]
 
     def _measured(self) -> list[_Hole]:
         """The holes, each measured by itself."""
