@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import re
+import shutil
+import subprocess
+import sys
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -83,6 +88,40 @@ def test_options_without_meaning_are_reported_once_each() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", UnusedOptionWarning)
         our_coacd.run_coacd(mesh, **given)
+
+
+@pytest.mark.promise("drop-in")
+def test_the_command_has_the_originals_flags() -> None:
+    pytest.importorskip("coacd", reason="the group bench is not installed")
+    theirs, ours = (
+        subprocess.run([*command, "--help"], capture_output=True, text=True).stdout
+        for command in (
+            [shutil.which("coacd") or pytest.skip("its command is not installed")],
+            [sys.executable, "-m", "rlacd.compat.coacd"],
+        )
+    )
+    flags = [set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", text)) for text in (theirs, ours)]
+    assert flags[0] <= flags[1] or not flags[0]
+    assert {"-t", "--threshold", "-c", "-mi", "--split"} <= flags[1]
+
+
+def test_the_command_writes_a_hull_an_object_and_says_what_has_no_effect(tmp_path: Path) -> None:
+    table().export(tmp_path / "in.obj")
+    words = ["-i", str(tmp_path / "in.obj"), "-o", str(tmp_path / "out.obj"), "-t", "0.1", "-c", "3", "--split"]
+    with pytest.warns(UnusedOptionWarning, match="mcts_iterations"):
+        our_coacd.main([*words, "-mi", "200"])
+    parts = sorted((tmp_path / "out_parts").iterdir())
+    assert len(parts) <= 3
+    assert (tmp_path / "out.obj").read_text().count("\no ") == len(parts)
+    with pytest.raises(SystemExit):
+        our_coacd.main([*words[:1], "nowhere.obj", *words[2:]])
+
+
+def test_run_coacd_takes_a_trimesh() -> None:
+    mesh = table()
+    given = mesh, our_coacd.Mesh(mesh.vertices, mesh.faces)
+    one, two = (our_coacd.run_coacd(each, threshold=0.1) for each in given)
+    assert all(np.array_equal(a, b) for (a, _), (b, _) in zip(one, two, strict=True))
 
 
 # --- V-HACD and trimesh -----------------------------------------------------------------------------------------------

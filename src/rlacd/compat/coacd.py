@@ -1,17 +1,24 @@
-"""CoACD's Python interface (coacd 1.0.14), decomposed by rlacd.
+"""CoACD's interface (coacd 1.0.14), decomposed by rlacd.
 
-``import coacd`` becomes ``from rlacd.compat import coacd``; the rest of a program stays as it is.
+``import coacd`` becomes ``from rlacd.compat import coacd``; the rest of a program stays as it is. The command
+``coacd -i in.obj -o out.obj`` becomes ``python -m rlacd.compat.coacd -i in.obj -o out.obj``.
 """
 
 from __future__ import annotations
 
+import argparse
+import inspect
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import trimesh
 
 from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
+from rlacd.errors import RlacdError
+from rlacd.io.read.load import load_mesh
 from rlacd.options import LENGTHS
 from rlacd.options.fields import flag, integer, number, one_of, read
 from rlacd.options.keywords import suggesting
@@ -64,7 +71,7 @@ def run_coacd(
     Parameters
     ----------
     mesh : Mesh
-        Or any object with ``vertices`` and ``indices``, such as coacd's own.
+        Or any object with ``vertices`` and ``indices``, such as coacd's own, or ``faces``, as trimesh's.
     threshold : float
         Concavity, in CoACD's measure and frame, or in the mesh's unit with `real_metric`.
     max_convex_hull : int
@@ -104,7 +111,7 @@ def run_coacd(
     decimate, real_metric = read(flag(), "decimate", decimate), read(flag(), "real_metric", real_metric)
     extrude, margin = read(flag(), "extrude", extrude), read(number(0.0), "extrude_margin", extrude_margin)
     result = decompose(
-        (mesh.vertices, mesh.indices),
+        (mesh.vertices, mesh.indices if hasattr(mesh, "indices") else mesh.faces),
         criterion="concavity",
         threshold=None if real_metric else max(threshold, LENGTHS["threshold"][0]),
         threshold_abs=threshold if real_metric else None,
@@ -120,3 +127,50 @@ def run_coacd(
 
 def set_log_level(level: str) -> None:
     """Accept CoACD's log levels; rlacd logs nothing."""
+
+
+FLAGS: dict[str, str] = {
+    **{"-t --threshold": "threshold", "-pm --preprocess-mode": "preprocess_mode", "-r --resolution": "resolution"},
+    **{"-nm --no-merge": "merge", "-d --decimate": "decimate", "-dt --max-ch-vertex": "max_ch_vertex"},
+    **{"-ex --extrude": "extrude", "-em --extrude-margin": "extrude_margin"},
+    **{"-c --max-convex-hull": "max_convex_hull", "-mi --mcts-iteration": "mcts_iterations"},
+    **{"-md --mcts-max-depth": "mcts_max_depth", "-mn --mcts-node": "mcts_nodes"},
+    **{"-pr --prep-resolution": "preprocess_resolution", "--pca": "pca", "-am --apx-mode": "apx_mode"},
+    "--seed": "seed",
+}
+"""Flags of CoACD's command, and the arguments of `run_coacd` that they are."""
+
+
+def main(words: list[str] | None = None) -> None:
+    """Run CoACD's command line: same flags, same files."""
+    parser = argparse.ArgumentParser("python -m rlacd.compat.coacd", description="CoACD's command, done by rlacd.")
+    parser.add_argument("-i", "--input", required=True, type=Path, help="any mesh file that rlacd reads")
+    parser.add_argument("-o", "--output", required=True, type=Path, help="any mesh file that trimesh writes")
+    parser.add_argument("--quiet", action="store_true", help="print nothing")
+    parser.add_argument("--split", action="store_true", help="each hull in a file of its own too, in OUTPUT_parts")
+    usual = inspect.signature(run_coacd).parameters
+    for flags, name in FLAGS.items():
+        default = usual[name].default
+        if isinstance(default, bool):
+            parser.add_argument(*flags.split(), dest=name, action="store_false" if default else "store_true")
+        else:
+            parser.add_argument(*flags.split(), dest=name, type=type(default), default=default)
+    given = vars(parser.parse_args(words))
+    source, output, split, quiet = (given.pop(name) for name in ("input", "output", "split", "quiet"))
+    try:
+        mesh = load_mesh(source)
+        hulls = [trimesh.Trimesh(v, f, process=False) for v, f in run_coacd(mesh, **given)]
+    except RlacdError as error:
+        parser.error(str(error))
+    trimesh.Scene(hulls).export(output)
+    if split:
+        folder = output.with_name(f"{output.stem}_parts")
+        folder.mkdir(exist_ok=True)
+        for number, hull in enumerate(hulls):
+            hull.export(folder / f"{output.stem}_{number:03d}{output.suffix}")
+    if not quiet:
+        print(f"{output}: {len(hulls)} hulls")
+
+
+if __name__ == "__main__":
+    main()
