@@ -30,7 +30,7 @@ from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.environment import CutEnv, Memory, terminal_reward
 from rlacd.merge import drop_slivers, merge_parts
-from rlacd.planes.candidates import concave_edge_planes
+from rlacd.planes.candidates import reflex_edge_planes
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
@@ -39,7 +39,7 @@ from rlacd.solid.component import Component, Plane
 from rlacd.solid.solid import Solid
 
 SHORTLIST = 10
-"""Planes of least hull sum that are tried, beside those of concave edges: what the paper's rule chooses among."""
+"""Planes of least hull sum that are tried, beside those of reflex edges: what the paper's rule chooses among."""
 
 PARTS = range(4, 13)
 """Parts by greedy-162 of the solids that are looked at."""
@@ -301,12 +301,12 @@ def key_of(component: Component) -> tuple[float, ...]:
 
 
 def planes_of(component: Component) -> list[Plane]:
-    """The ten best of the 150 planes by hull sum, and those of concave edges."""
+    """The ten best of the 150 planes by hull sum, and those of reflex edges."""
     candidates = paper_planes(component)
     scored = sweep(component, candidates)
     cost = np.where(valid_planes(component, candidates), scored.hull_below + scored.hull_above, np.inf)
     order = [i for i in np.argsort(cost, kind="stable")[:SHORTLIST].tolist() if math.isfinite(cost[i])]
-    edges = concave_edge_planes(component)
+    edges = reflex_edge_planes(component)
     return [candidates.plane(i) for i in order] + [edges.plane(i) for i in range(len(edges))]
 
 

@@ -16,7 +16,7 @@ from benchmarks.cli import PATH
 from benchmarks.runner import find_meshes
 from benchmarks.tables import Table
 from rlacd.cli.exit_codes import exit_codes
-from rlacd.criteria.concavity import Concavity, DistanceScreen
+from rlacd.criteria.concavity import Concavity, DistanceEarlyOut
 from rlacd.policies import Greedy
 from rlacd.run import work
 from rlacd.solid.component import ClippedPart, Component, Part
@@ -29,11 +29,11 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
     "cutting": (Component, "cut", lambda part, plane: (part.size,), work.cutting),
     "judging": (Concavity, "is_met", lambda goal, part: (len(part.faces), len(part.hull.faces)), work.judging),
     "joining": (Hull, "around", lambda *hulls: (sum(len(hull.vertices) for hull in hulls),), work.joining),
-    "testing": (DistanceScreen, "feasibility", lambda screen, solid, hull: (len(hull.vertices),), work.testing),
+    "testing": (DistanceEarlyOut, "feasibility", lambda early_out, solid, hull: (len(hull.vertices),), work.testing),
     "screening": (
-        DistanceScreen,
+        DistanceEarlyOut,
         "feasibilities",
-        lambda screen, solid, hulls, pairs, threads: (
+        lambda early_out, solid, hulls, pairs, threads: (
             sum(len(hulls[i]) for i in pairs.ravel().tolist()),
             len(pairs),
         ),

@@ -55,7 +55,7 @@ def main(mesh: Path | None, run: Path, **changes: object) -> list[dict[str, floa
         own = point["validation_own_plane"]
         print(f"{point['env_steps']:7d}  {own:12.2f}  {'#' * min(round(20 * own), 100)}")
 
-    # %% The network as a policy. `own` is what it learned; decompose adds planes of concave edges, and merges.
+    # %% The network as a policy. `own` is what it learned; decompose adds planes of reflex edges, and merges.
     [file] = folder.iterdir()
     found = rlacd.decompose(file, policy=str(policy), threshold=options.threshold, quality="fast")
     print(f"\n{len(found)} hulls by the network's ten best planes and merging; the policy is {policy}")

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 import rlacd
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
-from rlacd.planes.candidates import Candidates, concave_edge_planes
+from rlacd.planes.candidates import Candidates, reflex_edge_planes
 from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import mid_planes
 from rlacd.repair.repair import repair
@@ -126,7 +126,7 @@ def depth_below_hull(component: Component, points: Floats) -> Floats:
 @pytest.mark.parametrize("name", sorted(SOLIDS.keys() - {"noisy scan"}))
 def test_every_concave_edge_is_offered_where_as_many_are_asked_for(name: str) -> None:
     component = Component(SOLIDS[name]())
-    edges, candidates = ReflexEdges.of(component), concave_edge_planes(component, 1000)
+    edges, candidates = ReflexEdges.of(component), reflex_edge_planes(component, 1000)
     for middle, normals in zip(edges.middle, edges.normals, strict=True):
         for normal in (normals[0] - normals[1], *normals):
             assert has(candidates, tuple(normal), float(normal @ middle), within=1e-3)
@@ -153,7 +153,7 @@ def test_edges_that_more_than_two_faces_share_are_left_out() -> None:
     ],
 )
 def test_convex_solids_have_no_candidates(solid: Callable[[], Manifold]) -> None:
-    assert len(concave_edge_planes(Component(solid()))) == 0
+    assert len(reflex_edge_planes(Component(solid()))) == 0
 
 
 X, Y, Z = np.eye(3).tolist()
@@ -173,14 +173,14 @@ KNOWN: dict[str, tuple[Callable[[], Manifold], int, list[tuple[list[float], floa
 @pytest.mark.parametrize("name", KNOWN)
 def test_planes_are_those_that_a_person_would_cut_along(name: str) -> None:
     solid, most, planes = KNOWN[name]
-    candidates = concave_edge_planes(Component(solid()))
+    candidates = reflex_edge_planes(Component(solid()))
     assert len(planes) <= len(candidates) <= most
     for normal, offset in planes:
         assert has(candidates, normal, offset, within=1e-15 if max(normal) == sum(np.abs(normal)) else 1e-8)
 
 
 def test_edges_on_a_staircase_are_spread_out() -> None:
-    candidates = concave_edge_planes(Component(staircase(16)))
+    candidates = reflex_edge_planes(Component(staircase(16)))
     steps = np.sort([plane.offset for plane in planes_of(candidates) if plane.normal == (1, 0, 0)])
     assert len(steps) == 4
     assert (np.diff(steps) >= 2).all()
@@ -193,7 +193,7 @@ def test_the_best_edge_is_deep_sharp_and_long() -> None:
     edges = ReflexEdges.of(component)
     weight = depth_below_hull(component, edges.middle) * edges.angle
     weight *= np.linalg.norm(edges.ends[:, 1] - edges.ends[:, 0], axis=1)
-    (best,) = edges.chosen(concave_edge_planes(component, 1))
+    (best,) = edges.chosen(reflex_edge_planes(component, 1))
     assert weight[best] == pytest.approx(weight.max())
 
 
@@ -201,7 +201,7 @@ def test_edges_of_a_scan_lie_deep_not_in_its_noise() -> None:
     component = Component(noisy_scan())
     edges = ReflexEdges.of(component)
     depth = depth_below_hull(component, edges.middle)
-    chosen = depth[edges.chosen(concave_edge_planes(component))]
+    chosen = depth[edges.chosen(reflex_edge_planes(component))]
     assert len(depth) > 1000
     assert len(chosen) == 4
     assert chosen.min() > np.median(depth)
@@ -210,7 +210,7 @@ def test_edges_of_a_scan_lie_deep_not_in_its_noise() -> None:
 
 def assert_planes_belong_to_edges(component: Component, count: int = 4) -> None:
     """Every plane contains a reflex edge; it halves its angle, or has one of its faces on one side and touches it."""
-    edges, candidates = ReflexEdges.of(component), concave_edge_planes(component, count)
+    edges, candidates = ReflexEdges.of(component), reflex_edge_planes(component, count)
     assert len(candidates) <= 3 * count
     assert np.linalg.norm(candidates.directions, axis=1) == pytest.approx(1)
     for plane in planes_of(candidates):
@@ -248,8 +248,8 @@ def test_planes_of_any_boxes_belong_to_edges(sizes: list[tuple[int, ...]], turn:
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_planes_turn_with_the_solid(axis: str) -> None:
     turn = Rotation.from_euler(axis, 33, degrees=True)
-    still = concave_edge_planes(Component(lopsided()))
-    turned = concave_edge_planes(Component(lopsided().rotate(tuple(turn.as_euler("xyz", degrees=True)))))
+    still = reflex_edge_planes(Component(lopsided()))
+    turned = reflex_edge_planes(Component(lopsided().rotate(tuple(turn.as_euler("xyz", degrees=True)))))
     assert len(still) == len(turned)
     for plane in planes_of(still):
         assert has(turned, tuple(turn.apply(plane.normal)), plane.offset)
@@ -258,7 +258,7 @@ def test_planes_turn_with_the_solid(axis: str) -> None:
 @pytest.mark.parametrize("name", ["L", "tilted table", "grooved cylinder", "lopsided"])
 def test_navacd_takes_the_cut_with_the_least_hulls(name: str) -> None:
     component = Component(SOLIDS[name]())
-    candidates = Candidates.joined(mid_planes(component), concave_edge_planes(component))
+    candidates = Candidates.joined(mid_planes(component), reflex_edge_planes(component))
     plane = make_policy("navacd").choose(component)
     assert plane is not None
     sums = []

@@ -19,7 +19,7 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import grow_cover, merge_parts
 from rlacd.merge.merge import united_in_turn
-from rlacd.merge.slivers import SLIVER_LOSS, drop_slivers, is_film, is_sliver
+from rlacd.merge.slivers import SLIVER_LOSS, drop_slivers, is_sliver, is_thin
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.run import Run, Work
@@ -147,8 +147,8 @@ def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
     assert is_sliver(slab(0.01).hull)
     assert not is_sliver(slab(0.03).hull)
     assert not is_sliver(Component(Manifold.sphere(1, 32)).hull)
-    assert is_film(slab(1e-4))
-    assert not is_film(slab(2e-3))
+    assert is_thin(slab(1e-4))
+    assert not is_thin(slab(2e-3))
 
 
 def test_a_sliver_goes_only_where_others_stand_for_it() -> None:
@@ -332,18 +332,18 @@ def test_a_quick_no_about_a_hull_or_a_pair_is_never_wrong(seed: int, threshold: 
     solid, blocks = heap_of_blocks(random)
     hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
     pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
-    screen = Concavity(threshold).screen
-    _, feasibilities = screen.feasibilities(solid.filling, [hull.body for hull in hulls], pairs, 1)
+    early_out = Concavity(threshold).early_out
+    _, feasibilities = early_out.feasibilities(solid.filling, [hull.body for hull in hulls], pairs, 1)
     for (i, j), feasibility in zip(pairs, feasibilities, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
-        alone = screen.feasibility(solid.filling, joint)
+        alone = early_out.feasibility(solid.filling, joint)
         assert (feasibility == Feasibility.MAYBE) <= (alone is Feasibility.MAYBE)
         assert (feasibility == Feasibility.NEVER) <= (alone is Feasibility.NEVER)
         assert not (share_fits(solid, joint, threshold) and Feasibility.MAYBE not in (feasibility, alone))
-        assert screen.forbids(solid.filling, joint) == (alone is Feasibility.NEVER)
+        assert early_out.forbids(solid.filling, joint) == (alone is Feasibility.NEVER)
         if alone is Feasibility.NEVER:
             larger = Hull.of(np.concatenate([joint.vertices, random.uniform(-1, 1, (3, 3))]))
-            tighter = Concavity(threshold * (1 - 1e-9)).screen
+            tighter = Concavity(threshold * (1 - 1e-9)).early_out
             assert tighter.feasibility(solid.filling, larger) is Feasibility.NEVER
 
 
@@ -373,8 +373,8 @@ def test_what_is_deep_in_a_hull_is_seen(
 ) -> None:
     whole = Component(solid())
     for threshold in too_deep:
-        assert Concavity(threshold).screen.feasibility(whole.filling, whole.hull) is Feasibility.NEVER
-    assert Concavity(deep_enough).screen.feasibility(whole.filling, whole.hull) is Feasibility.MAYBE
+        assert Concavity(threshold).early_out.feasibility(whole.filling, whole.hull) is Feasibility.NEVER
+    assert Concavity(deep_enough).early_out.feasibility(whole.filling, whole.hull) is Feasibility.MAYBE
 
 
 def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:
@@ -388,5 +388,5 @@ def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:
 def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
     component = Component(CROSS)
     space = Navigable(0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
-    assert space.screen.feasibility(component.filling, component.hull) is Feasibility.NEVER
-    assert not space.screen.forbids(component.filling, component.hull)
+    assert space.early_out.feasibility(component.filling, component.hull) is Feasibility.NEVER
+    assert not space.early_out.forbids(component.filling, component.hull)

@@ -96,7 +96,7 @@ LIMITS = {
         f"at most {report.MOST_HOLES:,}: `body`",
     ],
     "docs/policies.md": [
-        f"those of {WORDS[EDGES_PER_COMPONENT]} concave edges",
+        f"those of {WORDS[EDGES_PER_COMPONENT]} reflex edges",
         f"more than {MANY_COMPONENTS:,} pieces",
     ],
     "docs/training.md": [f"a side thinner than {100 * SLIVER:g} %"],

@@ -19,7 +19,7 @@ import rlacd
 from fuzz.networks import ABOUT, q_network
 from rlacd.errors import WeightsError
 from rlacd.options.names import LEARNED
-from rlacd.planes.candidates import concave_edge_planes
+from rlacd.planes.candidates import reflex_edge_planes
 from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import make_policy
 from rlacd.policies.greedy import Greedy, RandomShortlist, excess_norm, hull_sum, paper_planes_and_edges
@@ -210,7 +210,7 @@ def test_alone_the_greatest_value_decides_and_deployed_the_least_hulls_of_the_te
     worth = np.where(distinct_planes(component, candidates), values(sweep_features(component, 0.05))[:, 0], -np.inf)
     planes = [candidates.plane(int(i)) for i in np.argsort(-worth)[:shortlist]]
     if edges:
-        beside = concave_edge_planes(component, 4)
+        beside = reflex_edge_planes(component, 4)
         planes += [beside.plane(i) for i in range(len(beside))]
     sums = [sum(side.hull.volume for side in component.cut(plane) if side is not None) for plane in planes]
     chosen = QPolicy(lambda c: values(sweep_features(c, 0.05))[:, 0], shortlist, edges).choose(component)

@@ -78,7 +78,7 @@ def uncovered(hulls: Iterable[trimesh.Trimesh], mesh: trimesh.Trimesh) -> float:
 def test_promises_hold_on_the_solid_itself(shape: str, quality: rlacd.QualityName) -> None:
     mesh = SHAPES[shape]()
     result = rlacd.decompose(mesh, quality=quality)
-    assert "lift" in result.report["seconds"]
+    assert "transfer" in result.report["seconds"]
     assert not result.report["warnings"]
     assert result.report["concavity"]["max"] <= 0.05
     assert uncovered(result, mesh) <= 1e-3
@@ -109,7 +109,7 @@ def test_a_part_without_room_below_the_threshold_keeps_its_own_hull() -> None:
 def test_noise_and_density_cost_hardly_any_parts(shape: str) -> None:
     dense = SHAPES[shape]()
     plain = {"ring": trimesh.creation.torus(1.0, 0.3, 32, 16), "cross": bars()}[shape]
-    assert "lift" not in rlacd.decompose(plain, quality="fast").report["seconds"], "it is decomposed as it is"
+    assert "transfer" not in rlacd.decompose(plain, quality="fast").report["seconds"], "it is decomposed as it is"
     assert len(rlacd.decompose(dense, quality="fast")) <= len(rlacd.decompose(plain, quality="fast")) + 1
 
 
@@ -136,7 +136,7 @@ def test_limits_hold_and_are_met_by_the_threshold() -> None:
 @pytest.mark.promise("dense")
 def test_stopped_at_any_time_the_hulls_cover_the_solid() -> None:
     mesh = ring()
-    for stage in ("simplify", "cut", "merge", "lift"):
+    for stage in ("simplify", "cut", "merge", "transfer"):
         result = rlacd.decompose(mesh, progress=lambda p, stage=stage: p.stage != stage)
         assert not result.report["complete"]
         assert uncovered(result, mesh) <= 1e-3

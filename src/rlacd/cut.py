@@ -12,7 +12,7 @@ from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
 from rlacd.run import Run, work
-from rlacd.solid.component import Component, Plane, is_film
+from rlacd.solid.component import Component, Plane, is_thin
 from rlacd.solid.frame import HALF_THICKNESS
 
 CUT_SLIVER = HALF_THICKNESS
@@ -175,7 +175,7 @@ class CutTree:
             return pieces
         plane = self._policy.choose(component, threads)
         if plane is None:
-            return halves(component) if is_film(component) else []
+            return halves(component) if is_thin(component) else []
         return self._cache.sides(component, plane)
 
 
@@ -199,7 +199,7 @@ def is_cut_sliver(piece: Component, across: Component) -> bool:
     Slivers have ragged outlines that take very many cuts to become convex. They can be dropped because every point of
     one is within `CUT_SLIVER` of the solid across the cut.
     """
-    if not is_film(piece):
+    if not is_thin(piece):
         return False
     surface = _native.Surface(across.vertices, across.faces)
     _, farthest = _native.directed_hausdorff(piece.vertices, piece.faces, surface, CUT_SLIVER / 4, 1)

@@ -1,6 +1,6 @@
-"""From a mesh to the parts of its solid: repair, simplify, cut, merge, search, lift, limit.
+"""From a mesh to the parts of its solid: repair, simplify, cut, merge, search, transfer, limit.
 
-Lift and limit cut again what fails; no other stage looks back.
+Transfer and limit cut again what fails; no other stage looks back.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ class _Decomposer:
         return cls(model, options, run, sweeps, tree)
 
     def decompose(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
-        """Cut, merge, search and lift.
+        """Cut, merge, search and transfer.
 
         Returns the parts that the levels up to the one asked for end with, the best last, the goal as settled on them,
         and a summary of the search.
@@ -178,12 +178,12 @@ class _Decomposer:
             states = [parts for parts in states if parts is not best] + [best]
             if self.model.proxy is None:
                 return states, done.criterion, found
-            lifted = [self._lifted(best, goal)]
+            moved = [self._transferred(best, goal)]
             least = found.at_least if found is not None else 1
             for parts in states[:-1]:  # of the levels below: on the solid they may be fewer
-                if len(lifted[-1]) > least and self.run.stopped_by is None:
-                    lifted = sorted([self._lifted(parts, goal), *lifted], key=cost, reverse=True)
-            return lifted, goal, found
+                if len(moved[-1]) > least and self.run.stopped_by is None:
+                    moved = sorted([self._transferred(parts, goal), *moved], key=cost, reverse=True)
+            return moved, goal, found
 
     def coarser(self, free: list[list[Part]], goal: Criterion) -> Iterator[list[Part]]:
         """Get decompositions under coarser and coarser goals, until one part is left; `free` are those under the goal.
@@ -196,15 +196,15 @@ class _Decomposer:
             factor *= COARSER if self.run.work.done - begin < MOST_CUTTING else COARSER**4
             with self.run.limited():
                 done = cut_and_merge(self.tree, self.model.tighter(goal, factor), self.run, merge=self.options.merge)
-            yield self._lifted(done.parts, goal, factor)
+            yield self._transferred(done.parts, goal, factor)
             if len(done.parts) <= 1:
                 return
 
-    def _lifted(self, parts: list[Part], goal: Criterion, factor: float = 1.0) -> list[Part]:
+    def _transferred(self, parts: list[Part], goal: Criterion, factor: float = 1.0) -> list[Part]:
         if self.model.proxy is None:
             return parts
         policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
-        return self.model.lift(parts, goal, factor, policy, self.run, merge=self.options.merge)
+        return self.model.transfer(parts, goal, factor, policy, self.run, merge=self.options.merge)
 
     def keeps(self, most: int, parts: list[Part]) -> bool:
         """Whether there are at most so many parts."""
@@ -246,7 +246,7 @@ class _Decomposer:
                     states = [parts := eliminate_parts(context, parts, run)]
                     if run.stopped_by is not None:
                         return states, None
-                bound = run.start(partial(at_least, self.model.solid, parts, asked.overhang, run))
+                bound = run.start(partial(at_least, self.model.solid, parts, asked.outward_deviation, run))
                 enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
                 context = replace(context, enough=enough)
                 states, found = search(context, parts, run, options.quality, options.budget, options.search_steps)
@@ -268,4 +268,4 @@ def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
 
 def _scale(criterion: Criterion) -> float | None:
     """How far a hull may reach beyond its part, if the criterion bounds that: an input of networks."""
-    return criterion.overhang if math.isfinite(criterion.overhang) else None
+    return criterion.outward_deviation if math.isfinite(criterion.outward_deviation) else None

@@ -86,7 +86,7 @@ def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, 
     inside = solid.inside(part.hull)
     if not inside.size:
         return []
-    scale = limited.overhang if math.isfinite(limited.overhang) else None
+    scale = limited.outward_deviation if math.isfinite(limited.outward_deviation) else None
     policy = make_policy(options.first_policy, SweepCache(), scale)
     tree = CutTree(Component((inside.vertices, inside.faces)), policy, run)
     done = cut_and_merge(tree, limited, run, merge=options.merge, most=PIECES * (extra + 1), strict=True)

@@ -197,10 +197,10 @@ def test_parts_out_of_reach_and_excluded_volumes_never_meet() -> None:
     criterion = Concavity(0.05)
     for gap in (0.08, 0.1001, 0.2):
         pair = from_manifold(box((-0.5, -0.5, -0.5), (0, 0.5, 0.5)) + box((gap, -0.5, -0.5), (0.5, 0.5, 0.5)))
-        assert gap <= criterion.screen.reach or not criterion.is_met(pair)
-        assert not criterion.screen.excludes(pair.volume, pair.hull.volume) or not criterion.is_met(pair)
-    assert not criterion.screen.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.166**3)
-    assert criterion.screen.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.167**3)
+        assert gap <= criterion.early_out.reach or not criterion.is_met(pair)
+        assert not criterion.early_out.excludes(pair.volume, pair.hull.volume) or not criterion.is_met(pair)
+    assert not criterion.early_out.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.166**3)
+    assert criterion.early_out.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.167**3)
 
 
 @pytest.mark.parametrize("threshold", [0, -1, float("nan")])

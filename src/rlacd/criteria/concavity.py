@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.criterion import Criterion, CriterionSummary, Feasibility, Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut, Feasibility
 from rlacd.errors import OptionError
 from rlacd.fit import told_apart
 from rlacd.options import Options
@@ -56,7 +56,7 @@ class ConcavityValue:
 
 
 @dataclass(frozen=True)
-class DistanceScreen(Screen):
+class DistanceEarlyOut(EarlyOut):
     """Necessary conditions for a distance or concavity of at most `threshold`.
 
     The reach is twice the threshold: if parts are farther apart, the middle of the joint hull is too far from both.
@@ -148,16 +148,16 @@ class Distance(Criterion):
         return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
     @property
-    def screen(self) -> DistanceScreen:
+    def early_out(self) -> DistanceEarlyOut:
         """Tests of the solid's corners, and of volumes if they count."""
-        return DistanceScreen(2 * self.threshold, self.threshold, self.weight)
+        return DistanceEarlyOut(2 * self.threshold, self.threshold, self.weight)
 
     def scaled(self, factor: float) -> Distance:
         """The same criterion with ``factor`` times the threshold."""
         return replace(self, threshold=self.threshold * factor)
 
     @property
-    def overhang(self) -> float:
+    def outward_deviation(self) -> float:
         """The threshold."""
         return self.threshold
 

@@ -51,7 +51,7 @@ class Criterion(Protocol):
         return False
 
     @property
-    def screen(self) -> Screen:
+    def early_out(self) -> EarlyOut:
         """Early-out tests, which reject unions that cannot meet the criterion."""
         ...
 
@@ -75,7 +75,7 @@ class Criterion(Protocol):
         ...
 
     @property
-    def overhang(self) -> float:
+    def outward_deviation(self) -> float:
         """Greatest outward deviation: how far a hull that meets the criterion may reach beyond its part's surface."""
         return math.inf
 
@@ -114,7 +114,7 @@ class Feasibility(IntEnum):
 
 
 @dataclass(frozen=True)
-class Screen:
+class EarlyOut:
     """Early-out tests: necessary conditions for a union to meet a criterion.
 
     The defaults suit a criterion that judges hulls alone. It needs no solid clipped to a joint hull: the glued union of

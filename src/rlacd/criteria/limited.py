@@ -12,7 +12,7 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria.avoided import FINEST_SHARE, Avoided
 from rlacd.criteria.concavity import Concavity, Distance
-from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
 from rlacd.criteria.navigable import Intrusions, Navigable
 from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
@@ -42,7 +42,7 @@ def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) ->
     """The largest balls in passages that hulls could narrow too much, and how large they have to stay."""
     scale = solid.frame.scale
     share, ball = options.keep_open or 0.0, (options.keep_open_abs or 0.0) * scale
-    most = min((ball + criterion.overhang) / (1 - share), 2.0)
+    most = min((ball + criterion.outward_deviation) / (1 - share), 2.0)
     least = least_kept(options, scale)
     dense = _native.mesh_area(solid.vertices, solid.faces.astype(np.int64)) / (2 * SPACING * least) ** 2
     starts = int(np.clip(dense, FEWEST_STARTS, MOST_STARTS))
@@ -130,14 +130,14 @@ class LimitedCriterion(Criterion):
         return self.criterion.eliminates
 
     @property
-    def screen(self) -> Screen:
+    def early_out(self) -> EarlyOut:
         """The underlying criterion's tests: what they reject fails here too."""
-        return self.criterion.screen
+        return self.criterion.early_out
 
     @property
-    def overhang(self) -> float:
+    def outward_deviation(self) -> float:
         """That of the underlying criterion."""
-        return self.criterion.overhang
+        return self.criterion.outward_deviation
 
     @property
     def obstacles(self) -> Balls | None:
@@ -197,5 +197,5 @@ class LimitedCriterion(Criterion):
         return replace(self, avoided=None)
 
     def _limited(self, part: Part) -> Part:
-        reach = self.of_facets.overhang
+        reach = self.of_facets.outward_deviation
         return limited_part(part, self.limits, reach, sides=within_reach(self.sides, part.hull, reach))

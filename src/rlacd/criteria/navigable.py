@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
 from rlacd.errors import OptionError
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
@@ -169,9 +169,9 @@ class Navigable(Criterion):
         return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
 
     @property
-    def screen(self) -> Screen:
+    def early_out(self) -> EarlyOut:
         """Reaches twice the sum of radius and tolerance: a ball can pass through a wider gap between two parts."""
-        return Screen(2 * (self.radius + self.tolerance))
+        return EarlyOut(2 * (self.radius + self.tolerance))
 
     @property
     def obstacles(self) -> Balls:

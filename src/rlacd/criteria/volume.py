@@ -15,7 +15,7 @@ import numpy as np
 
 from rlacd._native import mesh_volume
 from rlacd.criteria.concavity import Distance
-from rlacd.criteria.criterion import Criterion, CriterionSummary, Screen
+from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
 from rlacd.fit import told_apart
 from rlacd.options import Options
 from rlacd.run import Run
@@ -35,7 +35,7 @@ REACH = 0.2
 
 
 @dataclass(frozen=True)
-class VolumeScreen(Screen):
+class VolumeEarlyOut(EarlyOut):
     """Early-out tests by volumes alone."""
 
     criterion: AddedVolume
@@ -89,9 +89,9 @@ class AddedVolume(Criterion):
         return added / base if base > 0 else math.inf if added else 0.0
 
     @property
-    def screen(self) -> VolumeScreen:
+    def early_out(self) -> VolumeEarlyOut:
         """Tests of volumes."""
-        return VolumeScreen(REACH, self)
+        return VolumeEarlyOut(REACH, self)
 
     def is_met(self, part: Part) -> bool:
         """Whether the hull adds at most the tolerance."""

@@ -121,7 +121,7 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
         if shaped is not part:
             return shaped
         share = SHARE_OF_DEVIATION if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
-        near = within_reach(sides, part.hull, share * goal.overhang)
+        near = within_reach(sides, part.hull, share * goal.outward_deviation)
         part = kept_within(part, near, goal)
         return limit_part(
             simple_part(part, goal, limits, near) if options.detail == SIMPLE else part, limits, goal, near
@@ -201,9 +201,9 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
     A criterion that does not bound how far a hull may reach beyond its part leaves hulls as they are. A hull that
     exceeds the limits is left for `limit_part`. For `sides` see `limit_hull`.
     """
-    if not math.isfinite(criterion.overhang):
+    if not math.isfinite(criterion.outward_deviation):
         return part
-    growth = SHARE_OF_DEVIATION * criterion.overhang
+    growth = SHARE_OF_DEVIATION * criterion.outward_deviation
     for _ in range(GROWTHS_TRIED):
         simple = limited_part(part, limits, tolerance=growth, sides=sides)
         if simple is part:
@@ -224,7 +224,7 @@ def limit_part(
     Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
     For `sides` see `limit_hull`; if no hull in them meets the criterion, the criterion comes first.
     """
-    enough = math.inf if criterion is None else criterion.of_facets.overhang
+    enough = math.inf if criterion is None else criterion.of_facets.outward_deviation
     limited = limited_part(part, limits, enough, sides=sides)
     if limited is part or criterion is None:
         return limited

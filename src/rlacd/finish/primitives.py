@@ -96,13 +96,13 @@ def primitive_part(
 
 def _candidates(part: Part, hull: Hull, solid: Component | None, criterion: Criterion) -> Iterator[Part]:
     """The part with another hull, and all that the solid fills of it, unless either certainly fails the criterion."""
-    screen = criterion.screen
-    if not screen.excludes(part.volume, hull.volume):
+    early_out = criterion.early_out
+    if not early_out.excludes(part.volume, hull.volume):
         yield part.with_hull(hull)
-    if solid is None or criterion.obstacles is not None or screen.forbids(solid.filling, hull):
+    if solid is None or criterion.obstacles is not None or early_out.forbids(solid.filling, hull):
         return
     inside = solid.inside(hull)
-    if inside.volume >= (1 - LOST_VOLUME) * part.volume and not screen.excludes(inside.volume, hull.volume):
+    if inside.volume >= (1 - LOST_VOLUME) * part.volume and not early_out.excludes(inside.volume, hull.volume):
         yield inside  # otherwise the clipping failed
 
 

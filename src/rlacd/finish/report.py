@@ -104,10 +104,7 @@ def make_report(
             **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
             **summary.entries,
             **({"avoid": entered} if entered else {}),
-            "hausdorff": {
-                "over": distances and distances.over,
-                "under": distances and max(distances.under, distances.left_out.distance),
-            },
+            "hausdorff": _hausdorff(distances),
             "passages": distances and distances.narrowed.passages,
             "scale": solid.frame.scale,
             "mass": mass_of(*concatenated(weighed), solid.frame).as_plain(),
@@ -117,6 +114,11 @@ def make_report(
             "at_least": reached.found and min(reached.found.at_least, len(hulls)),
             "warnings": warnings,
         }
+
+
+def _hausdorff(distances: _Distances | None) -> dict[str, float | None]:
+    under = distances and max(distances.under, distances.left_out.distance)
+    return {"over": distances and distances.over, "under": under}
 
 
 def _why_entered(run: Run) -> str:
@@ -307,14 +309,14 @@ def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) ->
 def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
     """How far hulls stick out because of limits on their vertices and triangles, where that is too far."""
     facets, limits, scale = reached.goal.of_facets, reached.options.hull_limits, reached.solid.frame.scale
-    if not math.isfinite(facets.overhang):
+    if not math.isfinite(facets.outward_deviation):
         return []
-    beyond = [error for part in parts if part.exact and (error := facets.error(part)) > facets.overhang]
+    beyond = [error for part in parts if part.exact and (error := facets.error(part)) > facets.outward_deviation]
     if not beyond:
         return []
     counts = zip(limits, ("vertices", "triangles"), strict=True)
     most = " and ".join(f"{limit} {what}" for limit, what in counts if limit is not None)
-    farthest, allowed = told_apart(max(beyond) / scale, facets.overhang / scale)
+    farthest, allowed = told_apart(max(beyond) / scale, facets.outward_deviation / scale)
     return [
         f"{_hulls(len(beyond), 'sticks', 'stick')} out by up to {farthest}, more than {allowed} (in the input's unit): "
         f"with at most {most} they cannot fit closer unless there are many more."
@@ -386,7 +388,7 @@ def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: 
             "`repair`)."
         )
     sentences += distances.left_out.said if distances is not None else []
-    if distances is not None and not exceeds and distances.over > reached.goal.overhang + COVERAGE_TOLERANCE:
+    if distances is not None and not exceeds and distances.over > reached.goal.outward_deviation + COVERAGE_TOLERANCE:
         sentences.append(
             f"The hulls reach {distances.over / unit:.4g} ({in_words}) beyond the input's surface, more than the "
             f"threshold, farthest near {distances.over_at}: {_why_beyond(reached.solid, options)}."

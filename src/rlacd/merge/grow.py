@@ -50,7 +50,7 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
     solid : Component
         The solid that was decomposed.
     """
-    judges = criterion.screen.looks_inside and math.isfinite(criterion.overhang)
+    judges = criterion.early_out.looks_inside and math.isfinite(criterion.outward_deviation)
     if not judges or solid.size > DENSE or sum(not is_alone(part) for part in merged) < CROSSING * len(merged):
         return merged
     try:
@@ -67,7 +67,7 @@ def _regrown(merged: list[Part], criterion: Criterion, run: Run, solid: Componen
     corners = sum(len(piece.hull.vertices) for piece in pieces)
     if not run.work.pay(sum(work.growing(len(piece.hull.vertices), corners) for piece in pieces)):
         return merged
-    depth = DEPTH * criterion.overhang
+    depth = DEPTH * criterion.outward_deviation
     grown = run.map(lambda piece: solid.filling.grown(piece.hull.body, depth), pieces)
     chosen = _chosen(pieces, grown)
     if len(chosen) > WORTH * len(merged):

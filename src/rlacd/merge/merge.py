@@ -105,13 +105,13 @@ class _Adjoining:
 
         Incomplete if the run's work runs out.
         """
-        screen = self.criterion.screen
-        pairs = alive.boxes.pairs(new, screen.reach)
+        early_out = self.criterion.early_out
+        pairs = alive.boxes.pairs(new, early_out.reach)
         vertices, volumes, filled = alive.sums(pairs)
         if not self.run.work.pay(work.joining(vertices.sum(), len(pairs))):
             return []
         hulls = _native.joint_hull_volumes(alive.bodies, pairs, self.run.threads)
-        kept = ~screen.excludes(volumes, hulls)
+        kept = ~early_out.excludes(volumes, hulls)
         return _priced(pairs[kept], (hulls - filled)[kept])
 
     def unite(self, first: Part, second: Part) -> tuple[Part | None, float]:
@@ -134,8 +134,8 @@ class _Bridged(_Adjoining):
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> list[_Pair]:
         """Pairs whose joint hulls the solid may fill well enough, by an early-out test."""
-        screen, run = self.criterion.screen, self.run
-        reach = np.inf if len(alive.parts) <= self.few else screen.reach
+        early_out, run = self.criterion.early_out, self.run
+        reach = np.inf if len(alive.parts) <= self.few else early_out.reach
         pairs = alive.boxes.pairs(new, reach, across=True)
         found: list[_Pair] = []
         for begin in range(0, len(pairs), PAIRS_AT_ONCE):
@@ -143,7 +143,7 @@ class _Bridged(_Adjoining):
             vertices, _, filled = alive.sums(some)
             if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
                 break
-            volumes, verdicts = screen.feasibilities(self.solid.filling, alive.bodies, some, run.threads)
+            volumes, verdicts = early_out.feasibilities(self.solid.filling, alive.bodies, some, run.threads)
             may = verdicts == Feasibility.MAYBE
             found += _priced(some[may], (volumes - filled)[may])
         return found
@@ -152,7 +152,7 @@ class _Bridged(_Adjoining):
         """Test the joint hull more thoroughly, and clip the solid to it."""
         hull = Hull.around(first.hull, second.hull)
         price = work.testing(len(hull.vertices))
-        if self.criterion.screen.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
+        if self.criterion.early_out.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
             return None, price
         union: Part | None = _clipped(first, second, hull, self.criterion, self.solid)
         if union is not None and self.confirmed is not None:
@@ -168,7 +168,7 @@ class _Merging:
     """Parts that are being united."""
 
     def __init__(self, parts: Sequence[Part], pairing: _Adjoining, run: Run) -> None:
-        self._alive = NumberedParts(parts, pairing.criterion.screen)
+        self._alive = NumberedParts(parts, pairing.criterion.early_out)
         self._pairing = pairing
         self._run = run
         self._origin = list(range(len(parts)))  # the number of the first piece
@@ -250,32 +250,32 @@ class Uniter:
         list of (int, float)
             Index and volume. Empty if too little work is left.
         """
-        screen = self.criterion.screen
+        early_out = self.criterion.early_out
         hulls = [part.hull, *(other.hull for other in others)]
         bodies = [hull.body for hull in hulls]
-        pairs = Boxes(bodies).pairs([0], screen.reach)
+        pairs = Boxes(bodies).pairs([0], early_out.reach)
         near = pairs[:, 1].tolist()
         vertices = sum(len(part.hull.vertices) + len(hulls[i].vertices) for i in near)
         if not self.account.pay(work.screening(vertices, len(near))):
             return []
-        if not screen.looks_inside:
+        if not early_out.looks_inside:
             volumes = _native.joint_hull_volumes(bodies, pairs, 1)
             return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True)]
-        volumes, verdicts = screen.feasibilities(self.solid.filling, bodies, pairs, 1)
+        volumes, verdicts = early_out.feasibilities(self.solid.filling, bodies, pairs, 1)
         found = zip(near, volumes.tolist(), verdicts.tolist(), strict=True)
         return [(i - 1, volume) for i, volume, verdict in found if verdict == Feasibility.MAYBE]
 
     def unite_feasible(self, first: Part, second: Part) -> Part | None:
         """Unite two parts that may be united; None if no union meets the criterion after all."""
         hull = Hull.around(first.hull, second.hull)
-        screen = self.criterion.screen
+        early_out = self.criterion.early_out
         if is_alone(first) and is_alone(second):  # otherwise they may overlap
             if not self.account.pay(price_of_uniting(first, second)):
                 return None
             union = Part.glued(first, second, hull)
-            if not screen.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
+            if not early_out.excludes(union.volume, hull.volume) and self.criterion.is_met(union):
                 return union
-        if not screen.looks_inside or not self.account.pay(price_of_uniting(first, second, is_clipped=True)):
+        if not early_out.looks_inside or not self.account.pay(price_of_uniting(first, second, is_clipped=True)):
             return None
         return _clipped(first, second, hull, self.criterion, self.solid)
 
@@ -293,7 +293,7 @@ def is_alone(part: Part) -> bool:
 
 def _clipped(first: Part, second: Part, hull: Hull, criterion: Criterion, solid: Component) -> ClippedPart | None:
     clipped = ClippedPart(solid, (first, second), hull)
-    fits = clipped.is_whole and not criterion.screen.excludes(clipped.volume, hull.volume)
+    fits = clipped.is_whole and not criterion.early_out.excludes(clipped.volume, hull.volume)
     return clipped if fits and criterion.is_met(clipped) else None
 
 
@@ -320,7 +320,7 @@ def united_in_turn(
         Pays for measuring. When it is spent, or the run ends, nothing is united any more.
     run : Run
     """
-    numbered = NumberedParts(parts, criterion.screen)
+    numbered = NumberedParts(parts, criterion.early_out)
     alive, origin = numbered.parts, list(range(len(parts)))
     try:
         errors = dict(zip(alive, run.map(criterion.error, parts), strict=True))
@@ -358,7 +358,7 @@ def _bounded_pairs(
 ) -> list[_BoundedPair]:
     pairs = alive.boxes.pairs(new, reach)
     volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.bodies, pairs, run.threads)
-    errors = map(criterion.screen.least_error, volumes.tolist(), hulls.tolist())
+    errors = map(criterion.early_out.least_error, volumes.tolist(), hulls.tolist())
     queue = [_BoundedPair(error, i, j, False) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)
     return queue

@@ -9,7 +9,7 @@ import numpy as np
 from rlacd import _native
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray
-from rlacd.solid.component import Part, is_film
+from rlacd.solid.component import Part, is_thin
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import SLIVER_RADIUS, Hull
@@ -35,7 +35,7 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
     """
     parts = list(parts)
     suspects = parts if suspects is None else suspects
-    thin = run.map(lambda part: is_film(part) or is_sliver(part.hull), suspects)
+    thin = run.map(lambda part: is_thin(part) or is_sliver(part.hull), suspects)
     place = {id(part): i for i, part in enumerate(parts)}
     slivers = [place[id(part)] for part, is_thin in zip(suspects, thin, strict=True) if is_thin]
     if not slivers:

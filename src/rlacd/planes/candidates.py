@@ -66,7 +66,7 @@ def axis_and_principal(component: Component) -> Candidates:
     return Candidates(np.ascontiguousarray(directions[::OFFSETS_PER_AXIS]), offsets.reshape(-1, OFFSETS_PER_AXIS))
 
 
-def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) -> Candidates:
+def reflex_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) -> Candidates:
     """Candidates of one component: three planes for each of `count` reflex edges, without near-duplicates.
 
     Edges are deep, sharp ones of long creases first, and spread out. The first has the greatest depth x angle x length:
@@ -88,7 +88,7 @@ def concave_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) 
 
 
 def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
-    """The planes of `axis_and_principal` and `concave_edge_planes`, each with its own direction."""
+    """The planes of `axis_and_principal` and `reflex_edge_planes`, each with its own direction."""
     normals, offsets = _planes(component, per_axis, edges)
     return Candidates(normals, offsets[:, None])
 

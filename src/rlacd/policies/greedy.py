@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, concave_edge_planes
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, reflex_edge_planes
 from rlacd.planes.sweep import Sweep, SweepCache, distinct_planes, least_excess, paper_planes
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Plane
@@ -68,7 +68,7 @@ class Greedy:
 
 def paper_planes_and_edges(component: Component) -> Candidates:
     """Candidates of one component: the paper's 150, and those of four reflex edges."""
-    return Candidates.joined(paper_planes(component), concave_edge_planes(component))
+    return Candidates.joined(paper_planes(component), reflex_edge_planes(component))
 
 
 def navacd_planes(component: Component) -> Candidates:
@@ -78,7 +78,7 @@ def navacd_planes(component: Component) -> Candidates:
     hull volumes. It cuts one part at a time, the largest |CH(m_i)| - |m_i| first, where here all unfinished components
     of a round are cut: the plane that cuts a component does not depend on the others, so both reach the same parts.
     """
-    return Candidates.joined(mid_planes(component), concave_edge_planes(component))
+    return Candidates.joined(mid_planes(component), reflex_edge_planes(component))
 
 
 def mid_planes(component: Component) -> Candidates:
@@ -103,7 +103,7 @@ def least_hulls(
     directions = candidates.directions[chosen // candidates.offsets.shape[1]]
     short = Candidates(directions, candidates.offsets.ravel()[chosen][:, None])
     if reflex_edges:
-        short = Candidates.joined(short, concave_edge_planes(component, reflex_edges))
+        short = Candidates.joined(short, reflex_edge_planes(component, reflex_edges))
     fallback = candidates.plane(int(chosen[0])) if len(chosen) else None
     return least_excess(component, short, SCORES["hull-sum"], threads) or fallback
 

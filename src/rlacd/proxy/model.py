@@ -132,7 +132,7 @@ class Transfer:
             self._cover(moved)
             self._clip(moved)
         errors = self.run.map(self.goal.error, [each.on_solid for each in moved if not each.is_met])
-        return [each.on_solid for each in moved], max([1.0, *(error / self.goal.overhang for error in errors)])
+        return [each.on_solid for each in moved], max([1.0, *(error / self.goal.outward_deviation for error in errors)])
 
     def _cut_again(self, failing: _Transferred) -> list[_Transferred]:
         """Cut a part on the solid; the second time to a tighter goal, as the hulls of its pieces may grow."""
@@ -204,10 +204,10 @@ class Model:
     def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, run: Run) -> Model:
         """Make the model of a solid; `pieces` are closed solids whose union it is (see `simplify`)."""
         proxy = None
-        if math.isfinite(goal.overhang) and len(solid.faces) >= DENSE:
+        if math.isfinite(goal.outward_deviation) and len(solid.faces) >= DENSE:
             try:
                 with run.stage("simplify"):
-                    proxy = simplify(solid, goal.overhang, run.threads, pieces)
+                    proxy = simplify(solid, goal.outward_deviation, run.threads, pieces)
             except Stopped:
                 run.note_stop()
         return cls(solid, proxy)
@@ -223,17 +223,17 @@ class Model:
             return goal if factor == 1.0 else goal.scaled(factor)
         return goal.alone.scaled(factor - self.proxy.margin(goal))
 
-    def lift(
+    def transfer(
         self, parts: list[Part], goal: Criterion, factor: float, policy: Policy, run: Run, *, merge: bool
     ) -> list[Part]:
         """Transfer parts of the model to the solid, where they meet the goal, scaled by a factor."""
         assert self.proxy is not None
         scaled = goal if factor == 1.0 else goal.scaled(factor)
-        with run.stage("lift"):
-            transfer = Transfer(self.solid, self.proxy, scaled, policy, run)
-            parts, worst = transfer(parts, mend=run.stopped_by is None)
+        with run.stage("transfer"):
+            moving = Transfer(self.solid, self.proxy, scaled, policy, run)
+            parts, worst = moving(parts, mend=run.stopped_by is None)
             if merge and run.stopped_by is None:  # the margin may have kept some from merging
-                transfer = replace(transfer, goal=scaled.scaled(worst))
-                looser = transfer.goal.alone.scaled(1 + self.proxy.margin(goal))
-                parts = merge_transferred(parts, self.component, looser, transfer.confirmed, run)
+                moving = replace(moving, goal=scaled.scaled(worst))
+                looser = moving.goal.alone.scaled(1 + self.proxy.margin(goal))
+                parts = merge_transferred(parts, self.component, looser, moving.confirmed, run)
         return parts

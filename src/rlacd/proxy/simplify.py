@@ -73,7 +73,7 @@ class Proxy:
 
     def margin(self, goal: Criterion) -> float:
         """Share of what the goal allows by which parts of the proxy have to be tighter than those of the solid."""
-        return MARGIN * self.deviation / goal.overhang
+        return MARGIN * self.deviation / goal.outward_deviation
 
 
 class _Copy(NamedTuple):

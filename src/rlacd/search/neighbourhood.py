@@ -107,11 +107,11 @@ class Neighbourhood:
         self._context = context
         self._run = run
         self._random = np.random.default_rng(context.seed)
-        self._now = NumberedParts(parts, context.criterion.screen)
+        self._now = NumberedParts(parts, context.criterion.early_out)
         self.best = list(parts)
         self.gained = time.perf_counter()
         self.steps = self.accepted = 0
-        self._near = min(context.criterion.screen.reach, 2 * context.criterion.overhang)
+        self._near = min(context.criterion.early_out.reach, 2 * context.criterion.outward_deviation)
         self._around: dict[int, tuple[int, ...]] = {}
         self._begun: deque[_UnderWay] = deque()
         self._again: deque[_Trial] = deque()  # to be repeated: what they found came too late

@@ -127,7 +127,7 @@ def give(
 
 def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) -> Part:
     """Join disjoint pieces into a part, with all the solid fills of their hull if the criterion looks inside."""
-    if not criterion.screen.looks_inside:
+    if not criterion.early_out.looks_inside:
         parts: Sequence[Part] = pieces
         return reduce(Part.glued, parts)
     return ClippedPart(solid, pieces, Hull.around(*(piece.hull for piece in pieces)))

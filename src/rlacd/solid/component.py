@@ -24,7 +24,7 @@ NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
 LOST_VOLUME = TOLERANCE
-"""Share of a solid's volume that may be lost in a boolean, or as shavings (see `rlacd.cut`)."""
+"""Share of a solid's volume that may be lost in a boolean, or as slivers (see `rlacd.cut`)."""
 
 
 DENSE = 10_000
@@ -285,13 +285,13 @@ class Component(Part):
         return [self] if pieces is None else [Component.of(piece, self) for piece in pieces]
 
 
-FILM = HALF_THICKNESS / 5
-"""Mean thickness up to which a part is a film that a cut or rounding has left: sheets are ten times thicker."""
+THIN = HALF_THICKNESS / 5
+"""Mean thickness up to which a part is a sliver that a cut or rounding has left: sheets are ten times thicker."""
 
 
-def is_film(part: Part) -> bool:
-    """Whether the part's mean thickness, twice its volume over its area, is at most `FILM`."""
-    return 2 * part.volume <= FILM * _native.mesh_area(part.vertices, part.faces)
+def is_thin(part: Part) -> bool:
+    """Whether the part's mean thickness, twice its volume over its area, is at most `THIN`."""
+    return 2 * part.volume <= THIN * _native.mesh_area(part.vertices, part.faces)
 
 
 def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:
