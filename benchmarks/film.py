@@ -18,7 +18,7 @@ SIZE, PACE, COLORS = 300, 0.05, 48
 
 SHOWN: dict[str, tuple[Sequence[float], float, float, float, float]] = {
     "gears that mesh": ((0.05, 0.0, 0.05), 0.42, 90.0, -55.0, 2.4),
-    "mug on hook": ((-0.01, -0.03, 0.25), 0.5, 60.0, -15.0, 2.4),
+    "mug on hook": ((-0.01, -0.03, 0.25), 0.45, 60.0, -35.0, 2.4),
 }
 """Each task, where the camera looks, its distance, azimuth, elevation, and how many seconds are shown."""
 
@@ -59,10 +59,11 @@ def _frames(task: str, exact: Mapping[str, trimesh.Trimesh], hulls: Hulls) -> li
 
 
 def _paint(world: InMujoco) -> None:
-    """A colour for each hull; the floor is white."""
-    hues = np.random.default_rng(3).permutation(world.model.ngeom) / world.model.ngeom
-    for geom, hue in enumerate(hues):
-        world.model.geom_rgba[geom, :3] = 0.6 + 0.35 * np.cos(2 * np.pi * (hue + np.array([0, 1 / 3, 2 / 3])))
+    """A hue for each body, a shade of it for each hull; the floor is white."""
+    model, shades = world.model, np.random.default_rng(3).uniform(0.75, 1.0, world.model.ngeom)
+    for geom, shade in enumerate(shades):
+        turn = 2 * np.pi * (0.381966 * model.geom_bodyid[geom] + np.array([0, 1 / 3, 2 / 3]))  # the golden angle
+        model.geom_rgba[geom, :3] = shade * (0.65 + 0.3 * np.cos(turn))
     world.model.geom_rgba[0] = (0.93, 0.93, 0.93, 1)
     world.model.vis.headlight.ambient[:] = 0.4
     world.model.vis.headlight.diffuse[:] = 0.5
