@@ -110,7 +110,7 @@ def test_five_minutes_shows_what_the_command_prints_for_the_sample(tmp_path: Pat
 def test_the_readme_works_outside_the_repository() -> None:
     """On a package index and in the sdist: pictures and links have addresses, and lead to files that exist."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    targets = re.findall(r"\]\(([^)]+)\)", readme)
+    targets = re.findall(r"\]\(([^)]+)\)", readme) + re.findall(r'src="([^"]+)"', readme)
     assert len(targets) > 10
     for target in targets:
         assert target.startswith("https://"), target

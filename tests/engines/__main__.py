@@ -1,4 +1,4 @@
-"""``python -m tests.engines MESHES`` asks all engines that are installed, and prints the table of docs/formats.md."""
+"""``python -m tests.engines MESHES`` asks all installed engines, and prints the table of docs/reference/engines.md."""
 
 from __future__ import annotations
 
