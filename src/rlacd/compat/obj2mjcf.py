@@ -1,8 +1,4 @@
-"""The command of obj2mjcf 0.0.25, done by rlacd.
-
-``obj2mjcf --obj-dir meshes --decompose --save-mjcf`` becomes ``python -m rlacd.compat.obj2mjcf --obj-dir meshes
---decompose --save-mjcf``.
-"""
+"""The command of obj2mjcf 0.0.25, done by rlacd: ``obj2mjcf ...`` becomes ``python -m rlacd.compat.obj2mjcf ...``."""
 
 from __future__ import annotations
 
@@ -10,109 +6,76 @@ import argparse
 import inspect
 import re
 import sys
-from collections.abc import Iterator
+import warnings
 from pathlib import Path
+from typing import Any
 
-from rlacd.compat import warn_unused
+from rlacd.compat import UnusedOptionWarning, warn_unused
 from rlacd.compat.coacd import UNUSED, run_coacd
-from rlacd.decompose_mesh import decompose as decompose_mesh
+from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError, OutputError, RlacdError
 from rlacd.options import LENGTHS
-from rlacd.options.keywords import suggesting
 
-__all__ = ["obj2mjcf"]
-
-_UNUSED = {
-    **{name: reason for name, reason in UNUSED.items() if name != "preprocess_mode"},
-    "texture_resize_percent": "it copies textures as they are",
-}
-_OF_DECOMPOSE = dict.fromkeys(("threshold", "max_convex_hull", "seed"), "without decompose, there is one hull")
+_SWITCHES = ("save_mjcf", "compile_model", "verbose", "decompose", "overwrite", "add_free_joint")
+_OBEYED = ("threshold", "max_convex_hull", "seed")
+_IGNORED = ("preprocess_resolution", "mcts_iterations", "mcts_max_depth", "mcts_nodes", "resolution", "pca")
+_USUAL = {name: parameter.default for name, parameter in inspect.signature(run_coacd).parameters.items()}
 
 
-@suggesting()
-def obj2mjcf(
-    obj_dir: str,
-    obj_filter: str | None = None,
-    save_mjcf: bool = False,
-    compile_model: bool = False,
-    verbose: bool = False,
-    decompose: bool = False,
-    texture_resize_percent: float = 1.0,
-    overwrite: bool = False,
-    add_free_joint: bool = False,
-    preprocess_resolution: int = 50,
-    threshold: float = 0.05,
-    max_convex_hull: int = -1,
-    mcts_iterations: int = 100,
-    mcts_max_depth: int = 3,
-    mcts_nodes: int = 20,
-    resolution: int = 2000,
-    pca: bool = False,
-    seed: int = 0,
-) -> None:
-    """Write the hulls of each ``NAME.obj`` in a folder into ``NAME/`` beside it, as the command obj2mjcf does.
+def main(words: list[str] | None = None) -> None:
+    """Run obj2mjcf's command line: same flags; the hulls or model of ``NAME.obj`` in ``NAME/`` beside it."""
+    usage = "%(prog)s --obj-dir FOLDER [--decompose] [--save-mjcf] [options]"
+    parser = argparse.ArgumentParser("python -m rlacd.compat.obj2mjcf", usage, allow_abbrev=False)
+    parser.add_argument("--obj-dir", required=True, type=Path)
+    parser.add_argument("--obj-filter", default="", help="a regular expression for names of files")
+    parser.add_argument("--texture-resize-percent", type=float, default=1.0)
+    switches = [("--", name, False) for name in _SWITCHES]
+    for start, name, default in switches + [("--coacd-args.", name, _USUAL[name]) for name in _OBEYED + _IGNORED]:
+        flag = name.replace("_", "-")
+        if default is False:
+            parser.add_argument(start + flag, dest=name, action="store_true")
+            parser.add_argument(f"{start}no-{flag}", dest=name, action="store_false")
+        else:
+            parser.add_argument(start + flag, dest=name, type=type(default), default=default)
+    words = sys.argv[1:] if words is None else words  # --save_mjcf is a flag of obj2mjcf too
+    words = [word.replace("_", "-") if re.fullmatch(r"--[\w.-]+", word) else word for word in words]
+    try:
+        _convert(parser.parse_args(words))
+    except RlacdError as error:
+        parser.error(str(error))
 
-    Parameters
-    ----------
-    obj_dir : str
-        The folder.
-    obj_filter : str, optional
-        A regular expression that file names have to contain.
-    save_mjcf : bool
-        Write the model ``NAME/NAME.xml`` and its meshes, instead of hulls only.
-    compile_model : bool
-        Load the model into MuJoCo and make a step; this writes it too.
-    verbose : bool
-        Print how well hulls fit, not only how many there are.
-    decompose : bool
-        Decompose; otherwise, there is one hull.
-    overwrite : bool
-        Replace what an earlier run has written; other files stay.
-    add_free_joint : bool
-        Let the body move.
-    threshold, max_convex_hull, seed
-        As for `rlacd.compat.coacd.run_coacd`.
-    texture_resize_percent, preprocess_resolution, mcts_iterations, mcts_max_depth, mcts_nodes, resolution, pca
-        Accepted but unused; a warning explains this once.
 
-    Raises
-    ------
-    MeshError
-        A file has nothing to decompose.
-    OptionError
-        No file matches, or an option is out of range.
-    OutputError
-        A folder ``NAME`` exists and `overwrite` is not given, or MuJoCo refuses the model.
-    """
-    warn_unused(obj2mjcf, locals(), _UNUSED if decompose else _UNUSED | _OF_DECOMPOSE)
-    most = max_convex_hull if decompose else 1
-    files = _files(Path(obj_dir), obj_filter)
-    if not overwrite and (taken := [file.stem for file in files if file.with_suffix("").exists()]):
-        raise OutputError(f"{taken[0]} in {obj_dir} exists, maybe from an earlier run; --overwrite replaces it.")
+def _convert(given: Any) -> None:
+    warn_unused(run_coacd, _USUAL | vars(given), UNUSED)
+    if given.texture_resize_percent != 1.0:
+        said = "obj2mjcf: rlacd ignores texture_resize_percent: it copies textures as they are."
+        warnings.warn(said, UnusedOptionWarning, stacklevel=3)
+    if not given.decompose and any(getattr(given, name) != _USUAL[name] for name in _OBEYED):
+        warnings.warn("obj2mjcf: without decompose, coacd_args have no effect.", UnusedOptionWarning, stacklevel=3)
+    files = _files(given.obj_dir, given.obj_filter)
+    if not given.overwrite and (taken := [file.stem for file in files if file.with_suffix("").exists()]):
+        raise OutputError(f"{taken[0]} in {given.obj_dir} exists, maybe from an earlier run; --overwrite replaces it.")
+    threshold = max(given.threshold, LENGTHS["threshold"][0])
+    most = None if given.max_convex_hull < 1 else given.max_convex_hull
+    options = {"threshold": threshold, "max_hulls": most if given.decompose else 1, "seed": given.seed}
     for file in files:
-        result = decompose_mesh(
-            file,
-            criterion="concavity",
-            threshold=max(threshold, LENGTHS["threshold"][0]),
-            max_hulls=None if most < 1 else most,
-            seed=seed,
-        )
+        result = decompose(file, criterion="concavity", **options)
         folder = file.with_suffix("")
-        if save_mjcf or compile_model:
-            _save_model(result, folder / f"{file.stem}.xml", moves=add_free_joint, tried=compile_model)
+        if given.save_mjcf or given.compile_model:
+            _save_model(result, folder / f"{file.stem}.xml", moves=given.add_free_joint, tried=given.compile_model)
         else:
             result.save(f"{folder}/")
-        print(f"{file}: {', '.join(result.facts()[: None if verbose else 1])}")
+        print(f"{file}: {', '.join(result.facts()[: None if given.verbose else 1])}")
 
 
-def _files(folder: Path, pattern: str | None) -> list[Path]:
+def _files(folder: Path, pattern: str) -> list[Path]:
     try:
-        files = [file for file in sorted(folder.glob("*.obj")) if re.search(pattern or "", file.name)]
+        files = [file for file in sorted(folder.glob("*.obj")) if re.search(pattern, file.name)]
     except re.error as error:
         raise OptionError(f"--obj-filter {pattern} is not a regular expression: {error}.") from error
     if not files:
-        raise OptionError(f"no file *.obj in {folder} matches {pattern}." if pattern else f"no file *.obj in {folder}.")
+        raise OptionError(f"no file *.obj in {folder}" + (f" matches {pattern}." if pattern else "."))
     return files
 
 
@@ -128,39 +91,6 @@ def _save_model(result: Decomposition, path: Path, *, moves: bool, tried: bool) 
             mujoco.mj_step(model, mujoco.MjData(model))
         except (ImportError, ValueError) as error:
             raise OutputError(f"{path} is written, but MuJoCo does not compile it: {error}.") from error
-
-
-def _flags() -> Iterator[tuple[str, str, inspect.Parameter]]:
-    """The flags of obj2mjcf's command: how each begins, its name, and the argument of `obj2mjcf` that it is."""
-    of_coacd = inspect.signature(run_coacd).parameters
-    for name, parameter in inspect.signature(obj2mjcf).parameters.items():
-        yield "--coacd-args." if name in of_coacd else "--", name.replace("_", "-"), parameter
-
-
-def main(words: list[str] | None = None) -> None:
-    """Run obj2mjcf's command line."""
-    about = "obj2mjcf's command, done by rlacd."
-    usage = "%(prog)s --obj-dir FOLDER [--decompose] [--save-mjcf] [options]"
-    parser = argparse.ArgumentParser("python -m rlacd.compat.obj2mjcf", usage, about, allow_abbrev=False)
-    for start, name, parameter in _flags():
-        default, dest = parameter.default, parameter.name
-        if isinstance(default, bool):
-            parser.add_argument(start + name, dest=dest, action="store_true")
-            parser.add_argument(f"{start}no-{name}", dest=dest, action="store_false")
-        elif default is parameter.empty:
-            parser.add_argument(start + name, dest=dest, required=True)
-        else:
-            parser.add_argument(
-                start + name, dest=dest, type=str if default is None else type(default), default=default
-            )
-    words = [  # obj2mjcf takes --save_mjcf too
-        word.replace("_", "-") if re.fullmatch(r"--[\w.-]+", word) else word
-        for word in (sys.argv[1:] if words is None else words)
-    ]
-    try:
-        obj2mjcf(**vars(parser.parse_args(words)))
-    except RlacdError as error:
-        parser.error(str(error))
 
 
 if __name__ == "__main__":

@@ -20,14 +20,12 @@ from rlacd.options.keywords import suggesting
 __all__ = ["vhacd"]
 
 _UNUSED = {
-    **dict.fromkeys(("alpha", "beta"), "it prefers no planes for their symmetry"),
+    **dict.fromkeys(("alpha", "beta", "planeDownsampling", "convexhullDownsampling"), "it searches for the best plane"),
     "gamma": "it unites parts within the same concavity",
-    "minVolumePerCH": "its hulls have the vertices of the mesh",
+    **dict.fromkeys(("minVolumePerCH", "convexhullApproximation"), "its hulls are exact"),
     **dict.fromkeys(("resolution", "mode"), "it uses neither voxels nor tetrahedra"),
     "depth": "it cuts until every part is tight",
-    **dict.fromkeys(("planeDownsampling", "convexhullDownsampling"), "it always searches for the best plane"),
     "pca": "it tries planes along the principal axes anyway",
-    "convexhullApproximation": "its hulls are exact",
     "physicsClientId": "it needs no physics server",
 }
 
@@ -69,15 +67,6 @@ def vhacd(
     alpha, beta, gamma, minVolumePerCH, resolution, depth, planeDownsampling, convexhullDownsampling, pca, mode, \
 convexhullApproximation, physicsClientId
         Accepted but unused; a warning explains this once.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be read, or there is nothing to decompose.
-    OptionError
-        An option is out of range.
-    OutputError
-        A file cannot be written.
     """
     warn_unused(vhacd, locals(), _UNUSED)
     concavity = read(number(0), "concavity", concavity)
