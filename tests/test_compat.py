@@ -18,6 +18,8 @@ import trimesh
 import rlacd
 from rlacd.compat import UnusedOptionWarning
 from rlacd.compat import coacd as our_coacd
+from rlacd.compat import obj2mjcf as our_obj2mjcf
+from rlacd.compat.pybullet import vhacd
 from rlacd.compat.trimesh import convex_decomposition
 from rlacd.compat.vhacd import compute_vhacd
 from rlacd.errors import MeshDataError, OptionError
@@ -178,3 +180,80 @@ def test_trimesh_uses_rlacd_where_it_is_put(monkeypatch: pytest.MonkeyPatch) -> 
     assert len(mesh.convex_decomposition(maxConvexHulls=3)) <= 3
     with pytest.warns(UnusedOptionWarning, match="resolution"):
         mesh.convex_decomposition(resolution=1000)
+
+
+# --- PyBullet ---------------------------------------------------------------------------------------------------------
+
+
+def test_vhacd_has_the_originals_parameters_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PyBullet has no signature, but its log tells what it was given by position."""
+    pybullet = pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box().export("in.obj")
+    given = {name: p.default for name, p in inspect.signature(vhacd).parameters.items() if p.default is not p.empty}
+    logged = {
+        **{"concavity": "max. concavity", "alpha": "alpha", "beta": "beta", "gamma": "gamma"},
+        **{"minVolumePerCH": "min. volume to add vertices to convex-hulls", "resolution": "resolution"},
+        **{"maxNumVerticesPerCH": "max. vertices per convex-hull", "depth": "max. depth", "mode": "mode"},
+        **{"planeDownsampling": "plane down-sampling", "convexhullDownsampling": "convex-hull down-sampling"},
+        **{"pca": "pca", "convexhullApproximation": "convex-hull approximation"},
+    }
+    changed = {"resolution": 10_000, "depth": 7, "planeDownsampling": 3, "pca": 1, "alpha": 0.02}
+    client = pybullet.connect(pybullet.DIRECT)
+    for values in (given, given | changed):
+        words = ("in.obj", "out.obj", "log.txt")
+        pybullet.vhacd(*words, *([] if values is given else [*values.values()][:-1]), physicsClientId=client)
+        text = Path("log.txt").read_text()
+        found = {name: re.search(rf"\t {re.escape(word)}\s+(\S+)\n", text) for name, word in logged.items()}
+        said = {name: float(each[1]) for name, each in found.items() if each}
+        assert set(said) == set(logged)
+        assert said == {name: value for name, value in values.items() if name in said}
+    pybullet.disconnect(client)
+
+
+def test_vhacd_writes_an_object_a_hull_and_a_log(tmp_path: Path) -> None:
+    files = [str(tmp_path / name) for name in ("in.obj", "out.obj", "log.txt")]
+    table().export(files[0])
+    with pytest.warns(UnusedOptionWarning, match="resolution"):
+        vhacd(*files, concavity=0.01, resolution=100_000)
+    hulls = trimesh.load(files[1], process=False).split(only_watertight=False)
+    assert len(hulls) == Path(files[1]).read_text().count("o hull") > 1
+    added = sum(hull.volume for hull in hulls) - table().volume
+    assert added <= 0.01 * len(hulls) * table().convex_hull.volume
+    assert f"{len(hulls)} hulls" in Path(files[2]).read_text()
+    vhacd(*files, concavity=1.0)
+    assert Path(files[1]).read_text().count("o hull") == 1, "one hull adds less than its own volume"
+
+
+# --- obj2mjcf ---------------------------------------------------------------------------------------------------------
+
+
+def test_obj2mjcf_has_the_originals_flags(capsys: pytest.CaptureFixture[str]) -> None:
+    cli = pytest.importorskip("obj2mjcf.cli", reason="obj2mjcf is not installed")
+    helps = []
+    for main in (lambda: cli.tyro.cli(cli.Args, args=["--help"]), lambda: our_obj2mjcf.main(["--help"])):
+        with pytest.raises(SystemExit):
+            main()
+        helps.append(set(re.findall(r"(?<![\w-])--[a-z][a-z.-]*", capsys.readouterr().out)))
+    assert helps[0] == helps[1]
+
+
+def test_obj2mjcf_writes_models_that_mujoco_compiles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    for name in ("table", "left_alone"):
+        table().export(tmp_path / f"{name}.obj")
+    words = ["--obj-dir", str(tmp_path), "--obj-filter", "^table", "--save_mjcf", "--compile-model"]
+    with pytest.warns(UnusedOptionWarning) as said:
+        our_obj2mjcf.main([*words, "--decompose", "--texture-resize-percent", "0.5", "--coacd-args.pca"])
+    ignored = {str(each.message).split()[3] for each in said if each.category is UnusedOptionWarning}
+    assert ignored == {"texture_resize_percent:", "pca:"}
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "table" / "table.xml"))
+    assert (model.geom_contype != 0).sum() > 3
+    assert model.njnt == 0
+    assert not (tmp_path / "left_alone").exists()
+    with pytest.raises(SystemExit):
+        our_obj2mjcf.main(words)
+    assert "--overwrite" in capsys.readouterr().err
+    our_obj2mjcf.main([*words, "--overwrite", "--add-free-joint"])
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "table" / "table.xml"))
+    assert ((model.geom_contype != 0).sum(), model.njnt) == (1, 1)

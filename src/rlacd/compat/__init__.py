@@ -1,7 +1,6 @@
-"""Drop-in replacements for other tools' functions, for programs that call CoACD, V-HACD or trimesh today.
+"""Drop-in replacements for other tools' functions and commands: CoACD, V-HACD, trimesh, PyBullet and obj2mjcf.
 
-Each module is named after the one it replaces, and imports nothing of it: ``rlacd.compat.coacd``,
-``rlacd.compat.vhacd`` (the package vhacdx) and ``rlacd.compat.trimesh``.
+Each module is named after the one it replaces, and imports nothing of it; ``rlacd.compat.vhacd`` is the package vhacdx.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from rlacd.options.keywords import suggesting
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 
-_UNUSED = {
+UNUSED = {
     "preprocess_mode": "it repairs bodies that are not closed, and no others",
     "preprocess_resolution": "it does not remesh the input",
     "resolution": "it bounds distances instead of sampling them",
@@ -104,7 +104,7 @@ def run_coacd(
     OptionError
         An option is out of range.
     """
-    warn_unused(run_coacd, locals(), _UNUSED)
+    warn_unused(run_coacd, locals(), UNUSED)
     apx_mode = read(one_of(("ch", "box")), "apx_mode", apx_mode)
     threshold = read(number(above=0), "threshold", threshold)
     most_hulls = read(integer(-(2**31)), "max_convex_hull", max_convex_hull)
