@@ -6,7 +6,9 @@ RLACD_INSTALL := $(BIN)/pip install --quiet --constraint constraints-dev.txt --n
                  --config-settings=cmake.define.RLACD_WERROR=ON
 # A file's tests stay in one process, one process a processor.
 PYTEST := $(BIN)/pytest --numprocesses auto --dist loadfile
-NATIVE_SOURCES := $(wildcard native/*/*.cpp native/*/*.hpp) CMakeLists.txt pyproject.toml constraints-dev.txt
+KERNELS := $(wildcard native/*/*.cpp native/*/*.hpp)
+CPP := $(KERNELS) $(wildcard tests/native/* examples/cpp/*.cpp)
+NATIVE_SOURCES := $(KERNELS) CMakeLists.txt pyproject.toml constraints-dev.txt
 
 # The sanitized builds live in environments of their own.
 SANITIZE_address := address,undefined,float-divide-by-zero,float-cast-overflow
@@ -20,7 +22,7 @@ SEED    ?= 0
 MESHES  ?= ../shared/meshes
 SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo docs pictures benchmarks test test-fast test-all nightly engines lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs pictures benchmarks test test-fast test-all test-native nightly engines lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -74,7 +76,7 @@ stubs: $(VENV)/installed
 lint: $(VENV)/lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/clang-format --dry-run --Werror native/*/*.cpp native/*/*.hpp
+	$(BIN)/clang-format --dry-run --Werror $(CPP)
 	$(BIN)/mypy
 
 # In tiers: two minutes while you work, ten on every push, all of it at night.
@@ -87,7 +89,17 @@ test: lint $(VENV)/test-extras
 test-all: lint $(VENV)/test-extras
 	RLACD_RANDOM=1 $(PYTEST)
 
-nightly: test-all sanitize soak
+# The kernels without Python: tests in C++ (they need doctest), and an example that finds the installed library.
+test-native:
+	cmake -S . -B build/cpp -DRLACD_BUILD_TESTS=ON -DRLACD_WERROR=ON -DCMAKE_INSTALL_PREFIX=build/cpp/installed
+	cmake --build build/cpp
+	build/cpp/rlacd_tests
+	cmake --install build/cpp
+	cmake -S examples/cpp -B build/cpp/example -DCMAKE_PREFIX_PATH=$(CURDIR)/build/cpp/installed
+	cmake --build build/cpp/example
+	build/cpp/example/halves < examples/cpp/l_shape.off
+
+nightly: test-all test-native sanitize soak
 
 # Physics engines, from the registries, to hold hulls and files against: 12 GB, half of it PyTorch for Genesis.
 engines: $(VENV)/test-extras build/engines/installed
@@ -113,6 +125,7 @@ build/engines/installed: build/engines/packages $(NATIVE_SOURCES)
 sanitize: sanitize-address sanitize-thread
 
 sanitize-address sanitize-thread: sanitize-%: build/sanitize-%/installed
+	$(PYTHON) sanitizers/run.py $* native
 	$(PYTHON) sanitizers/run.py $* tests
 	$(PYTHON) sanitizers/run.py $* meshes
 
@@ -122,7 +135,7 @@ build/sanitize-%/installed: $(NATIVE_SOURCES)
 	  scikit-build-core nanobind cmake ninja pytest hypothesis point-cloud-utils
 	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt --no-build-isolation --editable . \
 	  --config-settings=build-dir=build/sanitize-$*/native --config-settings=cmake.build-type=RelWithDebInfo \
-	  --config-settings=cmake.define.RLACD_SANITIZE=$(SANITIZE_$*)
+	  --config-settings=cmake.define.RLACD_SANITIZE=$(SANITIZE_$*) --config-settings=cmake.define.RLACD_BUILD_TESTS=ON
 	touch $@
 
 # Everything at random, as long as you like: files, shapes, real meshes, faults, options. It goes on where it was.
@@ -151,7 +164,7 @@ $(VENV)/lint: $(VENV)/tools
 format: $(VENV)/lint
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i native/*/*.cpp native/*/*.hpp
+	$(BIN)/clang-format -i $(CPP)
 
 clean:
 	rm -rf $(VENV) build demo

@@ -1,12 +1,13 @@
 """Run Python with the kernels of a sanitized build, and fail when a sanitizer reports anything.
 
-    python sanitizers/run.py address tests              the native tests
+    python sanitizers/run.py address native             the tests in C++
+    python sanitizers/run.py address tests              tests in Python that reach the kernels
     python sanitizers/run.py thread meshes              real meshes, decomposed in every way
     python sanitizers/run.py address -m fuzz.shapes --count 300
 
-`make sanitize-address` and `make sanitize-thread` make the builds and do the first two. Python itself and the libraries
-are not instrumented: the runtime is preloaded, and watches what the kernels do. Reports of all processes, children too,
-are written to files in the build's folder and shown at the end.
+`make sanitize-address` and `make sanitize-thread` make the builds and do the first three. Python itself and the
+libraries are not instrumented: the runtime is preloaded, and watches what the kernels do. Reports of all processes,
+children too, are written to files in the build's folder and shown at the end.
 """
 
 from __future__ import annotations
@@ -68,6 +69,8 @@ def environment(kind: str, reports: Path) -> dict[str, str]:
 
 def command(kind: str, build: Path, words: list[str]) -> list[str]:
     python = str(build / "bin" / "python")
+    if words == ["native"]:
+        return [str(build / "native" / "rlacd_tests")]
     if words == ["tests"]:
         named = [str(path) for name in NATIVE_TESTS for path in Path("tests").rglob(f"test_{name}.py")]
         skipped = [f"--deselect={name}" for name in CANNOT.get(kind, ())]

@@ -1,0 +1,72 @@
+#include <doctest/doctest.h>
+
+#include "convex/hull.hpp"
+#include "core/mesh_measures.hpp"
+#include "shapes.hpp"
+#include "solid/filling.hpp"
+#include "solid/glue.hpp"
+#include "solid/pieces.hpp"
+#include "solid/reunite.hpp"
+
+using namespace rlacd;
+
+namespace {
+
+Plane random_plane(Random& random) { return {normalized(random.point(1)), random(-0.4, 0.4)}; }
+
+}  // namespace
+
+TEST_CASE("a cut closes both sides and loses no volume; the sides reunite and glue to the solid") {
+  Random random(9);
+  for (const Mesh& solid : {box({1, 0.5, 0.7}), torus(0.7, 0.3), torus(0.7, 0.3, 61, 7)})
+    for (int i = 0; i < 40; ++i) {
+      const Plane plane = i < 4 ? Plane{{0, i % 2 == 0 ? 1.0 : 0.0, i % 2 == 0 ? 0.0 : 1.0}, i < 2 ? 0 : 0.1}
+                                : random_plane(random);  // the first along the mesh's own edges
+      const auto sides = cut(solid, plane.normal, plane.offset, 0);
+      REQUIRE((sides[0] && sides[1]));
+      CHECK(sides[0]->volume + sides[1]->volume == doctest::Approx(mesh_volume(solid)).epsilon(1e-9));
+      for (int side = 0; side < 2; ++side) {
+        CHECK(is_closed(sides[side]->mesh));
+        CHECK(sides[side]->hull_volume >= sides[side]->volume * (1 - 1e-9));
+        for (const Vec3 p : sides[side]->mesh.vertices) CHECK((side == 0 ? 1 : -1) * plane.depth(p) > -1e-9);
+      }
+      CHECK(mesh_area(glue(sides[0]->mesh, sides[1]->mesh)) == doctest::Approx(mesh_area(solid)).epsilon(1e-6));
+      const auto whole = reunited({sides[0]->mesh, sides[1]->mesh});
+      REQUIRE(whole);
+      CHECK(is_closed(*whole));
+      CHECK(mesh_volume(*whole) == doctest::Approx(mesh_volume(solid)).epsilon(1e-9));
+    }
+}
+
+TEST_CASE("a plane through the axis leaves two pieces of each half of a torus") {
+  const auto sides = cut(torus(0.7, 0.3), {1, 0, 0}, 0.1, 0);
+  const auto pieces = connected_pieces(torus(0.7, 0.3), 0);
+  CHECK_FALSE(pieces);
+  const auto quarters = cut(sides[1]->mesh, {1, 0, 0}, 0.3, 0);
+  const auto slices = connected_pieces(quarters[0]->mesh, 0);
+  REQUIRE(slices);
+  REQUIRE(slices->size() == 2);
+  CHECK((*slices)[0].volume + (*slices)[1].volume == doctest::Approx(quarters[0]->volume));
+}
+
+TEST_CASE("what a solid fills of a convex hull is what is left by cuts along its facets") {
+  Random random(10);
+  const Mesh solid = torus(0.7, 0.3);
+  const Filling filling(solid);
+  for (int i = 0; i < 40; ++i) {
+    std::vector<Vec3> points;
+    for (int n = 0; n < 12; ++n) points.push_back(random.point(1));
+    const ConvexBody hull(hull_mesh(points));
+    const ClippedSolid clipped = filling.clipped(hull);
+    const Mesh cuts = inside_all(solid, hull.mesh());
+    CHECK(clipped.volume == doctest::Approx(mesh_volume(cuts)).epsilon(1e-6));
+    CHECK(mesh_volume(clipped.mesh) == doctest::Approx(clipped.volume));
+  }
+}
+
+TEST_CASE("the feasibility of a hull agrees with the space that it spans") {
+  const ConvexBody ring(hull_mesh(torus(0.7, 0.3).vertices));
+  const Filling torus_filling(torus(0.7, 0.3)), box_filling(box({1, 0.5, 0.7}));
+  CHECK(torus_filling.feasibility(ring, 0.1) != Feasibility::kMaybe);  // the hole reaches 0.3 deep at its middle
+  CHECK(box_filling.feasibility(ConvexBody(box({1, 0.5, 0.7})), 1e-3) == Feasibility::kMaybe);
+}
