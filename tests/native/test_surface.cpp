@@ -48,18 +48,3 @@ TEST_CASE("the winding number counts the bodies around a point") {
     REQUIRE(surface.winding().at(p, 3) == doctest::Approx(bodies).epsilon(0.05));
   }
 }
-
-TEST_CASE("bodies and handles are counted") {
-  Mesh mesh = torus(0.7, 0.3);
-  const auto euler = [](const Mesh& m) {
-    return static_cast<int>(m.vertices.size() + m.faces.size()) -
-           static_cast<int>(edges_of(m.faces, m.vertices.size()).vertices.size());
-  };
-  CHECK(euler(mesh) == 0);
-  CHECK(euler(box({1, 1, 1})) == 2);
-  append(mesh, box({0.1, 0.1, 0.1}));
-  CHECK(closed_bodies(mesh).count == 2);
-  mesh.faces.pop_back();
-  CHECK(closed_bodies(mesh).count == 0);
-  CHECK_FALSE(is_closed(mesh));
-}
