@@ -97,7 +97,7 @@ test-native:
 	cmake --install build/cpp
 	cmake -S examples/cpp -B build/cpp/example -DCMAKE_PREFIX_PATH=$(CURDIR)/build/cpp/installed
 	cmake --build build/cpp/example
-	build/cpp/example/halves < examples/cpp/l_shape.off
+	build/cpp/example/halves
 
 nightly: test-all test-native sanitize soak
 

@@ -60,10 +60,6 @@ class Engine(World):
     def __init__(self, scene: Scene, exact: Mapping[str, trimesh.Trimesh]) -> None:
         self.scene, self.masses, self.time = scene, [mass_of(body, exact) for body in scene.bodies], 0.0
 
-    def step(self) -> float:
-        """Take a step; how deep the deepest contact is, in metres."""
-        raise NotImplementedError
-
     def _forces(self) -> list[tuple[int, FloatArray]]:
         found = []
         for index, body in enumerate(self.scene.bodies):

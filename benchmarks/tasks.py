@@ -56,6 +56,9 @@ class Body:
 class World(Protocol):
     """A scene in an engine; bodies by their index."""
 
+    def step(self) -> float:
+        """Take a step; how deep the deepest contact is, in metres."""
+
     def place(self, body: int) -> FloatArray:
         """Rotation and position [4, 4] of a shape's own frame."""
 

@@ -1,19 +1,25 @@
-// Cuts a closed mesh (OFF, triangles, on standard input) by the plane through the middle of its box that is normal to
-// the x axis, and prints the volumes of the pieces and of their convex hulls.
+// Cuts an L by the plane through the middle of its box that is normal to the x axis, and prints the volumes of the
+// pieces and of their convex hulls.
 #include <iostream>
-#include <string>
 
 #include "solid/pieces.hpp"
 
 int main() {
-  std::string off;
-  std::size_t vertices = 0, faces = 0, edges = 0;
-  std::cin >> off >> vertices >> faces >> edges;
-  rlacd::Mesh mesh{std::vector<rlacd::Vec3>(vertices), std::vector<rlacd::Triangle>(faces)};
-  for (rlacd::Vec3& v : mesh.vertices) std::cin >> v.x >> v.y >> v.z;
-  for (rlacd::Triangle& f : mesh.faces) std::cin >> edges >> f[0] >> f[1] >> f[2];
-  if (!std::cin || off != "OFF") return std::cerr << "this is no OFF file\n", 1;
-
+  const rlacd::Mesh mesh{{{0, 0, 0},
+                          {3, 0, 0},
+                          {3, 2, 0},
+                          {2, 2, 0},
+                          {2, 1, 0},
+                          {0, 1, 0},
+                          {0, 0, 1},
+                          {3, 0, 1},
+                          {3, 2, 1},
+                          {2, 2, 1},
+                          {2, 1, 1},
+                          {0, 1, 1}},
+                         {{0, 4, 1},  {6, 7, 10}, {0, 5, 4},  {6, 10, 11}, {1, 3, 2}, {7, 8, 9}, {1, 4, 3},
+                          {7, 9, 10}, {0, 1, 7},  {0, 7, 6},  {1, 2, 8},   {1, 8, 7}, {2, 3, 9}, {2, 9, 8},
+                          {3, 4, 10}, {3, 10, 9}, {4, 5, 11}, {4, 11, 10}, {5, 0, 6}, {5, 6, 11}}};
   const rlacd::Box box = rlacd::Box::of(mesh.vertices);
   for (const auto& side : rlacd::cut(mesh, {1, 0, 0}, (box.lower.x + box.upper.x) / 2, 0)) {
     if (!side) continue;
