@@ -57,6 +57,36 @@ def test_a_command_does_not_wait_for_libraries_that_it_does_not_use(tmp_path: Pa
     assert not loaded & unused
 
 
+ROBOTS = {
+    "urdf": '<robot name="r"><link name="l"><collision><geometry><mesh filename="box.obj"/></geometry></collision>'
+    "</link></robot>",
+    "xml": '<mujoco><asset><mesh name="b" file="box.obj"/></asset><worldbody><body><geom type="mesh" mesh="b"/></body>'
+    "</worldbody></mujoco>",
+}
+
+
+@pytest.mark.parametrize("ending", ["dae", "3mf", "urdf", "xml", "stl"])
+def test_a_process_reads_its_file_with_the_libraries_that_trimesh_was_loaded_without(
+    tmp_path: Path, ending: str
+) -> None:
+    """Other tests have trimesh and its libraries loaded when a command begins; a user's process has not."""
+    file, box = tmp_path / f"a.{ending}", trimesh.creation.box()
+    box.export(tmp_path / "box.obj")
+    file.write_text(ROBOTS[ending]) if ending in ROBOTS else box.export(file)
+    words = [
+        "decompose",
+        str(file),
+        "--quality",
+        "fast",
+        "--output",
+        str(tmp_path / "out") + (f".{ending}" if ending in ROBOTS else ".glb"),
+    ]
+    done = subprocess.run([sys.executable, "-m", "rlacd", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    used = f"import rlacd.cli.lean, pathlib; rlacd.cli.lean.import_trimesh(pathlib.Path({str(file)!r}))"
+    modules_after(f"{used}; import importlib.metadata, lxml.etree, networkx; networkx.Graph()")
+
+
 def test_no_module_imports_scipy() -> None:
     """It is installed for the tests, so nothing else would notice."""
     files = list(Path(rlacd.__file__).parent.rglob("*.py"))

@@ -12,14 +12,14 @@ from typing import NoReturn
 
 from rlacd.cli.exit_codes import INTERRUPTED, ExitCode, leave, say
 
-NOT_OURS = ("scipy", "shapely", "rtree", "cascadio", "embreex", "svg", "importlib.metadata")
+NOT_OURS = ("scipy", "shapely", "rtree", "cascadio", "embreex", "svg")
 """What trimesh uses where it is installed, and rlacd never needs: half of a command's time."""
 
 NEEDLESS = {
-    **dict.fromkeys((".obj", ".glb", ".gltf"), ("networkx", "lxml")),
-    **dict.fromkeys((".stl", ".ply", ".off"), ("networkx", "lxml", "PIL")),
+    **dict.fromkeys((".obj", ".glb", ".gltf"), ("networkx", "lxml", "importlib.metadata")),
+    **dict.fromkeys((".stl", ".ply", ".off"), ("networkx", "lxml", "importlib.metadata", "PIL")),
 }
-"""What trimesh reads formats without."""
+"""What trimesh reads formats without; networkx needs importlib.metadata, so both are hidden or neither."""
 
 
 def import_trimesh(mesh: Path) -> None:
