@@ -7,6 +7,8 @@ import functools
 import inspect
 import re
 import shlex
+import shutil
+import subprocess
 import sys
 from importlib import import_module
 from itertools import takewhile
@@ -195,18 +197,39 @@ COMMANDS = sorted(
 )
 
 
+MESHES = [
+    "assets/furniture/stool.obj",
+    "block.stl",
+    "chair.glb",
+    "chair.obj",
+    "cupboard.glb",
+    "house.glb",
+    "link.obj",
+    "mesh.ply",
+    "mug.glb",
+    "rack.stl",
+    "scan.ply",
+    "SM_Chair.glb",
+]
+"""The files that pages name."""
+
+
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with the files that pages name; nothing waits for Ctrl-C, or changes other packages for later tests."""
     post = trimesh.creation.box((1, 1, 3))
     seat = trimesh.creation.box((3, 1, 1), trimesh.transformations.translation_matrix((1, 0, -1)))
     ell = trimesh.boolean.union([post, seat])
-    for name in ("chair.glb", "house.glb", "link.obj", "block.stl"):
+    (tmp_path / "assets" / "furniture").mkdir(parents=True)
+    (tmp_path / "run").mkdir()
+    shutil.copy(Path(rlacd.__file__).parent / "policies" / "rl_acd.npz", tmp_path / "run" / "policy.npz")
+    for name in MESHES:
         ell.export(tmp_path / name)
-    (tmp_path / "robot.urdf").write_text(
-        '<robot name="r"><link name="finger_tip"><collision><geometry>'
-        '<mesh filename="link.obj" scale="0.1 0.1 0.1"/></geometry></collision></link></robot>'
-    )
+    for robot, mesh in {"robot": "link.obj", "arm": "package://arm_description/link.obj"}.items():
+        (tmp_path / f"{robot}.urdf").write_text(
+            '<robot name="r"><link name="finger_tip"><collision><geometry>'
+            f'<mesh filename="{mesh}" scale="0.1 0.1 0.1"/></geometry></collision></link></robot>'
+        )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(viewer.ViewServer, "wait", lambda self: None)
     monkeypatch.setitem(sys.modules, "coacd", coacd)
@@ -242,3 +265,14 @@ def test_commands_have_the_options_that_pages_use(line: str) -> None:
     while hasattr(at, "resolve_command"):
         _, at, words = at.resolve_command(at.context_class(at), words)
     at.make_context("rlacd", words)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "line", [line for line in COMMANDS if re.match(r"(decompose|info|tradeoff|batch)\b(?!.*ray)", line)]
+)
+def test_commands_run_in_a_process_of_their_own(folder: Path, line: str) -> None:
+    """Where no other test has imported what a command forgets."""
+    words = shlex.split(line.replace("/opt/robots/arm", "."), comments=True)
+    done = subprocess.run([sys.executable, "-m", "rlacd", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
