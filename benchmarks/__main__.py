@@ -6,6 +6,7 @@ import sys
 from importlib import import_module
 
 COMMANDS = {
+    "fetch": "brings the meshes that the numbers are of, from public repositories, with git",
     "compare": "rlacd beside CoACD, V-HACD and itself with other options: README's table, quality levels, dense meshes",
     "vhacd-set": "the V-HACD set, on which VisACD and CoACD publish their figures",
     "corpus": "whole corpora: failures, invalid hulls, parts over the threshold, the worst meshes",
