@@ -13,12 +13,11 @@ COMMANDS = {
     "hard": "shapes that are hard for the defaults: sponges, lattices, sheets, thousands of bodies",
     "damaged": "closed meshes with a share of their surface destroyed: what repair recovers",
     "late": "how late a decomposition ends after a timeout or Ctrl-C",
-    "replay": "what a traced decomposition would take on other numbers of cores",
     "batch": "the overhead of a batch beside its meshes",
     "physics": "ten tasks in MuJoCo and PyBullet: a mug on a hook, gears that mesh, a stack; a film of two",
     "piles": "any meshes' hulls in MuJoCo: piles, balls dropped into holes; primitives",
     "robots": "whole robots: hulls a link, farthest, MuJoCo's speed, each mesh at its own scale and links as solids",
-    "training": "the paper's experiments that train: rewards, discounts",
+    "paper": "the paper's training to the letter, on the features of I2P-MAE",
     "oracle": "small solids: the best trees of cuts by the paper's objective and by the number of parts",
     "prices": "the prices of rlacd.work against measured times",
 }

@@ -37,7 +37,6 @@ def app(bench: Bench, methods: str, threshold: float | None) -> Page:
     fast, best             with that quality; fast:policy=navacd:max_vertices=32  with other options
     fast:space[=RADIUS]    with navigable space (tolerance 0.1, half of it as radius; longest side 2)
     coacd, vhacd           other tools with their default options
-    disjoint               rlacd's cuts, united only where hulls stay disjoint
     """
     settings = {}
     for name in words(methods):

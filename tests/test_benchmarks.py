@@ -21,15 +21,13 @@ from benchmarks.methods import make_method, rlacd_options
 from benchmarks.oracle import Oracle, planes_of
 from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Task, save_row
-from benchmarks.tables import Ratio, Table, failures, managed, ratio_of
-from benchmarks.training import ARMS, _options, discounts, train_arms
+from benchmarks.tables import Ratio, failures, managed, ratio_of
 from click.testing import CliRunner
 
 import rlacd
 from rlacd.criteria import Concavity
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.environment import CutEnv
-from rlacd.learn.options import TRAIN_PRESETS
 from rlacd.policies import make_policy
 from rlacd.pool import ProcessLimits
 from rlacd.run import Run
@@ -112,14 +110,6 @@ class TestMethods:
         assert np.allclose(points.min(axis=0), (-1, -1, -0.2), atol=0.06)
         assert np.allclose(points.max(axis=0), (1, 1, 0.2), atol=0.06)
         assert all(f.shape[1] == 3 and f.max() < len(v) for v, f in hulls)
-
-    def test_disjoint_hulls_share_no_volume(self) -> None:
-        """Two bars of a cross that overlap are more hulls where they must not."""
-        mesh = from_manifold(CROSS.rotate((10, 20, 30)))
-        hulls = make_method("disjoint").run(mesh.vertices, mesh.faces, 0.05, 1)
-        bodies = [trimesh.Trimesh(v, f, process=False) for v, f in hulls]
-        assert len(hulls) > len(rlacd.decompose((mesh.vertices, mesh.faces), quality="fast")) == 2
-        assert trimesh.boolean.union(bodies).volume == pytest.approx(sum(body.volume for body in bodies), rel=1e-6)
 
 
 def test_other_tools_run_at_their_own_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -374,41 +364,6 @@ class TestCommands:
         assert says in told
         assert len(told.strip().splitlines()) == 1
         assert not Path("run").exists()
-
-    @pytest.mark.slow
-    def test_discounts_that_add_up_to_more_than_one_diverge(self, meshes: Path, tmp_path: Path) -> None:
-        page = run(discounts, meshes, "-o", tmp_path, "--depth", 3, "--steps", 3000)
-        assert "| share of the hull (eq. 9) |" in page
-        assert "| 0.99 + 0.99 |" in page
-
-
-@pytest.mark.parametrize("preset", ["returns", "paper"])
-def test_arms_differ_in_what_they_say_only(preset: str) -> None:
-    arms = [_options(preset, 100, 1, changes) for changes in ARMS.values()]
-    assert len(set(arms)) == len(arms)
-    assert {(a.env_steps, a.seed, a.learning_starts, a.validate_every) for a in arms} == {(100, 1, 20, 50)}
-
-
-@pytest.mark.nightly
-def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("torch")
-    folder = tmp_path / "meshes"
-    folder.mkdir()
-    for number in range(6):
-        mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
-        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
-    arms = dict(list(ARMS.items())[:2])
-    monkeypatch.setattr("benchmarks.training.ARMS", arms)
-    monkeypatch.setattr("rlacd.learn.options.TRAIN_PRESETS", {"returns": {**TRAIN_PRESETS["returns"], "validation": 2}})
-    said: list[str] = []
-    given = (folder, tmp_path / "run", "returns", 40, 2, said.append)
-    page = train_arms(*given)
-    table = next(block for block in page.blocks if isinstance(block, Table))
-    assert [line[0] for line in table.lines] == list(arms)
-    assert all(float(str(line[1]).partition(" ± ")[0]) > 0 for line in table.lines)
-    assert len({(tmp_path / "run" / f"rewards-1-seed-{s}" / "curves.jsonl").read_text() for s in (0, 1)}) == 2
-    monkeypatch.setattr("rlacd.learn.train.train", None)  # would fail if called
-    assert str(train_arms(*given)) == str(page)
 
 
 @pytest.mark.parametrize(("name", "fewest"), [("angle", 2), ("cross", 3), ("table", 5)])

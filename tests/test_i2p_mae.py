@@ -23,7 +23,7 @@ pytest.importorskip("torch", reason="needs the extra train")
 import torch
 from benchmarks.learned.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, PublishedEncoder, Sizes, seen_below
 from benchmarks.learned.point_groups import farthest_points, gather, nearest_points
-from benchmarks.training import app as training
+from benchmarks.paper import app as paper
 
 from rlacd.learn.dqn import pick_device, q_network
 from rlacd.learn.options import TrainOptions
@@ -229,8 +229,8 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_missing_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
-    words = ["paper", str(meshes), "--out", str(tmp_path / "run"), "--weights", str(tmp_path / "nowhere.pth")]
-    shown = CliRunner().invoke(training, words)
+    words = [str(meshes), "--out", str(tmp_path / "run"), "--weights", str(tmp_path / "nowhere.pth")]
+    shown = CliRunner().invoke(paper, words)
     assert shown.exit_code == 2
     assert "there is no file" in shown.output
     assert "Traceback" not in shown.output

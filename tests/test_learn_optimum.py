@@ -1,4 +1,4 @@
-"""Against exact dynamic programming on trees of cuts: tabular Q-learning (the paper's appendix A) and networks."""
+"""Networks against the exact optimum of their objective, by recursion over all trees of cuts by two planes."""
 
 from __future__ import annotations
 
@@ -11,78 +11,34 @@ from manifold3d import Manifold
 
 pytest.importorskip("torch", reason="needs the extra train")
 
-from benchmarks.tabular import Node, all_nodes, grow, middle_planes, process_of, q_learning
-
 from rlacd.criteria import Concavity
 from rlacd.learn.environment import CutEnv
 from rlacd.learn.meshes import Solids
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.train import load_policy, train
+from rlacd.planes.candidates import OFFSETS_PER_AXIS
 from rlacd.planes.sweep import paper_planes, valid_planes
 from rlacd.policies import Policy
 from rlacd.solid.component import Component
-from tests.learning import small_solids
 from tests.shapes import box, trimesh_of
 
-CRITERION = Concavity(0.02)
+
+def worth(component: Component, unit: float) -> float:
+    """Value of a component where only volume is rewarded, in units of a volume: eq. 7 and 8 as they stand."""
+    best = 0.0
+    for plane in TWO:
+        cutting = CutEnv(component, LIMIT)
+        if not cutting.unfinished:
+            break
+        cut = cutting.step(component, cutting.candidates(component).plane(plane))
+        if cut.left.stuck != [component]:
+            below = sum(d * worth(c, unit) for c, d in zip(cut.left.unfinished, cut.discounts, strict=True))
+            best = max(best, cut.saved * component.hull.volume / unit + below)
+    return best
 
 
-@pytest.fixture(scope="module")
-def roots() -> list[Node]:
-    solids = [Component(solid) for name, solid in small_solids().items() if name in ("angle", "table", "cross")]
-    return [node for solid in solids for node in grow(solid, CRITERION, middle_planes(), depth=3)]
-
-
-def best(node: Node, finish_reward: float) -> float:
-    """Value of a node by recursion over the tree: eq. 7 and 8 as they stand."""
-    return max(
-        (
-            o.saved
-            + finish_reward * o.finished
-            + sum(d * best(c, finish_reward) for c, d in zip(o.children, o.discounts, strict=True))
-            for o in node.outcomes
-        ),
-        default=0.0,
-    )
-
-
-def root_values(roots: list[Node], finish_reward: float) -> list[float]:
-    process = process_of(roots, alike=False, finish_reward=finish_reward)
-    exact = process.solve()
-    assert exact is not None
-    order = [node for node in all_nodes(roots) if node.outcomes]
-    values = process.values(exact)
-    return [float(values[order.index(root)]) for root in roots]
-
-
-def volume_worth(node: Node, unit: float) -> float:
-    """Value of a component where only volume is rewarded, by eq. 7 and 8."""
-    return max(
-        (
-            o.saved * node.hull_volume / unit
-            + sum(d * volume_worth(c, unit) for c, d in zip(o.children, o.discounts, strict=True))
-            for o in node.outcomes
-        ),
-        default=0.0,
-    )
-
-
-@pytest.mark.parametrize("finish_reward", [0.0, 1.0])
-def test_dynamic_programming_agrees_with_recursion_over_the_tree(roots: list[Node], finish_reward: float) -> None:
-    assert root_values(roots, finish_reward) == pytest.approx([best(root, finish_reward) for root in roots])
-
-
-@pytest.mark.parametrize("static_discount", [None, 0.99])
-def test_q_learning_converges_to_dynamic_programming_on_trees(roots: list[Node], static_discount: float | None) -> None:
-    process = process_of(roots, alike=False, static_discount=static_discount)
-    exact = process.solve()
-    assert exact is not None
-    # Every sample is certain, so steps of size 1 are allowed and the answer is exact.
-    learned = q_learning(process, 60 * len(process.pair), np.random.default_rng(0), rate=0.0)[-1]
-    assert learned[process.possible] == pytest.approx(exact[process.possible], abs=1e-12)
-
-
-TWO = middle_planes((0, 2))
+TWO = [axis * OFFSETS_PER_AXIS + OFFSETS_PER_AXIS // 2 for axis in (0, 2)]
+"""Those that halve a component along x and z."""
 
 LIMIT = Concavity(0.07)
 
@@ -138,9 +94,8 @@ def test_networks_reach_the_optimum_of_their_objective(u_shape: Component, tmp_p
     options = TrainOptions(threshold=LIMIT.threshold, **{**given, **steps, **changes})
     train(tmp_path / "meshes", tmp_path / "run", options, say=lambda line: None)
     policy = load_policy(tmp_path / "run")
-    [root] = grow(u_shape, LIMIT, TWO, depth=8)
     unit = CutEnv(u_shape, LIMIT).excess(u_shape) if options.target == "return" else 1
-    known = volume_worth(root, root.hull_volume)
+    known = worth(u_shape, u_shape.hull.volume)
     assert (policy._values(u_shape)[TWO] * unit).max() == pytest.approx(known, abs=0.03)
     assert cuts_by(policy, u_shape) in range(3, 11)
 
