@@ -7,10 +7,7 @@ from importlib import import_module
 
 COMMANDS = {
     "fetch": "brings the meshes that the numbers are of, from public repositories, with git",
-    "compare": "rlacd beside CoACD, V-HACD and itself with other options: README's table, quality levels, dense meshes",
-    "vhacd-set": "the V-HACD set, on which VisACD and CoACD publish their figures",
-    "corpus": "whole corpora: failures, invalid hulls, parts over the threshold, the worst meshes",
-    "hard": "shapes that are hard for the defaults: sponges, lattices, sheets, thousands of bodies",
+    "compare": "rlacd beside CoACD, V-HACD and itself with other options; quality levels, whole corpora",
     "damaged": "closed meshes with a share of their surface destroyed: what repair recovers",
     "late": "how late a decomposition ends after a timeout or Ctrl-C",
     "batch": "the overhead of a batch beside its meshes",

@@ -14,7 +14,7 @@ import numpy as np
 import psutil
 import pytest
 import trimesh
-from benchmarks import compare, corpus, hard, vhacd_set
+from benchmarks import compare
 from benchmarks.__main__ import COMMANDS
 from benchmarks.learned.compare import policy_of
 from benchmarks.methods import make_method, rlacd_options
@@ -265,7 +265,7 @@ class TestTables:
         assert [len(rows) for rows in managed({"a": a, "b": b}).values()] == [2, 2]
         text = str(compare.comparison({"a": a, "b": b}))
         assert "| 2 meshes | a | b |" in text
-        assert "| hulls | 6 | 8 |" in text
+        assert "| hulls; a mesh | 6; 3.0 | 8; 4.0 |" in text
         assert "| failed | 0 of 3 | 1 of 3 |" in text
         nothing = {"a": self.rows(2), "b": self.rows(failed="m0")}
         assert all(
@@ -314,18 +314,17 @@ class TestCommands:
         assert "there is no command 'x'" in wrong.stderr
 
     @pytest.mark.slow
-    def test_compare_corpus_and_the_vhacd_set(self, meshes: Path, tmp_path: Path) -> None:
+    def test_compare_writes_a_page_and_does_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
         text = run(compare.app, meshes, "--out", out, "--methods", "fast,fast:policy=navacd", "--first", 2)
         assert (out / "compare.md").read_text() in text
         assert "| 2 meshes, threshold 0.05 | rlacd `fast` | rlacd `fast:policy=navacd` |" in text
         before = sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir())
-        assert "| decomposed | 2 of 2 |" in run(corpus.app, meshes, "--out", out)
+        assert "| failed | 0 of 2 |" in run(compare.app, meshes, "--out", out, "--methods", "fast", "--warm")
         assert sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir()) == before
-        page = run(vhacd_set.app, meshes, "--out", out, "--methods", "fast,fast@0.04", "--threads", 2)
-        assert "| fast @ 0.05 | 1.5 |" in page
-        assert "| fast @ 0.04 |" in page
-        assert "VisACD, published" in page
+        page = run(compare.app, meshes, "--out", out, "--methods", "fast,fast@0.04", "--threads", 2)
+        assert "| 2 meshes | fast | fast@0.04 |" in page
+        assert "| hulls; a mesh | 3; 1.5 |" in page
         assert "| wall s, 2 threads: median, mean, most, sum |" in page
 
     @pytest.mark.slow
@@ -334,13 +333,6 @@ class TestCommands:
         command = [sys.executable, "-m", "benchmarks", "prices", str(meshes)]
         told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
         assert all(f"| {kernel} |" in told for kernel in ("choosing", "cutting", "judging", "filling"))
-
-    @pytest.mark.slow
-    def test_hard_shapes_are_written_and_compared(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(hard, "SHAPES", {"gyroid": lambda: hard.gyroid(0.2, 3.0)})
-        page = run(hard.app, "-o", tmp_path, "--methods", "fast")
-        assert "| gyroid.ply |" in page
-        assert len(trimesh.load_mesh(tmp_path / "shapes" / "gyroid.ply").faces) > 100
 
     @pytest.mark.parametrize(
         ("words", "says"),
