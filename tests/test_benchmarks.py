@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import inspect
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import pytest
 import trimesh
 from benchmarks import compare
@@ -179,44 +176,6 @@ class TestRunner:
         rows = bench_of(meshes, tmp_path / "run", process=ProcessLimits(**limits)).run("fast")
         assert all(says in row["error"] for row in rows)
         assert len(rows) == 2, "the run goes on"
-
-    def test_a_crash_is_recorded(self, meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        crasher = tmp_path / "crasher"
-        crasher.write_text("#!/bin/sh\necho last words >&2\nkill -SEGV $$\n")
-        crasher.chmod(0o755)
-        monkeypatch.setattr(sys, "executable", str(crasher))
-        rows = bench_of(meshes, tmp_path / "run").run("fast")
-        assert [row["error"] for row in rows] == ["its process died of SIGSEGV last words"] * 2
-
-    @pytest.mark.nightly
-    def test_stopping_a_run_ends_its_processes_and_records_nothing(self, tmp_path: Path) -> None:
-        """Whether it is interrupted or killed: no process goes on, and what was running is done again next time."""
-        folder = tmp_path / "meshes"
-        folder.mkdir()
-        sphere = trimesh.creation.icosphere(subdivisions=6)  # keeps a method busy for long
-        for name in ("a.ply", "b.ply"):
-            trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
-        program = (
-            "import signal, sys; from pathlib import Path; from benchmarks.runner import Bench, find_meshes;"
-            "signal.signal(signal.SIGINT, signal.default_int_handler);"  # ignored by what runs in a shell's background
-            "m, o = map(Path, sys.argv[1:]);"
-            "Bench(m, find_meshes(m), o).run('fast', 0.002)"
-        )
-        for number in (signal.SIGINT, signal.SIGKILL):
-            out = tmp_path / f"run-{number}"
-            command = [sys.executable, "-c", program, folder, out]
-            with subprocess.Popen(command, stderr=subprocess.DEVNULL, cwd=ROOT) as process:
-                try:
-                    parent = psutil.Process(process.pid)
-                    while not (children := parent.children()):
-                        time.sleep(0.1)
-                    time.sleep(1)  # let it begin
-                    process.send_signal(number)
-                    process.wait(timeout=60)
-                finally:
-                    process.kill()
-            assert not psutil.wait_procs(children, timeout=30)[1]
-            assert not list(out.glob("tasks/*.json"))
 
     def test_a_broken_mesh_is_recorded_and_what_another_version_made_is_made_again(
         self, meshes: Path, tmp_path: Path

@@ -253,16 +253,6 @@ def test_needles_are_as_near_as_their_edges(width: float) -> None:
     np.testing.assert_allclose(surface.distance(points), np.linalg.norm(points - on_segment, axis=1), atol=width + 1e-8)
 
 
-def test_winding_tells_inside_from_outside() -> None:
-    mesh = from_manifold(box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)))
-    points = np.random.default_rng(0).uniform(-1.5, 1.5, (4000, 3))
-    reach = np.abs(points).max(axis=1)
-    inside = (reach < 1) & (reach > 0.5)
-    surface = _native.Surface(mesh.vertices, mesh.faces)
-    np.testing.assert_allclose(surface.winding(points, accuracy=np.inf), inside, atol=1e-9)
-    assert np.array_equal(surface.winding(points) > 0.5, inside)
-
-
 @pytest.mark.parametrize("width", [1.0, 1e-9])
 def test_around_a_closed_surface_windings_are_whole_numbers(width: float) -> None:
     """Two rings through each other, at best as thick as rounding; rays meet their edges, corners, and faces edge on."""

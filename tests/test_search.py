@@ -117,20 +117,6 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
             )
 
 
-def test_reuniting_again_and_again_leaves_no_crumbs() -> None:
-    solid = again = Component(frame())
-    rng = np.random.default_rng(0)
-    for _ in range(12):
-        x, y, z = rng.normal(size=3)
-        length = math.hypot(x, y, z)
-        sides = again.cut(Plane((x / length, y / length, z / length), 0.1))
-        reunited = reunite(strangers([side for side in sides if side is not None]))
-        assert reunited is not None
-        again = reunited
-    assert again.volume == pytest.approx(solid.volume, rel=1e-6)
-    assert len(again.faces) < 12 * len(solid.faces)  # 160 times as many without cleaning up
-
-
 def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Criterion) -> None:
     assert exchange.gain == 1
     assert exchange.out[0] is part
