@@ -281,9 +281,9 @@ class TestCommands:
         before = sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir())
         assert "| failed | 0 of 2 |" in run(compare.app, meshes, "--out", out, "--methods", "fast", "--warm")
         assert sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir()) == before
-        page = run(compare.app, meshes, "--out", out, "--methods", "fast,fast@0.04", "--threads", 2)
-        assert "| 2 meshes | fast | fast@0.04 |" in page
-        assert "| hulls; a mesh | 3; 1.5 |" in page
+        page = run(compare.app, meshes, "--out", out, "--methods", "fast,fast@1.9", "--threads", 2)
+        assert "| 2 meshes | fast | fast@1.9 |" in page
+        assert "| hulls; a mesh | 3; 1.5 | 2; 1.0 |" in page
         assert "| wall s, 2 threads: median, mean, most, sum |" in page
 
     @pytest.mark.slow
