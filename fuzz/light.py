@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import math
 import pickle
-import re
 import resource
 import sys
 import time
@@ -75,9 +74,6 @@ ROOM = 3 * 2**30
 
 _HERE = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl", "xyz")
 """Formats that are read in this process; the others start one of their own for each file (`rlacd.io.read.apart`)."""
-
-REFUSED, READ = " refused: ", " read"
-"""Between a format and the reason, and after a format, in the counts of a trial."""
 
 Options = dict[str, Any]
 
@@ -160,7 +156,7 @@ class LightTrials:
                 mesh = load_mesh(path)
         except rlacd.RlacdError as error:
             said = str(error)
-            trial.counts[f"{kind}{REFUSED}{_without_details(said, path)}"] += 1
+            trial.counts[f"{kind} refused"] += 1
             is_sentence = said and "\n" not in said and len(said) <= LONGEST_SENTENCE
             trial.end, trial.said = ("refused", []) if is_sentence else ("wrong", [f"no sentence: {said!r:.900}"])
         except MemoryError as error:
@@ -168,7 +164,7 @@ class LightTrials:
         except Exception as error:  # any other is a failure, and is what is looked for
             trial.end, trial.said = "untyped", [f"{type(error).__name__}: {error!s:.300}"]
         else:
-            trial.counts[f"{kind}{READ}"] += 1
+            trial.counts[f"{kind} read"] += 1
             trial.said = wrong_in(mesh)
             trial.end = "wrong" if trial.said else "loaded"
             if trial.end == "loaded" and _chosen(trial) and 0 < len(mesh.faces) <= MOST_FACES:
@@ -331,13 +327,6 @@ def _decomposed(shape: Shape, options: Options) -> tuple[str, list[str], int]:
     hulls = [(np.array(hull.vertices), np.array(hull.faces)) for hull in result]
     said = judge(Case(shape, options, hulls, report), SAMPLES)
     return "wrong" if said else "done", said, len(hulls)
-
-
-def _without_details(said: str, path: Path) -> str:
-    """The reason of a refusal without names, numbers and quotations, to be counted."""
-    said = said.replace(str(path), "it").replace(path.name, "it")
-    said = re.sub(r"'[^']*'|\"[^\"]*\"|\[[^\]]*\]", "…", said)
-    return re.sub(r"[-+]?\d[\w.+-]*|\b(?:nan|inf)\b", "N", said)[:90]
 
 
 class _OpenedFiles:

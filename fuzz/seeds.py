@@ -64,7 +64,7 @@ def seeds_of_shapes() -> dict[str, list[Seed]]:
 def seeds_of(meshes: Path) -> dict[str, list[Seed]]:
     """Collect real files, and small real meshes written in every format, by format."""
     found: dict[str, list[Seed]] = {}
-    for path in sorted((meshes / "raw").iterdir()):
+    for path in sorted((meshes / "raw").glob("*")):
         if path.stat().st_size < LARGEST_SEED:
             found.setdefault(path.suffix[1:], []).append(Seed(path.read_bytes()))
     with open(meshes / "index.csv", encoding="utf-8", newline="") as listing:

@@ -27,7 +27,7 @@ from typing import Any
 
 from fuzz.cases import AnyLaboratory, case_of, file_of, minimised, try_case
 from fuzz.light import KINDS as LIGHT
-from fuzz.light import READ, REFUSED, WarmTrials
+from fuzz.light import WarmTrials
 from fuzz.seeds import seeds_from
 from fuzz.trials import KINDS, WELL, Laboratory, Trial
 from rlacd import __version__
@@ -37,8 +37,6 @@ CHUNK, LIGHT_CHUNK = 50, 1000
 
 TRIES = 40
 """Number of smaller inputs tried for every failure."""
-
-MOST_REASONS = 25
 
 Row = dict[str, Any]
 
@@ -165,28 +163,9 @@ def totals(rows: list[Row]) -> str:
     for kind in kinds:
         cells = [ends[f"{kind} {end}"] for end in columns]
         lines.append(f"| {kind} | {sum(cells)} | " + " | ".join(map(str, cells)) + " |")
-    whys = Counter({name: number for name, number in counts.items() if REFUSED in name or name.endswith(READ)})
-    counted = ", ".join(f"{name} {number}" for name, number in counts.most_common() if name not in whys)
+    counted = ", ".join(f"{name} {number}" for name, number in counts.most_common())
     hours = sum(row["cpu"] for row in rows) / 3600
-    return "\n".join([*lines, "", f"{hours:.2f} hours of a processor; {counted}", *reasons(whys)])
-
-
-def reasons(whys: Counter[str]) -> list[str]:
-    """Damaged files by format, and the most frequent reasons of refusals, as Markdown."""
-    if not whys:
-        return []
-    formats = sorted({name.split()[0] for name in whys})
-    lines = ["", "| format | files | read | refused | reasons |", "|---|--:|--:|--:|--:|"]
-    for kind in formats:
-        own = Counter({name: number for name, number in whys.items() if name.split()[0] == kind})
-        read = own.pop(f"{kind}{READ}", 0)
-        lines.append(f"| {kind} | {own.total() + read} | {read} | {own.total()} | {len(own)} |")
-    overall = Counter[str]()
-    for name, number in whys.items():
-        if REFUSED in name:
-            overall[name.split(REFUSED)[1]] += number
-    lines += ["", "| refused | files |", "|---|--:|"]
-    return [*lines, *(f"| {why.replace('|', '/')} | {number} |" for why, number in overall.most_common(MOST_REASONS))]
+    return "\n".join([*lines, "", f"{hours:.2f} hours of a processor; {counted}"])
 
 
 def main() -> int:
@@ -202,6 +181,9 @@ def main() -> int:
     parser.add_argument("--again", type=Path, help="a case to try once more")
     parser.add_argument("--minimise", type=Path, help="a case to make smaller, in place")
     args = parser.parse_args()
+    args.light = args.only in LIGHT if args.only else args.light
+    if args.only == "mesh" and meshes_of(args.meshes) is None:
+        parser.error("--only mesh needs --meshes, the folder of real meshes")
     if args.totals:
         print(totals(Ledger(args.folder / "ledger.jsonl").rows))
         return 0
