@@ -24,7 +24,7 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 NATIVE_TESTS = (
     *("hull", "sweep", "distance", "concavity", "concave_edges", "limits", "metrics"),
-    *("plane_cut", "overlap", "decomposition", "fuzz_found"),
+    *("plane_cut", "overlap", "decomposition", "fuzz_found", "kernels_refuse"),
     *("proxy", "stop"),
     *("navigable", "merge", "decompose", "search", "policies", "bad_input"),
 )

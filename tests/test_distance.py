@@ -319,19 +319,3 @@ def test_samples_are_spread_by_area() -> None:
         expected = count * areas / areas.sum()
         assert np.abs(np.bincount(face, minlength=len(areas)) - expected).max() < 3
         np.testing.assert_allclose(points.mean(axis=0), [0.5, 1, 1.5], atol=0.02)  # the surface's centroid
-
-
-def test_bad_surfaces_and_points_are_refused() -> None:
-    corners, faces = np.eye(3), np.array([[0, 1, 2]], dtype=np.int32)
-    for vertices, triangles, says in (
-        (np.where(corners, np.nan, 0), faces, "not finite"),
-        (np.where(corners, np.inf, 0), faces, "not finite"),
-        (corners, faces + 1, "out of range"),
-        (corners, faces[:0], "no faces"),
-    ):
-        with pytest.raises(ValueError, match=says):
-            _native.Surface(vertices, triangles)
-    surface = _native.Surface(corners, faces)
-    for query in (surface.distance, surface.closest, surface.winding):
-        with pytest.raises(ValueError, match="not finite"):
-            query(np.array([[0, 0, np.nan]]))

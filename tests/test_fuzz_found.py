@@ -33,15 +33,6 @@ def test_surfaces_of_any_size_can_be_asked_for_closest_points(unit: float) -> No
     assert ((on >= 0) & (on < 80)).all()
 
 
-@pytest.mark.parametrize("unit", [1e155, 1e308])
-def test_coordinates_whose_squares_overflow_are_refused(unit: float) -> None:
-    vertices, faces = triangles(unit)
-    with pytest.raises(ValueError, match="1e150"):
-        _native.Surface(vertices, faces)
-    with pytest.raises(ValueError, match="1e150"):
-        _native.Surface(vertices / unit, faces).closest(vertices)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "step"), [(12, "slab"), (60, "wrapped")])
 def test_sheets_that_all_cross_are_wrapped_when_they_are_many(count: int, step: str) -> None:

@@ -27,13 +27,12 @@ from benchmarks.paper import app as paper
 
 from rlacd.learn.dqn import pick_device, q_network
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.train import load_policy, train
+from rlacd.learn.train import train
 from rlacd.policies.plane_features import PLANES
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
 from tests.scripts import script
 from tests.test_learn_train import TINY as TINY_RUN
-from tests.test_learn_train import weights as whole_state
 
 pytestmark = pytest.mark.slow
 
@@ -251,15 +250,6 @@ def meshes(tmp_path: Path) -> Path:
 def run(meshes: Path, folder: Path, seed: int = 0, points: int = 64, resume: bool = False, **changes: Any) -> Path:
     encoder, options = PublishedEncoder(tiny_encoder(seed), points), TrainOptions(**{**SHORT, **changes})
     return train(meshes, folder, options, resume=resume, encoder=encoder, say=lambda line: None)
-
-
-def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "whole")
-    run(meshes, tmp_path / "halves", env_steps=34)
-    run(meshes, tmp_path / "halves", resume=True)
-    assert whole_state(tmp_path / "whole") == whole_state(tmp_path / "halves")
-    encoder = PublishedEncoder(tiny_encoder(), 64)
-    assert load_policy(tmp_path / "halves", encoder).choose(Component(small_solids()["angle"])) is not None
 
 
 def test_other_weights_do_not_go_on_with_a_run(meshes: Path, tmp_path: Path) -> None:
