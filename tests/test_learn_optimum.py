@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
 
 pytest.importorskip("torch", reason="needs the extra train")
 
@@ -55,20 +54,15 @@ def two_planes(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"rlacd.{place}_planes", two)
 
 
-def saved(folder: Path, name: str, solid: Manifold) -> Component:
-    """Write a solid to a folder and read it as training does."""
-    folder.mkdir(exist_ok=True)
-    trimesh_of(solid).export(folder / name)
-    read = Solids(folder, folder / "solids").get(name)
-    assert read is not None
-    return read
-
-
 @pytest.fixture
 def u_shape(tmp_path: Path, two_planes: None) -> Component:
     """A "u" with arms of different height: 31 components in all."""
     solid = box((0, 0, 0), (3, 1, 0.4)) + box((0, 0, 0), (0.4, 1, 2)) + box((2.6, 0, 0), (3, 1, 1))
-    return saved(tmp_path / "meshes", "u.ply", solid)
+    (tmp_path / "meshes").mkdir()
+    trimesh_of(solid).export(tmp_path / "meshes" / "u.ply")
+    read = Solids(tmp_path / "meshes", tmp_path / "solids").get("u.ply")
+    assert read is not None
+    return read
 
 
 @pytest.mark.nightly

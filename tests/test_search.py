@@ -155,24 +155,6 @@ def test_a_part_gives_what_the_others_can_take_and_keeps_the_rest(seed: int) -> 
     assert give(bent, [], CRITERION, np.random.default_rng(seed), solid, Run(1)) is None
 
 
-def test_a_part_that_sticks_out_stays() -> None:
-    slab, pin = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((0.4, 0.4, 0.2), (0.6, 0.6, 0.9)))
-    solid = together([slab, pin])
-    assert redistribute(pin, [slab], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
-    assert redistribute(pin, [], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
-
-
-def test_all_or_nothing() -> None:
-    """A half that fits into a neighbour does not go there if the other half fits nowhere."""
-    slab, long = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((1, 0, 0), (3, 1, 0.2)))
-    tower = Component(box((2.9, 0, 0.2), (3, 1, 1.5)))
-    parts: list[Part] = [slab, tower]
-    bent = Part.glued(long, tower)
-    solid = together([slab, long, tower])
-    assert redistribute(bent, [slab], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
-    assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid, Run(1)) is not None
-
-
 @settings(max_examples=30, deadline=None)
 @given(stacks(), st.integers(0, 2**32 - 1))
 def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
