@@ -15,14 +15,12 @@ SANITIZE_address := address,undefined,float-divide-by-zero,float-cast-overflow
 SANITIZE_thread  := thread
 
 # What the fuzzers are given: time, a seed for other inputs, and the real meshes whose files are damaged.
-MINUTES ?= 10
 HOURS   ?= 1
 WORKERS ?= 1
 SEED    ?= 0
 MESHES  ?= ../shared/meshes
-SECONDS_TO_FUZZ = $(shell expr 60 \* $(MINUTES))
 
-.PHONY: install demo docs pictures benchmarks test test-fast test-all test-native nightly engines lint soak soak-light soak-totals stubs fuzz-files fuzz-shapes sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs pictures benchmarks test test-fast test-all test-native nightly engines lint soak soak-light soak-totals stubs sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -148,14 +146,6 @@ soak-light: $(VENV)/test-extras
 
 soak-totals: $(VENV)/test-extras
 	$(BIN)/python -m fuzz.soak --totals
-
-# Random shapes under random options.
-fuzz-shapes: $(VENV)/installed
-	$(BIN)/python -m fuzz.shapes --seconds $(SECONDS_TO_FUZZ)
-
-# Damaged files of every format.
-fuzz-files: $(VENV)/test-extras
-	$(BIN)/python -m fuzz.damaged $(MESHES) --minutes $(MINUTES) --seed $(SEED)
 
 $(VENV)/lint: $(VENV)/tools
 	@$(BIN)/pip install --quiet --constraint constraints-dev.txt --group lint

@@ -6,18 +6,15 @@ import sys
 from importlib import import_module
 
 COMMANDS = {
-    "compare": "rlacd beside CoACD, V-HACD and itself with other options: README's table, quality levels, dense meshes",
-    "vhacd-set": "the V-HACD set, on which VisACD and CoACD publish their figures",
-    "corpus": "whole corpora: failures, invalid hulls, parts over the threshold, the worst meshes",
-    "hard": "shapes that are hard for the defaults: sponges, lattices, sheets, thousands of bodies",
+    "fetch": "brings the meshes that the numbers are of, from public repositories, with git",
+    "compare": "rlacd beside CoACD, V-HACD and itself with other options; quality levels, whole corpora",
     "damaged": "closed meshes with a share of their surface destroyed: what repair recovers",
     "late": "how late a decomposition ends after a timeout or Ctrl-C",
-    "replay": "what a traced decomposition would take on other numbers of cores",
     "batch": "the overhead of a batch beside its meshes",
     "physics": "ten tasks in MuJoCo and PyBullet: a mug on a hook, gears that mesh, a stack; a film of two",
     "piles": "any meshes' hulls in MuJoCo: piles, balls dropped into holes; primitives",
     "robots": "whole robots: hulls a link, farthest, MuJoCo's speed, each mesh at its own scale and links as solids",
-    "training": "the paper's experiments that train: rewards, discounts",
+    "paper": "the paper's training to the letter, on the features of I2P-MAE",
     "oracle": "small solids: the best trees of cuts by the paper's objective and by the number of parts",
     "prices": "the prices of rlacd.work against measured times",
 }

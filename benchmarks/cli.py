@@ -29,21 +29,17 @@ RUNS = (
     click.option("--memory", default=12.0, show_default=True, help="GB a process may hold; 0: no limit."),
     click.option("--jobs", type=click.IntRange(1), default=1, help="Processes at a time, of one thread each."),
     click.option("--threads", type=click.IntRange(1), default=1, help="Do all again with so many, for the wall time."),
+    click.option(
+        "--warm", is_flag=True, help="One process for many meshes: faster, but its peak memory is not each's."
+    ),
 )
 """Of every command that runs methods on meshes."""
 
 
-def experiment(
-    check: Callable[..., object] = lambda **_: None, fresh: bool = True
-) -> Callable[[Callable[..., Page]], click.Command]:
+def experiment(check: Callable[..., object]) -> Callable[[Callable[..., Page]], click.Command]:
     """Make a command of a function that takes a `Bench` and its own options, and returns a page.
 
-    Parameters
-    ----------
-    check : callable
-        Gets the command's own options before a file is read or written: raises if an extra or a tool is missing.
-    fresh : bool
-        Whether each task gets a process of its own.
+    `check` gets the command's own options before a file is read or written: raises if an extra or a tool is missing.
     """
 
     def register(make_page: Callable[..., Page]) -> click.Command:
@@ -56,8 +52,8 @@ def experiment(
                 check(**chosen)
                 names = find_meshes(meshes, given["listed"])[: given["first"]]
                 process = ProcessLimits(given["limit"], int(given["memory"] * 2**30))
-                bench = Bench(meshes, names, out, Limits(process, given["jobs"], fresh, given["threads"]), click.echo)
-                write(make_page(bench, **chosen), out, name)
+                limits = Limits(process, given["jobs"], not given["warm"], given["threads"])
+                write(make_page(Bench(meshes, names, out, limits, click.echo), **chosen), out, name)
 
         vars(run)["__click_params__"] = list(own)
         for decorate in reversed(RUNS):
@@ -83,4 +79,4 @@ def check_methods(methods: str, **_: object) -> None:
     if not words(methods):
         raise OptionError("--methods is empty; name at least one.")
     for name in words(methods):
-        make_method(name)
+        make_method(name.partition("@")[0])

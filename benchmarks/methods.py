@@ -10,7 +10,6 @@ name                            tool                                          se
 ``coacd``                       CoACD                                         concavity threshold (its own)
 ``coacd-hulls``                 CoACD at its own threshold                    most hulls (64)
 ``vhacd``                       V-HACD 4                                      most hulls (its own)
-``disjoint``                    `benchmarks.disjoint`                         concavity threshold (rlacd's)
 ==============================  ============================================  =====================================
 
 Lengths are in the frame where the longest side is 2. The default radius is half the tolerance.
@@ -85,10 +84,6 @@ def make_method(name: str) -> Method:
         return Method(name, version_of("coacd"), "hulls", 64, partial(_coacd, most=True))
     if name == "vhacd":
         return Method(name, version_of("vhacdx"), "hulls", 64, _vhacd)
-    if name == "disjoint":
-        from benchmarks.disjoint import decompose_disjoint
-
-        return Method(name, version_of("rlacd"), "threshold", Options.threshold, decompose_disjoint)
     setting, default = ("tolerance", 0.1) if _space(name) else ("threshold", Options.threshold)
     return Method(name, version_of("rlacd"), setting, default, _rlacd(name))
 
@@ -107,7 +102,7 @@ def rlacd_options(name: str) -> dict[str, Any]:
     if base not in QUALITIES:
         raise OptionError(
             f"there is no method {name!r}; it has to be default, fast or best, if need be followed by :OPTION=VALUE or "
-            "by :space[=RADIUS]; or coacd, coacd-hulls, vhacd, disjoint."
+            "by :space[=RADIUS]; or coacd, coacd-hulls, vhacd."
         )
     options = dict(QUALITIES[base])
     for word in words:

@@ -8,7 +8,6 @@ component can be the last. No tree of m_i saves more than its excess, |CH(m_i)| 
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -21,7 +20,7 @@ import numpy as np
 
 from benchmarks.cli import OUT, PATH, write
 from benchmarks.runner import find_meshes
-from benchmarks.store import Row
+from benchmarks.store import Row, Task, load_row, save_row
 from benchmarks.tables import Page, Ratio, Table
 from rlacd.cli.exit_codes import exit_codes
 from rlacd.criteria import Concavity
@@ -372,16 +371,14 @@ def page(rows: list[Row]) -> Page:
 def app(meshes: Path, out: Path, listed: Path | None, count: int, faces: int, threshold: float, budget: int) -> None:
     """Find the best trees of cuts of small solids by the paper's objective and by the number of parts."""
     with exit_codes():
-        out.mkdir(parents=True, exist_ok=True)
-        known = {row["mesh"]: row for row in read_rows(out / "rows.jsonl")}
         rows: list[Row] = []
-        names = find_meshes(meshes, listed)
-        for name in np.random.default_rng(0).permutation(names).tolist():
-            if name not in known:
-                known[name] = {"mesh": name, **(one_of(meshes / name, faces, threshold, budget) or {})}
-                with open(out / "rows.jsonl", "a", encoding="utf-8") as file:
-                    file.write(json.dumps(known[name]) + "\n")
-            rows += [known[name]] if "least" in known[name] else []
+        for name in np.random.default_rng(0).permutation(find_meshes(meshes, listed)).tolist():
+            task = Task(name, f"oracle, {faces} faces, {budget} components", threshold)
+            row = load_row(out, task)
+            if row is None:
+                row = {"mesh": name, **(one_of(meshes / name, faces, threshold, budget) or {})}
+                save_row(out, task, row)
+            rows += [row] if "least" in row else []
             if len(rows) == count:
                 break
         write(page(rows), out, "oracle")
@@ -394,8 +391,3 @@ def one_of(path: Path, faces: int, threshold: float, budget: int) -> Row | None:
         return measure(repair(mesh, threads=1), threshold, budget) if len(mesh.faces) <= faces else None
     except (RlacdError, ValueError):
         return None
-
-
-def read_rows(path: Path) -> list[Row]:
-    """Rows of an earlier run."""
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []

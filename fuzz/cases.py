@@ -24,12 +24,14 @@ SMALL = 60
 
 
 class AnyLaboratory(Protocol):
-    """What runs trials: `fuzz.trials.Laboratory` or `fuzz.warm.WarmTrials`."""
+    """What runs trials: `fuzz.trials.Laboratory` or `fuzz.light.WarmTrials`."""
 
     seed: int
 
+    def kind(self, number: int) -> str: ...
     def trial(self, number: int) -> Trial: ...
     def shape(self, number: int) -> tuple[Shape, dict[str, Any]]: ...
+    def damaged(self, number: int) -> tuple[str, Seed]: ...
     def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial: ...
     def reread(self, trial: Trial, kind: str, file: Seed) -> Trial: ...
     def close(self) -> None: ...
@@ -74,69 +76,54 @@ def try_case(laboratory: AnyLaboratory, case: Case) -> Trial:
 
 def minimised(laboratory: AnyLaboratory, case: Case, tries: int) -> Case:
     """Remove options and triangles, or bytes, in ever smaller pieces, as long as the case still fails the same way."""
-    if case["end"] != "hang" and "content" in case:
-        return _shorter(laboratory, case, tries)
-    if case["kind"] not in SHAPES or case["end"] == "hang":
+    if case["end"] == "hang" or ("content" not in case and case["kind"] not in SHAPES):
         return case
-    shape, options = inputs(laboratory, case)
-    trial = Trial(case["seed"], case["number"], case["kind"], case["end"], case["said"])
+    then = Trial(case["seed"], case["number"], case["kind"], case["end"], case["said"])
     smallest, left = case, tries
 
-    def fails(less: Shape, fewer: dict[str, Any]) -> bool:
+    def fails(less: Case) -> bool:
         nonlocal smallest, left
-        if left == 0:
-            return False
         left -= 1
-        now = laboratory.retry(trial, less, fewer)
-        if now.end != trial.end or not _alike(now, trial):
+        if left < 0:
             return False
-        smallest = case_of(now, less if len(less.faces) <= SMALL else None)
+        now = try_case(laboratory, less)
+        if now.end != then.end or not _alike(now, then):
+            return False
+        smallest = less if len(less.get("faces", ())) <= SMALL else smallest
         return True
 
+    if "content" in case:
+        content = np.frombuffer(base64.b64decode(case["content"]), np.uint8)
+        _thin(len(content), lambda kept: fails({**case, "content": base64.b64encode(content[kept].tobytes()).decode()}))
+        return smallest
+    options = case["options"]
     for name in [name for name in options if name != "threads"]:
         fewer = {other: value for other, value in options.items() if other != name}
-        if ("threshold" in fewer or "criterion" in fewer) and fails(shape, fewer):
+        if ("threshold" in fewer or "criterion" in fewer) and fails({**case, "options": fewer}):
             options = fewer
-    _fewer(shape.faces, lambda faces: fails(_only(shape, faces), options))
+    shape, _ = inputs(laboratory, case)
+    _thin(len(shape.faces), lambda kept: fails({**case, "options": options, **_only(shape, shape.faces[kept])}))
     return smallest
 
 
-def _shorter(laboratory: AnyLaboratory, case: Case, tries: int) -> Case:
-    """Remove ever smaller pieces of a file."""
-    content = base64.b64decode(case["content"])
-    trial = Trial(case["seed"], case["number"], case["kind"], case["end"], case["said"])
-    step = len(content) // 2
-    while step and tries:
-        at = 0
-        while at < len(content) and tries:
-            tries -= 1
-            less = {**case, "content": base64.b64encode(content[:at] + content[at + step :]).decode()}
-            now = try_case(laboratory, less)
-            if now.end == trial.end and _alike(now, trial):
-                case, content = less, content[:at] + content[at + step :]
-            else:
-                at += step
-        step //= 2
-    return case
-
-
-def _fewer(faces: np.ndarray, fails: Callable[[np.ndarray], bool]) -> None:
-    """Remove ever smaller pieces of the faces."""
-    step = len(faces) // 2
+def _thin(count: int, fails: Callable[[np.ndarray], bool]) -> None:
+    """Leave out ever smaller pieces of so many things; `fails` gets the numbers of those that are left."""
+    kept, step = np.arange(count), count // 2
     while step:
         at = 0
-        while at < len(faces):
-            less = np.delete(faces, np.arange(at, min(at + step, len(faces))), axis=0)
+        while at < len(kept):
+            less = np.delete(kept, slice(at, at + step))
             if len(less) and fails(less):
-                faces = less
+                kept = less
             else:
                 at += step
         step //= 2
 
 
-def _only(shape: Shape, faces: np.ndarray) -> Shape:
+def _only(shape: Shape, faces: np.ndarray) -> Case:
+    """Some faces of a shape, as a case holds them."""
     used, index = np.unique(faces, return_inverse=True)
-    return Shape(shape.vertices[used], index.reshape(-1, 3), shape.steps, False)
+    return {"vertices": shape.vertices[used].tolist(), "faces": index.reshape(-1, 3).tolist(), "closed": False}
 
 
 def _alike(now: Trial, then: Trial) -> bool:

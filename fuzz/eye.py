@@ -1,10 +1,7 @@
 """What hulls add to a surface and miss of it, seen by dense samples and none of the kernels.
 
-    python -m fuzz.eye MESH... --samples 100000 --quality fast
-
-decomposes meshes and prints what the report says beside what the samples show. Every number here is the distance of one
-point, measured exactly: a lower bound of what the report bounds from above. Lengths are in the frame where the
-longest side of the input is 2.
+Every number here is the distance of one point, measured exactly: a lower bound of what the report bounds from above.
+Lengths are in the frame where the longest side of the input is 2.
 
 Which points are *outer*? Hulls on both sides of a cut touch, and their facets in the cut are inside the union.
 Coordinates are rounded, so these two facets lie a hair apart: a boolean union, or a test at tolerance 0, takes them for
@@ -13,15 +10,12 @@ surface, although nothing can reach them. A point of a hull is outer when it is 
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-import rlacd
 from fuzz.geometry import Floats, Ints, Polytope, distance_to_triangles, distance_to_union, sampled
 
 SEAM = 1e-5
@@ -139,26 +133,3 @@ def in_frame(
     corners = where[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     return where, faces[area > NO_AREA], [Polytope((points - centre) / size, own) for points, own in hulls]
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("meshes", nargs="+", type=Path)
-    parser.add_argument("--samples", type=int, default=100_000)
-    parser.add_argument("--quality", default="fast")
-    options = parser.parse_args()
-    print("| mesh | over: said | seen | under: said | seen |\n|---|--:|--:|--:|--:|")
-    for path in options.meshes:
-        result = rlacd.decompose(path, quality=options.quality)
-        source = np.asarray(result.source.vertices, dtype=np.float64), np.asarray(result.source.faces, dtype=np.int64)
-        hulls = [(np.array(hull.vertices), np.array(hull.faces, dtype=np.int64)) for hull in result]
-        where, faces, placed = in_frame(*source, hulls)
-        random = np.random.default_rng(0)
-        over = seen_over(placed, where[faces], options.samples, random).distance
-        under = seen_under(placed, where, faces, options.samples, random).distance
-        said = result.report["hausdorff"]
-        print(f"| {path.stem} | {said['over']:.4f} | {over:.4f} | {said['under']:.4f} | {under:.4f} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,21 +1,24 @@
 """Light trials: small damaged files read, small shapes decomposed and judged, many a second in one process.
 
-Like the trials of `fuzz.trials`, each is a function of a seed and its number alone. They differ in what they cost: no
-process is started, nothing is supervised (`fuzz.warm` does that), and inputs are small.
+Like the trials of `fuzz.trials`, each is a function of a seed and its number alone. They differ in what they cost:
+inputs are small, and `LightTrials` starts no process. `WarmTrials` runs them in one that is replaced when it dies,
+hangs or grows.
 """
 
 from __future__ import annotations
 
 import logging
 import math
-import re
+import pickle
 import resource
 import sys
 import time
 import warnings
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -27,7 +30,9 @@ from fuzz.judges import Case, judge
 from fuzz.mutations import Seed, mutated, nudged, packed
 from fuzz.recipes import Shape, concatenated, make_shape
 from fuzz.trials import Trial
+from fuzz.watched import Watched, end_of
 from rlacd.io.read.load import load_mesh
+from rlacd.pool import Blobs, ProcessLimits, Server, Shared, WorkerDiedError
 from rlacd.solid.input_mesh import InputMesh
 
 KINDS = {"read": 0.91, "small": 0.09}
@@ -56,14 +61,19 @@ SPACE_SECONDS = 1.0
 
 LONGEST_SENTENCE = 700
 
+CPU_SECONDS = 30.0
+"""CPU seconds that a light trial may take."""
+
+LIMITS = ProcessLimits(600.0, 2 * 2**30)
+
+LIFE = 5000
+"""Number of trials after which the process is replaced."""
+
 ROOM = 3 * 2**30
 """Bytes of address space beside what the process has when it begins."""
 
 _HERE = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl", "xyz")
 """Formats that are read in this process; the others start one of their own for each file (`rlacd.io.read.apart`)."""
-
-REFUSED, READ = " refused: ", " read"
-"""Between a format and the reason, and after a format, in the counts of a trial."""
 
 Options = dict[str, Any]
 
@@ -146,7 +156,7 @@ class LightTrials:
                 mesh = load_mesh(path)
         except rlacd.RlacdError as error:
             said = str(error)
-            trial.counts[f"{kind}{REFUSED}{_without_details(said, path)}"] += 1
+            trial.counts[f"{kind} refused"] += 1
             is_sentence = said and "\n" not in said and len(said) <= LONGEST_SENTENCE
             trial.end, trial.said = ("refused", []) if is_sentence else ("wrong", [f"no sentence: {said!r:.900}"])
         except MemoryError as error:
@@ -154,7 +164,7 @@ class LightTrials:
         except Exception as error:  # any other is a failure, and is what is looked for
             trial.end, trial.said = "untyped", [f"{type(error).__name__}: {error!s:.300}"]
         else:
-            trial.counts[f"{kind}{READ}"] += 1
+            trial.counts[f"{kind} read"] += 1
             trial.said = wrong_in(mesh)
             trial.end = "wrong" if trial.said else "loaded"
             if trial.end == "loaded" and _chosen(trial) and 0 < len(mesh.faces) <= MOST_FACES:
@@ -168,6 +178,58 @@ class LightTrials:
         end, said, hulls = _decomposed(shape, _cheap(draw_options(trial.seed * 10**12 + trial.number)))
         trial.counts += Counter(decompositions=int(hulls > 0), hulls=hulls)
         return replace(trial, end="loaded" if end in ("done", "refused") else end, said=said)
+
+
+class WarmTrials(LightTrials):
+    """Light trials in a process of their own."""
+
+    def __init__(self, seed: int, seeds: dict[str, list[Seed]], cpu_seconds: float = CPU_SECONDS) -> None:
+        self._scratch = TemporaryDirectory(prefix="rlacd-light-")
+        super().__init__(seed, seeds, Path(self._scratch.name))
+        self._given = {"seeds": Shared({"seeds": pickle.dumps((seed, seeds))})}
+        self._process, self._life = Watched(LIMITS, cpu_seconds), 0
+
+    def trial(self, number: int) -> Trial:
+        """Run a trial."""
+        return self._ask(Trial(self.seed, number, self.kind(number)), "trial", number)
+
+    def retry(self, trial: Trial, shape: Shape, options: Options) -> Trial:
+        """Decompose another shape with other options."""
+        return self._ask(trial, "retry", trial, shape, options)
+
+    def reread(self, trial: Trial, kind: str, file: Seed) -> Trial:
+        """Read another file."""
+        return self._ask(trial, "reread", trial, kind, file)
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.close()
+        self._scratch.cleanup()
+
+    def _ask(self, trial: Trial, *request: Any) -> Trial:
+        self._life += 1
+        given = {"blobs": {"request": pickle.dumps(request)}, "shared": self._given, "fresh": self._life % LIFE == 0}
+        try:
+            answer = self._process.ask("fuzz.light:make_server", {}, **given)
+        except WorkerDiedError as error:
+            end, said = end_of(error)
+            return replace(trial, end=end, said=said, counts=Counter(files=int(trial.kind == "read")))
+        done: Trial = pickle.loads(answer.blobs["trial"])
+        return done
+
+
+def make_server(folder: Path) -> Server:
+    """The process of `WarmTrials`."""
+    enter_worker()
+    light: list[LightTrials] = []
+
+    def answer(_: Any, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[dict[str, Any], dict[str, bytes]]:
+        if not light:
+            light.append(LightTrials(*pickle.loads(shared["seeds"].blobs["seeds"]), folder))
+        method, *given = pickle.loads(blobs["request"])
+        return {}, {"trial": pickle.dumps(getattr(light[0], method)(*given))}
+
+    return answer
 
 
 def wrong_in(mesh: InputMesh) -> list[str]:
@@ -265,13 +327,6 @@ def _decomposed(shape: Shape, options: Options) -> tuple[str, list[str], int]:
     hulls = [(np.array(hull.vertices), np.array(hull.faces)) for hull in result]
     said = judge(Case(shape, options, hulls, report), SAMPLES)
     return "wrong" if said else "done", said, len(hulls)
-
-
-def _without_details(said: str, path: Path) -> str:
-    """The reason of a refusal without names, numbers and quotations, to be counted."""
-    said = said.replace(str(path), "it").replace(path.name, "it")
-    said = re.sub(r"'[^']*'|\"[^\"]*\"|\[[^\]]*\]", "…", said)
-    return re.sub(r"[-+]?\d[\w.+-]*|\b(?:nan|inf)\b", "N", said)[:90]
 
 
 class _OpenedFiles:

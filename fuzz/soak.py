@@ -2,6 +2,7 @@
 
     python -m fuzz.soak --hours 1                   `make soak HOURS=1`; resumes where it stopped
     python -m fuzz.soak --hours 1 --light           many small inputs a second in one warm process (`fuzz.light`)
+    python -m fuzz.soak --hours 1 --only file       one kind of trial
     python -m fuzz.soak --totals                    totals of all runs
     python -m fuzz.soak --again soak/0-1234.json    rerun a failure
     python -m fuzz.soak --minimise CASE.json        reduce it to the options and triangles it needs
@@ -26,9 +27,9 @@ from typing import Any
 
 from fuzz.cases import AnyLaboratory, case_of, file_of, minimised, try_case
 from fuzz.light import KINDS as LIGHT
-from fuzz.light import READ, REFUSED
-from fuzz.trials import WELL, Laboratory, Trial, seeds_from
-from fuzz.warm import WarmTrials
+from fuzz.light import WarmTrials
+from fuzz.seeds import seeds_from
+from fuzz.trials import KINDS, WELL, Laboratory, Trial
 from rlacd import __version__
 
 CHUNK, LIGHT_CHUNK = 50, 1000
@@ -36,8 +37,6 @@ CHUNK, LIGHT_CHUNK = 50, 1000
 
 TRIES = 40
 """Number of smaller inputs tried for every failure."""
-
-MOST_REASONS = 25
 
 Row = dict[str, Any]
 
@@ -56,9 +55,10 @@ class Ledger:
         lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
         self.rows: list[Row] = [json.loads(line) for line in lines if line.endswith("}")]
 
-    def done(self, seed: int, is_light: bool) -> set[int]:
+    def done(self, seed: int, is_light: bool, only: str) -> set[int]:
         """The first numbers of a seed's finished chunks."""
-        return {row["first"] for row in self.rows if row["seed"] == seed and row.get("light", False) == is_light}
+        wanted = {"seed": seed, "light": is_light, "only": only}
+        return {row["first"] for row in self.rows if {"light": False, "only": "", **row}.items() >= wanted.items()}
 
     def add(self, row: Row) -> None:
         """Append a row."""
@@ -67,12 +67,16 @@ class Ledger:
         self.rows.append(row)
 
 
-def do_chunk(laboratory: AnyLaboratory, first: int, size: int, until: float, folder: Path) -> Row | None:
-    """Run the trials of a chunk; None if time runs out first."""
+def do_chunk(
+    laboratory: AnyLaboratory, first: int, size: int, until: float, folder: Path, only: str = ""
+) -> Row | None:
+    """Run the trials of a chunk, or only those of a kind; None if time runs out first."""
     ends, counts, cpu = Counter[str](), Counter[str](), 0.0
     for number in range(first, first + size):
         if time.monotonic() > until:
             return None
+        if only and laboratory.kind(number) != only:
+            continue
         trial = laboratory.trial(number)
         ends[f"{trial.kind} {trial.end}"] += 1
         counts += trial.counts
@@ -83,6 +87,7 @@ def do_chunk(laboratory: AnyLaboratory, first: int, size: int, until: float, fol
         "seed": laboratory.seed,
         "first": first,
         "light": isinstance(laboratory, WarmTrials),
+        "only": only,
         "version": __version__,
         "cpu": round(cpu, 1),
         "ends": ends,
@@ -95,7 +100,7 @@ def report(laboratory: AnyLaboratory, trial: Trial, folder: Path) -> None:
     place = folder / f"{trial.seed}-{trial.number}.json"
     print(f"{trial.kind} {trial.number} {trial.end}: {'; '.join(trial.said)}\n  {place}", flush=True)
     case = case_of(trial)
-    if trial.kind == "read" and isinstance(laboratory, WarmTrials):
+    if trial.kind in ("read", "file"):
         case |= file_of(*laboratory.damaged(trial.number))
     write_case(place, case)
     write_case(place, minimised(laboratory, case, TRIES))
@@ -112,7 +117,7 @@ def soak(args: argparse.Namespace) -> int:
     before = len(list(folder.glob("*.json")))
     until = time.monotonic() + 3600 * args.hours
     size = LIGHT_CHUNK if args.light else CHUNK
-    done = ledger.done(args.seed, args.light)
+    done = ledger.done(args.seed, args.light, args.only)
     chunks = (first for first in count(0, size) if first not in done)
     lock = threading.Lock()
 
@@ -122,7 +127,7 @@ def soak(args: argparse.Namespace) -> int:
             while time.monotonic() < until:
                 with lock:
                     first = next(chunks)
-                row = do_chunk(laboratory, first, size, until, folder)
+                row = do_chunk(laboratory, first, size, until, folder, args.only)
                 if row is not None:
                     ledger.add(row)
         finally:
@@ -158,28 +163,9 @@ def totals(rows: list[Row]) -> str:
     for kind in kinds:
         cells = [ends[f"{kind} {end}"] for end in columns]
         lines.append(f"| {kind} | {sum(cells)} | " + " | ".join(map(str, cells)) + " |")
-    whys = Counter({name: number for name, number in counts.items() if REFUSED in name or name.endswith(READ)})
-    counted = ", ".join(f"{name} {number}" for name, number in counts.most_common() if name not in whys)
+    counted = ", ".join(f"{name} {number}" for name, number in counts.most_common())
     hours = sum(row["cpu"] for row in rows) / 3600
-    return "\n".join([*lines, "", f"{hours:.2f} hours of a processor; {counted}", *reasons(whys)])
-
-
-def reasons(whys: Counter[str]) -> list[str]:
-    """Damaged files by format, and the most frequent reasons of refusals, as Markdown."""
-    if not whys:
-        return []
-    formats = sorted({name.split()[0] for name in whys})
-    lines = ["", "| format | files | read | refused | reasons |", "|---|--:|--:|--:|--:|"]
-    for kind in formats:
-        own = Counter({name: number for name, number in whys.items() if name.split()[0] == kind})
-        read = own.pop(f"{kind}{READ}", 0)
-        lines.append(f"| {kind} | {own.total() + read} | {read} | {own.total()} | {len(own)} |")
-    overall = Counter[str]()
-    for name, number in whys.items():
-        if REFUSED in name:
-            overall[name.split(REFUSED)[1]] += number
-    lines += ["", "| refused | files |", "|---|--:|"]
-    return [*lines, *(f"| {why.replace('|', '/')} | {number} |" for why, number in overall.most_common(MOST_REASONS))]
+    return "\n".join([*lines, "", f"{hours:.2f} hours of a processor; {counted}"])
 
 
 def main() -> int:
@@ -189,11 +175,15 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=1, help="trials at a time")
     parser.add_argument("--meshes", type=Path, help="folder of real meshes, with its index.csv")
     parser.add_argument("--light", action="store_true", help="light trials only")
+    parser.add_argument("--only", default="", choices=[*KINDS, *LIGHT], help="one kind of trial")
     parser.add_argument("--folder", type=Path, default=Path("soak"), help="for the ledger and the cases")
     parser.add_argument("--totals", action="store_true", help="sums over the ledger")
     parser.add_argument("--again", type=Path, help="a case to try once more")
     parser.add_argument("--minimise", type=Path, help="a case to make smaller, in place")
     args = parser.parse_args()
+    args.light = args.only in LIGHT if args.only else args.light
+    if args.only == "mesh" and meshes_of(args.meshes) is None:
+        parser.error("--only mesh needs --meshes, the folder of real meshes")
     if args.totals:
         print(totals(Ledger(args.folder / "ledger.jsonl").rows))
         return 0

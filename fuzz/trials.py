@@ -9,7 +9,6 @@ import csv
 import os
 import time
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,17 +19,17 @@ import trimesh
 
 from fuzz import faults
 from fuzz.choices import draw_options
-from fuzz.damaged import CPU_SECONDS, MEMORY, SECONDS, Fuzzer, seeds_of, written
 from fuzz.faults import draw_fault
 from fuzz.files import read_hulls, write_mesh
-from fuzz.judges import Case, judge
-from fuzz.mutations import Seed
+from fuzz.geometry import why_not_convex
+from fuzz.judges import Case, finite_faces, judge
+from fuzz.mutations import Seed, damaged
 from fuzz.recipes import FAULTS, Shape, make_shape, pick, placed
-from fuzz.shapes import FORMATS, Row, judged
-from fuzz.worker import Watched
+from fuzz.seeds import seeds_from
+from fuzz.watched import Watched, end_of
 from rlacd import NavigableSpace
 from rlacd.batch import JobSpec
-from rlacd.pool import ProcessLimits
+from rlacd.pool import ProcessLimits, WorkerDiedError
 
 KINDS = {"file": 0.93, "shape": 0.06, "mesh": 0.004, "fault": 0.005, "batch": 0.001}
 """Relative frequency of each kind of trial."""
@@ -41,8 +40,19 @@ WELL = ("done", "loaded", "refused")
 LARGEST_MESH = 20_000
 """Maximum number of triangles of a real mesh."""
 
-SHAPE_SECONDS = 300.0
-"""CPU seconds allowed for a shape."""
+FILE_LIMITS = ProcessLimits(1800.0, 2 * 2**30), 60.0
+"""Limits of a damaged file, and its CPU seconds; it gets a timeout of one second."""
+
+SHAPE_LIMITS = ProcessLimits(7200.0, 3 * 2**30), 300.0
+
+BUDGET = {"threshold": 0.2, "max_hulls": 3, "quality": "fast", "timeout": 1.0, "threads": 1, "resolution": 30}
+"""Options of a damaged file."""
+
+FORMATS = ("obj", "obj", "obj", "ply", "ply", "glb", "stl", "urdf")
+"""Of the hulls of a shape."""
+
+AGAIN = 4
+"""One in this many shapes is decomposed twice."""
 
 LATE = 1.0, 1.1
 """How far a timeout may be exceeded: seconds, and a factor."""
@@ -103,10 +113,8 @@ class Laboratory:
         self.folder = Path(self._scratch.name)
         self._meshes = meshes
         self._small = [] if meshes is None else _small_meshes(meshes)
-        self._files = Fuzzer(
-            seeds_from(meshes), seed, self.folder, Watched(ProcessLimits(SECONDS, MEMORY), CPU_SECONDS)
-        )
-        self._shapes = Watched(ProcessLimits(4 * SECONDS, 3 * 2**30), SHAPE_SECONDS)
+        self._seeds = seeds_from(meshes)
+        self._files, self._shapes = Watched(*FILE_LIMITS), Watched(*SHAPE_LIMITS)
 
     def close(self) -> None:
         """End all processes."""
@@ -123,14 +131,7 @@ class Laboratory:
         """Run a trial."""
         trial = Trial(self.seed, number, self.kind(number))
         start = time.thread_time()
-        make: dict[str, Callable[[Trial, np.random.Generator], Trial]] = {
-            "file": self._file,
-            "shape": self._shape,
-            "mesh": self._mesh,
-            "fault": self._fault,
-            "batch": self._batch,
-        }
-        trial = make[trial.kind](trial, np.random.default_rng([self.seed, number, 11]))
+        trial = getattr(self, f"_{trial.kind}")(trial, np.random.default_rng([self.seed, number, 11]))
         trial.cpu = round(trial.cpu + time.thread_time() - start, 4)
         return trial
 
@@ -146,34 +147,75 @@ class Laboratory:
             shape = pick(random, FAULTS)(shape, random)
         return placed(shape, random), draw_options(self._shape_seed(number))
 
-    def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial:
-        """Rerun a trial with another shape and options."""
-        random = np.random.default_rng([self.seed, trial.number, 11])
-        ending, twice = str(random.choice(FORMATS)), bool(random.random() < 0.25)
-        row = judged(Row(trial.number, "done"), shape, options, ending, twice, self._shapes, self.folder)
-        end = {"hang": "memory"}.get(row.status, row.status) if "memory" in " ".join(row.said) else row.status
-        counts = Counter(decompositions=1 + row.twice, hulls=row.parts, twice=row.twice)
-        return replace(trial, end=end, said=row.said, story=row.steps, options=row.options, counts=counts, cpu=row.cpu)
+    def damaged(self, number: int) -> tuple[str, Seed]:
+        """The format and content of a trial of the kind ``file``."""
+        random = np.random.default_rng([self.seed, number])
+        kind = list(self._seeds)[number % len(self._seeds)]
+        seeds = self._seeds[kind]
+        return kind, damaged(kind, seeds[random.integers(len(seeds))], seeds, random)
 
     def reread(self, trial: Trial, kind: str, file: Seed) -> Trial:
-        """Read a file and decompose it."""
-        path = self.folder / f"mesh.{kind}"
-        path.write_bytes(file.content)
-        for name, content in file.beside.items():
-            (self.folder / name).write_bytes(content)
-        row = self._files.result(path)
-        return replace(trial, end=row["end"], said=[row["said"]] if row["said"] and row["end"] != "refused" else [])
+        """Read a file and decompose it: to hulls that are convex, or to one typed error."""
+        with TemporaryDirectory(dir=self.folder) as place:
+            path = Path(place) / f"mesh.{kind}"
+            for name, content in {**file.beside, path.name: file.content}.items():
+                (Path(place) / name).write_bytes(content)
+            options = dict(BUDGET)
+            if kind == "npz":  # a network
+                options["policy"], path = str(path), path.with_suffix(".stl")
+                trimesh.creation.box().export(path)
+            trial = replace(trial, story=[f"damaged {kind}"], counts=Counter({"files": 1, f"{kind} files": 1}))
+            try:
+                told, files = self._files.decompose(JobSpec(options, ending=".obj"), path, "mesh")
+            except WorkerDiedError as error:
+                trial.end, trial.said = end_of(error)
+                return trial
+        trial.cpu, said = told["cpu"], str(told.get("error", ""))
+        if said:
+            is_typed = not said.startswith(("a bug in rlacd", "there is not enough memory"))
+            return replace(trial, end="refused" if is_typed else "untyped", said=[] if is_typed else [said])
+        # Of a robot there is a file for each hull.
+        read = [hull for name, data in files.items() if name.endswith(".obj") for hull in read_hulls(data, "obj")]
+        said = "; ".join(f"hull {i}: {why}" for i, hull in enumerate(read) if (why := why_not_convex(*hull)))
+        trial.counts["decompositions"] = 1
+        return replace(trial, end="invalid" if said else "loaded", said=[said] if said else [])
+
+    def retry(self, trial: Trial, shape: Shape, options: dict[str, Any]) -> Trial:
+        """Decompose a shape, possibly again with another number of threads, and judge the result."""
+        random = np.random.default_rng([self.seed, trial.number, 11])
+        ending, twice = str(random.choice(FORMATS)), bool(random.random() < 1 / AGAIN)
+        spec = JobSpec.of(options, file_format=ending)
+        trial = replace(trial, end="done", said=[], story=list(shape.steps), options=spec.options)
+        trial.counts = Counter(decompositions=1)
+        mesh = write_mesh(self.folder / f"{trial.number}.ply", shape.vertices, shape.faces)
+        try:
+            told, files = self._shapes.decompose(spec, mesh, "out")
+            trial.cpu = told["cpu"]
+            if "error" in told:
+                trial.end, trial.said = _refusal(shape, ending, told)
+                return trial
+            if twice and told["report"]["complete"]:
+                other = JobSpec.of({**options, "threads": options["threads"] % 3 + 1}, file_format=ending)
+                again, same = self._shapes.decompose(other, mesh, "out")
+                trial.cpu += again["cpu"]
+                if files != same:
+                    return replace(trial, end="wrong", said=[f"other bytes on other threads {again.get('error', '')}"])
+                trial.counts += Counter(decompositions=1, twice=1)
+        except WorkerDiedError as error:
+            trial.end, trial.said = end_of(error)
+            return trial
+        finally:
+            mesh.unlink()
+        trial.counts["hulls"] = told["report"]["parts"]
+        if ending in ("obj", "ply"):
+            trial.said = judge(Case(shape, options, read_hulls(files[f"out.{ending}"], ending), told["report"]))
+        return replace(trial, end="wrong" if trial.said else "done")
 
     def _shape_seed(self, number: int) -> int:
         return self.seed * 10**9 + number
 
     def _file(self, trial: Trial, random: np.random.Generator) -> Trial:
-        kind, path = self._files.input(trial.number)
-        row = self._files.result(path)
-        path.unlink()
-        counts = Counter({"files": 1, f"{kind} files": 1, "decompositions": row["end"] in ("loaded", "invalid")})
-        said = [row["said"]] if row["said"] and row["end"] != "refused" else []
-        return replace(trial, end=row["end"], said=said, story=[f"damaged {kind}"], counts=counts, cpu=row["cpu"])
+        return self.reread(trial, *self.damaged(trial.number))
 
     def _shape(self, trial: Trial, random: np.random.Generator) -> Trial:
         return self.retry(trial, *self.shape(trial.number))
@@ -196,7 +238,7 @@ class Laboratory:
             mesh = write_mesh(Path(place) / "mesh.ply", shape.vertices, shape.faces)
             out = Path(place) / "out"
             out.mkdir()
-            said, whole = self._shapes.run(spec, mesh, mesh.name, "out")
+            said, whole = self._shapes.decompose(spec, mesh, "out")
             trial.cpu += said["cpu"]
             if "error" in said:
                 return replace(trial, end="refused", counts=Counter(faults=1))
@@ -208,7 +250,7 @@ class Laboratory:
             for name, content in old.items():
                 (out / name).write_bytes(content)
             words = ["decompose", str(mesh), "-o", str(out / (main or "out")) + ("" if main else "/"), "--quiet"]
-            words += [*words_for(ending), *faults.words_of(options)]
+            words += [*(["--format", "obj"] if ending == "folder" else []), *faults.words_of(options)]
             first = faults.command(words, fault)
             after = faults.tree(out)
             found = faults.complaints(fault, first)
@@ -267,14 +309,16 @@ class Laboratory:
         return replace(trial, end="wrong" if found else "done", said=found, counts=counts, cpu=cpu)
 
 
-def seeds_from(meshes: Path | None) -> dict[str, list[Seed]]:
-    """Valid files by format: those of the folder of real meshes, or of a few simple shapes."""
-    return _simple_seeds() if meshes is None else seeds_of(meshes)
-
-
-def words_for(ending: str) -> list[str]:
-    """Command-line words that choose the format of a folder."""
-    return ["--format", "obj"] if ending == "folder" else []
+def _refusal(shape: Shape, ending: str, told: dict[str, Any]) -> tuple[str, list[str]]:
+    """Tell whether an error is the right one for this input."""
+    error = told["error"]
+    if error.startswith("a bug in rlacd") or "memory" in error:
+        return "bug", [error]
+    if told.get("unusable"):
+        is_right = len(finite_faces(shape)) == 0
+    else:
+        is_right = ending in ("glb", "urdf") and "precision" in error  # single precision cannot hold every hull
+    return ("refused", []) if is_right else ("wrong", [error])
 
 
 def _results(folder: Path) -> faults.Tree:
@@ -295,13 +339,3 @@ def _lateness(cpu: float, timeout: float, threads: int) -> list[str]:
 def _small_meshes(meshes: Path) -> list[Path]:
     with open(meshes / "index.csv", encoding="utf-8", newline="") as listing:
         return [meshes / row["file"] for row in csv.DictReader(listing) if 4 <= int(row["faces"]) <= LARGEST_MESH]
-
-
-def _simple_seeds() -> dict[str, list[Seed]]:
-    """Files of simple shapes, by format, for use without the folder of real meshes."""
-    bodies = [trimesh.creation.box((2, 0.4, 0.4)), trimesh.creation.cylinder(0.3, 1, sections=5)]
-    found: dict[str, list[Seed]] = {}
-    for mesh in (*bodies, trimesh.util.concatenate(bodies)):
-        for kind, seed in written(mesh):
-            found.setdefault(kind, []).append(seed)
-    return found

@@ -3,7 +3,7 @@
     python sanitizers/run.py address native             the tests in C++
     python sanitizers/run.py address tests              tests in Python that reach the kernels
     python sanitizers/run.py thread meshes              real meshes, decomposed in every way
-    python sanitizers/run.py address -m fuzz.shapes --count 300
+    python sanitizers/run.py address -m fuzz.kernels --count 300
 
 `make sanitize-address` and `make sanitize-thread` make the builds and do the first three. Python itself and the
 libraries are not instrumented: the runtime is preloaded, and watches what the kernels do. Reports of all processes,
@@ -24,7 +24,7 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 NATIVE_TESTS = (
     *("hull", "sweep", "distance", "concavity", "concave_edges", "limits", "metrics"),
-    *("plane_cut", "overlap", "decomposition", "fuzz_found"),
+    *("plane_cut", "overlap", "decomposition", "fuzz_found", "kernels_refuse"),
     *("proxy", "stop"),
     *("navigable", "merge", "decompose", "search", "policies", "bad_input"),
 )

@@ -1,12 +1,18 @@
-"""Large and awkward shapes that keep every stage of a decomposition busy for long; made of arithmetic, no files."""
+"""Large and awkward shapes that keep every stage of a decomposition busy for long; made of arithmetic, no files.
+
+python -m tests.shapes_large FOLDER        write those that are hard for the defaults
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
+from manifold3d import Manifold
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -119,6 +125,18 @@ def noisy_ball(faces: int = 1_000_000, noise: float = 0.01, seed: int = 0) -> Me
     return ball.vertices * moved, ball.faces.astype(np.int32)
 
 
+def gyroid(edge: float = 0.077, waves: float = 6.5) -> Mesh:
+    """A wall along a gyroid, cut to a cube."""
+
+    def inside(x: float, y: float, z: float) -> float:
+        s, c = np.sin(waves * np.array([x, y, z])), np.cos(waves * np.array([x, y, z]))
+        wall = 0.35 - abs(s[0] * c[1] + s[1] * c[2] + s[2] * c[0])
+        return float(min(wall, 0.98 - abs(x), 0.98 - abs(y), 0.98 - abs(z)))
+
+    mesh = Manifold.level_set(inside, [-1, -1, -1, 1, 1, 1], edge).to_mesh64()
+    return mesh.vert_properties[:, :3], mesh.tri_verts.astype(np.int32)
+
+
 def _grid(rows: int, columns: int) -> Ints:
     i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
     a = (i * columns + j).ravel()
@@ -144,3 +162,21 @@ LARGE: dict[str, Callable[[], Mesh]] = {
     "sheet": sheet,
 }
 """By name, in the size that the promise about `timeout` is measured with."""
+
+HARD: dict[str, Callable[[], Mesh]] = {
+    "gyroid": gyroid,
+    "sponge": sponge,
+    "boxes": boxes,
+    "screws": lambda: screws(150),
+    "bristles": bristles,
+    "terrain": lambda: terrain(192),
+    "sheet": lambda: sheet(90_000),
+    "ball": lambda: noisy_ball(100_000),
+}
+"""Of at most 100,000 triangles each."""
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, make in HARD.items():
+        trimesh.Trimesh(*make(), process=False).export(folder / f"{name}.ply")

@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 import inspect
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import pytest
 import trimesh
-from benchmarks import compare, corpus, hard, vhacd_set
+from benchmarks import compare
 from benchmarks.__main__ import COMMANDS
 from benchmarks.learned.compare import policy_of
 from benchmarks.methods import make_method, rlacd_options
 from benchmarks.oracle import Oracle, planes_of
 from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Task, save_row
-from benchmarks.tables import Ratio, Table, failures, managed, ratio_of
-from benchmarks.training import ARMS, _options, discounts, train_arms
+from benchmarks.tables import Ratio, failures, managed, ratio_of
 from click.testing import CliRunner
 
 import rlacd
 from rlacd.criteria import Concavity
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.environment import CutEnv
-from rlacd.learn.options import TRAIN_PRESETS
 from rlacd.policies import make_policy
 from rlacd.pool import ProcessLimits
 from rlacd.run import Run
@@ -113,14 +108,6 @@ class TestMethods:
         assert np.allclose(points.max(axis=0), (1, 1, 0.2), atol=0.06)
         assert all(f.shape[1] == 3 and f.max() < len(v) for v, f in hulls)
 
-    def test_disjoint_hulls_share_no_volume(self) -> None:
-        """Two bars of a cross that overlap are more hulls where they must not."""
-        mesh = from_manifold(CROSS.rotate((10, 20, 30)))
-        hulls = make_method("disjoint").run(mesh.vertices, mesh.faces, 0.05, 1)
-        bodies = [trimesh.Trimesh(v, f, process=False) for v, f in hulls]
-        assert len(hulls) > len(rlacd.decompose((mesh.vertices, mesh.faces), quality="fast")) == 2
-        assert trimesh.boolean.union(bodies).volume == pytest.approx(sum(body.volume for body in bodies), rel=1e-6)
-
 
 def test_other_tools_run_at_their_own_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is passed but the setting compared, at the default it has there, and the input."""
@@ -190,44 +177,6 @@ class TestRunner:
         assert all(says in row["error"] for row in rows)
         assert len(rows) == 2, "the run goes on"
 
-    def test_a_crash_is_recorded(self, meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        crasher = tmp_path / "crasher"
-        crasher.write_text("#!/bin/sh\necho last words >&2\nkill -SEGV $$\n")
-        crasher.chmod(0o755)
-        monkeypatch.setattr(sys, "executable", str(crasher))
-        rows = bench_of(meshes, tmp_path / "run").run("fast")
-        assert [row["error"] for row in rows] == ["its process died of SIGSEGV last words"] * 2
-
-    @pytest.mark.nightly
-    def test_stopping_a_run_ends_its_processes_and_records_nothing(self, tmp_path: Path) -> None:
-        """Whether it is interrupted or killed: no process goes on, and what was running is done again next time."""
-        folder = tmp_path / "meshes"
-        folder.mkdir()
-        sphere = trimesh.creation.icosphere(subdivisions=6)  # keeps a method busy for long
-        for name in ("a.ply", "b.ply"):
-            trimesh.util.concatenate([sphere, sphere.copy().apply_translation((1.5, 0, 0))]).export(folder / name)
-        program = (
-            "import signal, sys; from pathlib import Path; from benchmarks.runner import Bench, find_meshes;"
-            "signal.signal(signal.SIGINT, signal.default_int_handler);"  # ignored by what runs in a shell's background
-            "m, o = map(Path, sys.argv[1:]);"
-            "Bench(m, find_meshes(m), o).run('fast', 0.002)"
-        )
-        for number in (signal.SIGINT, signal.SIGKILL):
-            out = tmp_path / f"run-{number}"
-            command = [sys.executable, "-c", program, folder, out]
-            with subprocess.Popen(command, stderr=subprocess.DEVNULL, cwd=ROOT) as process:
-                try:
-                    parent = psutil.Process(process.pid)
-                    while not (children := parent.children()):
-                        time.sleep(0.1)
-                    time.sleep(1)  # let it begin
-                    process.send_signal(number)
-                    process.wait(timeout=60)
-                finally:
-                    process.kill()
-            assert not psutil.wait_procs(children, timeout=30)[1]
-            assert not list(out.glob("tasks/*.json"))
-
     def test_a_broken_mesh_is_recorded_and_what_another_version_made_is_made_again(
         self, meshes: Path, tmp_path: Path
     ) -> None:
@@ -275,7 +224,7 @@ class TestTables:
         assert [len(rows) for rows in managed({"a": a, "b": b}).values()] == [2, 2]
         text = str(compare.comparison({"a": a, "b": b}))
         assert "| 2 meshes | a | b |" in text
-        assert "| hulls | 6 | 8 |" in text
+        assert "| hulls; a mesh | 6; 3.0 | 8; 4.0 |" in text
         assert "| failed | 0 of 3 | 1 of 3 |" in text
         nothing = {"a": self.rows(2), "b": self.rows(failed="m0")}
         assert all(
@@ -324,18 +273,17 @@ class TestCommands:
         assert "there is no command 'x'" in wrong.stderr
 
     @pytest.mark.slow
-    def test_compare_corpus_and_the_vhacd_set(self, meshes: Path, tmp_path: Path) -> None:
+    def test_compare_writes_a_page_and_does_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
         text = run(compare.app, meshes, "--out", out, "--methods", "fast,fast:policy=navacd", "--first", 2)
         assert (out / "compare.md").read_text() in text
         assert "| 2 meshes, threshold 0.05 | rlacd `fast` | rlacd `fast:policy=navacd` |" in text
         before = sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir())
-        assert "| decomposed | 2 of 2 |" in run(corpus.app, meshes, "--out", out)
+        assert "| failed | 0 of 2 |" in run(compare.app, meshes, "--out", out, "--methods", "fast", "--warm")
         assert sorted(file.stat().st_mtime_ns for file in (out / "tasks").iterdir()) == before
-        page = run(vhacd_set.app, meshes, "--out", out, "--methods", "fast,fast@0.04", "--threads", 2)
-        assert "| fast @ 0.05 | 1.5 |" in page
-        assert "| fast @ 0.04 |" in page
-        assert "VisACD, published" in page
+        page = run(compare.app, meshes, "--out", out, "--methods", "fast,fast@1.9", "--threads", 2)
+        assert "| 2 meshes | fast | fast@1.9 |" in page
+        assert "| hulls; a mesh | 3; 1.5 | 2; 1.0 |" in page
         assert "| wall s, 2 threads: median, mean, most, sum |" in page
 
     @pytest.mark.slow
@@ -344,13 +292,6 @@ class TestCommands:
         command = [sys.executable, "-m", "benchmarks", "prices", str(meshes)]
         told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
         assert all(f"| {kernel} |" in told for kernel in ("choosing", "cutting", "judging", "filling"))
-
-    @pytest.mark.slow
-    def test_hard_shapes_are_written_and_compared(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(hard, "SHAPES", {"gyroid": lambda: hard.gyroid(0.2, 3.0)})
-        page = run(hard.app, "-o", tmp_path, "--methods", "fast")
-        assert "| gyroid.ply |" in page
-        assert len(trimesh.load_mesh(tmp_path / "shapes" / "gyroid.ply").faces) > 100
 
     @pytest.mark.parametrize(
         ("words", "says"),
@@ -374,41 +315,6 @@ class TestCommands:
         assert says in told
         assert len(told.strip().splitlines()) == 1
         assert not Path("run").exists()
-
-    @pytest.mark.slow
-    def test_discounts_that_add_up_to_more_than_one_diverge(self, meshes: Path, tmp_path: Path) -> None:
-        page = run(discounts, meshes, "-o", tmp_path, "--depth", 3, "--steps", 3000)
-        assert "| share of the hull (eq. 9) |" in page
-        assert "| 0.99 + 0.99 |" in page
-
-
-@pytest.mark.parametrize("preset", ["returns", "paper"])
-def test_arms_differ_in_what_they_say_only(preset: str) -> None:
-    arms = [_options(preset, 100, 1, changes) for changes in ARMS.values()]
-    assert len(set(arms)) == len(arms)
-    assert {(a.env_steps, a.seed, a.learning_starts, a.validate_every) for a in arms} == {(100, 1, 20, 50)}
-
-
-@pytest.mark.nightly
-def test_arms_are_trained_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("torch")
-    folder = tmp_path / "meshes"
-    folder.mkdir()
-    for number in range(6):
-        mesh = from_manifold(CROSS + box((0, 0, 0), (0.3 + 0.1 * number, 0.4, 1)))
-        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(folder / f"{number}.stl")
-    arms = dict(list(ARMS.items())[:2])
-    monkeypatch.setattr("benchmarks.training.ARMS", arms)
-    monkeypatch.setattr("rlacd.learn.options.TRAIN_PRESETS", {"returns": {**TRAIN_PRESETS["returns"], "validation": 2}})
-    said: list[str] = []
-    given = (folder, tmp_path / "run", "returns", 40, 2, said.append)
-    page = train_arms(*given)
-    table = next(block for block in page.blocks if isinstance(block, Table))
-    assert [line[0] for line in table.lines] == list(arms)
-    assert all(float(str(line[1]).partition(" ± ")[0]) > 0 for line in table.lines)
-    assert len({(tmp_path / "run" / f"rewards-1-seed-{s}" / "curves.jsonl").read_text() for s in (0, 1)}) == 2
-    monkeypatch.setattr("rlacd.learn.train.train", None)  # would fail if called
-    assert str(train_arms(*given)) == str(page)
 
 
 @pytest.mark.parametrize(("name", "fewest"), [("angle", 2), ("cross", 3), ("table", 5)])

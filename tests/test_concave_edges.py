@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,11 +16,9 @@ from scipy.spatial.transform import Rotation
 
 import rlacd
 from rlacd import _native
-from rlacd.io.read.load import load_mesh
 from rlacd.planes.candidates import Candidates, reflex_edge_planes
 from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import mid_planes
-from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Plane
 from tests.shapes import Floats, box, to_manifold, trimesh_of
 
@@ -288,11 +285,6 @@ def test_policies_cut_every_solid_an_l_into_two_convex_parts(policy: Policy, nam
         assert sum(side.hull.volume for side in sides) == pytest.approx(3, rel=1e-7)
 
 
-def bricks() -> Manifold:
-    """The plane between them holds a face of each, on opposite sides."""
-    return box((0, 0, 0), (2, 1, 1)) + box((1, 1, 0), (3, 2, 1))
-
-
 @pytest.mark.parametrize("turn", [(0, 0, 0), (17, 31, 5)], ids=["upright", "tilted"])
 @pytest.mark.parametrize("inset", [0, 0.1], ids=["legs at the corners", "legs set in"])
 @pytest.mark.parametrize("policy", ["greedy", "navacd"])
@@ -310,9 +302,3 @@ def test_offset_bricks_come_apart(policy: str) -> None:
     result = rlacd.decompose(trimesh_of(bricks), policy=policy)
     assert [len(hull.vertices) for hull in result] == [8, 8]
     assert [hull.volume for hull in result] == pytest.approx([2, 2])
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("file", ["test/vhacd/al.ply", "test/vhacd/hornbug.ply", "test/coacd_examples/SnowFlake.ply"])
-def test_planes_of_real_meshes_belong_to_edges(corpus: Path, file: str) -> None:
-    assert_planes_belong_to_edges(Component(repair(load_mesh(corpus / file)).manifold), 8)

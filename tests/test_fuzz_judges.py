@@ -17,6 +17,7 @@ from fuzz.judges import Case, judge
 from fuzz.kernels import try_seed
 from fuzz.recipes import Shape
 from tests.shapes import Closed, box, from_manifold
+from tests.shapes_bad import arrays
 
 pytestmark = pytest.mark.slow
 
@@ -68,15 +69,11 @@ def test_a_mass_with_its_cavity_and_a_corner_without_a_word_are_seen() -> None:
     shape = Shape(np.array(hollow.vertices), np.array(hollow.faces), (), True)
     good = case(Closed(shape.vertices, shape.faces))
     assert judge(good) == []
-    solid = replace(good, report={**good.report, "mass": case(Closed(*_arrays(creation.box()))).report["mass"]})
+    solid = replace(good, report={**good.report, "mass": case(Closed(*arrays(creation.box()))).report["mass"]})
     assert any("the volume is 8, not 7" in word for word in judge(solid))
     point = replace(shape, vertices=np.concatenate([shape.vertices, [[3, 0, 0]]]))
     point = replace(point, faces=np.concatenate([shape.faces, [[16, 16, 16]]]))
     assert any("a corner of a face lies" in word for word in judge(replace(good, shape=point)))
-
-
-def _arrays(mesh: Any) -> tuple[Any, Any]:
-    return np.array(mesh.vertices), np.array(mesh.faces)
 
 
 @pytest.mark.parametrize("limit", [{"max_vertices": 7}, {"max_faces": 11}, {"max_hulls": 1}])
@@ -86,8 +83,7 @@ def test_a_broken_limit_is_seen(limit: dict[str, int]) -> None:
 
 
 def test_what_is_wrong_with_a_hull_is_reported() -> None:
-    cube = creation.box()
-    vertices, faces = np.array(cube.vertices), np.array(cube.faces)
+    vertices, faces = arrays(creation.box())
     assert why_not_convex(vertices, faces) is None
     assert why_not_convex(vertices, faces[:, ::-1]) == "a vertex lies above a face"
     assert why_not_convex(vertices, faces[1:]) == "an edge has no twin"
@@ -116,8 +112,7 @@ CUBES = np.array([[(0, 0, 0), (1, 1, 1)], [(1, 0, 0), (3, 1, 1)]], dtype=float)
 
 
 def cube(bounds: Any) -> Polytope:
-    mesh = creation.box(bounds=bounds)
-    return Polytope(np.array(mesh.vertices), np.array(mesh.faces))
+    return Polytope(*arrays(creation.box(bounds=bounds)))
 
 
 def test_the_farthest_point_is_that_of_trying_all() -> None:

@@ -23,17 +23,16 @@ pytest.importorskip("torch", reason="needs the extra train")
 import torch
 from benchmarks.learned.i2p_mae import HierarchicalEncoder, I2PMAEEncoder, PublishedEncoder, Sizes, seen_below
 from benchmarks.learned.point_groups import farthest_points, gather, nearest_points
-from benchmarks.training import app as training
+from benchmarks.paper import app as paper
 
 from rlacd.learn.dqn import pick_device, q_network
 from rlacd.learn.options import TrainOptions
-from rlacd.learn.train import load_policy, train
+from rlacd.learn.train import train
 from rlacd.policies.plane_features import PLANES
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
 from tests.scripts import script
 from tests.test_learn_train import TINY as TINY_RUN
-from tests.test_learn_train import weights as whole_state
 
 pytestmark = pytest.mark.slow
 
@@ -229,8 +228,8 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_missing_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
-    words = ["paper", str(meshes), "--out", str(tmp_path / "run"), "--weights", str(tmp_path / "nowhere.pth")]
-    shown = CliRunner().invoke(training, words)
+    words = [str(meshes), "--out", str(tmp_path / "run"), "--weights", str(tmp_path / "nowhere.pth")]
+    shown = CliRunner().invoke(paper, words)
     assert shown.exit_code == 2
     assert "there is no file" in shown.output
     assert "Traceback" not in shown.output
@@ -251,15 +250,6 @@ def meshes(tmp_path: Path) -> Path:
 def run(meshes: Path, folder: Path, seed: int = 0, points: int = 64, resume: bool = False, **changes: Any) -> Path:
     encoder, options = PublishedEncoder(tiny_encoder(seed), points), TrainOptions(**{**SHORT, **changes})
     return train(meshes, folder, options, resume=resume, encoder=encoder, say=lambda line: None)
-
-
-def test_a_resumed_run_is_the_run_that_was_never_stopped(meshes: Path, tmp_path: Path) -> None:
-    run(meshes, tmp_path / "whole")
-    run(meshes, tmp_path / "halves", env_steps=34)
-    run(meshes, tmp_path / "halves", resume=True)
-    assert whole_state(tmp_path / "whole") == whole_state(tmp_path / "halves")
-    encoder = PublishedEncoder(tiny_encoder(), 64)
-    assert load_policy(tmp_path / "halves", encoder).choose(Component(small_solids()["angle"])) is not None
 
 
 def test_other_weights_do_not_go_on_with_a_run(meshes: Path, tmp_path: Path) -> None:

@@ -38,7 +38,6 @@ from tests.shapes import (
     to_manifold,
     together,
 )
-from tests.test_sweep import SOLIDS
 
 
 def pieces_of(solid: Manifold, *planes: Plane) -> list[Component]:
@@ -102,21 +101,6 @@ def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
     assert len(merged) < len(parts)
     assert all(criterion.is_met(part) for part in merged)
     assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
-
-
-@pytest.mark.parametrize("name", SOLIDS)
-@pytest.mark.parametrize("seed", range(5))
-def test_gluing_undoes_a_cut(name: str, seed: int) -> None:
-    solid = Component(SOLIDS[name]())
-    rng = np.random.default_rng(seed)
-    normal = rng.normal(size=3)
-    normal /= np.linalg.norm(normal)
-    below, above = solid.cut(Plane(tuple(normal), float(normal @ solid.vertices.mean(axis=0))))
-    glued = Part.glued(below, above)
-    assert glued.volume == pytest.approx(solid.volume)
-    area = _native.mesh_area(glued.vertices, glued.faces)
-    assert area == pytest.approx(_native.mesh_area(solid.vertices, solid.faces), rel=1e-5)
-    assert glued.hull.volume == pytest.approx(solid.hull.volume)
 
 
 def test_only_the_common_area_of_two_faces_vanishes() -> None:

@@ -122,7 +122,8 @@ def test_limits_of_a_page_are_those_of_the_program(name: str) -> None:
 @functools.cache
 def measured(corpus: Path, group: str, options: str) -> list[dict[str, Any]]:
     """The reports of a group of meshes: a list of the corpus, or a folder."""
-    listed = corpus / f"{group}.txt"
+    assert (corpus / "train").is_dir()  # or not all meshes are there
+    listed = Path(corpus, f"{group}.txt")
     folder = corpus if listed.is_file() else corpus / group
     names = find_meshes(folder, listed if listed.is_file() else None)
     given = json.loads(options)

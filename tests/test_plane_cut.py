@@ -164,14 +164,6 @@ def test_a_cut_along_an_axis_is_exact(axis: int) -> None:
                 assert side.hull.volume == pytest.approx(solid.volume(), rel=1e-12)
 
 
-def test_bad_meshes_are_refused() -> None:
-    corner = np.eye(3)
-    with pytest.raises(ValueError, match="out of range"):
-        _native.cut(corner, np.array([(0, 1, 3)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5, 0.0)
-    with pytest.raises(ValueError, match="not finite"):
-        _native.cut(corner * np.nan, np.array([(0, 1, 2)], dtype=np.int32), 1.0, 0.0, 0.0, 0.5, 0.0)
-
-
 def test_a_surface_that_is_not_closed_keeps_all_its_points_on_both_sides() -> None:
     box = trimesh.creation.box((1, 1, 1))
     vertices, opened = np.array(box.vertices), np.array(box.faces[1:], dtype=np.int32)

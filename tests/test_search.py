@@ -117,20 +117,6 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
             )
 
 
-def test_reuniting_again_and_again_leaves_no_crumbs() -> None:
-    solid = again = Component(frame())
-    rng = np.random.default_rng(0)
-    for _ in range(12):
-        x, y, z = rng.normal(size=3)
-        length = math.hypot(x, y, z)
-        sides = again.cut(Plane((x / length, y / length, z / length), 0.1))
-        reunited = reunite(strangers([side for side in sides if side is not None]))
-        assert reunited is not None
-        again = reunited
-    assert again.volume == pytest.approx(solid.volume, rel=1e-6)
-    assert len(again.faces) < 12 * len(solid.faces)  # 160 times as many without cleaning up
-
-
 def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Criterion) -> None:
     assert exchange.gain == 1
     assert exchange.out[0] is part
@@ -167,24 +153,6 @@ def test_a_part_gives_what_the_others_can_take_and_keeps_the_rest(seed: int) -> 
     taker = max(exchange.into, key=lambda part: part.volume)
     assert taker.hull.volume > 1.5 * slab.hull.volume
     assert give(bent, [], CRITERION, np.random.default_rng(seed), solid, Run(1)) is None
-
-
-def test_a_part_that_sticks_out_stays() -> None:
-    slab, pin = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((0.4, 0.4, 0.2), (0.6, 0.6, 0.9)))
-    solid = together([slab, pin])
-    assert redistribute(pin, [slab], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
-    assert redistribute(pin, [], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
-
-
-def test_all_or_nothing() -> None:
-    """A half that fits into a neighbour does not go there if the other half fits nowhere."""
-    slab, long = Component(box((0, 0, 0), (1, 1, 0.2))), Component(box((1, 0, 0), (3, 1, 0.2)))
-    tower = Component(box((2.9, 0, 0.2), (3, 1, 1.5)))
-    parts: list[Part] = [slab, tower]
-    bent = Part.glued(long, tower)
-    solid = together([slab, long, tower])
-    assert redistribute(bent, [slab], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
-    assert redistribute(long, parts, CRITERION, np.random.default_rng(0), solid, Run(1)) is not None
 
 
 @settings(max_examples=30, deadline=None)

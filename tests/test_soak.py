@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
 from collections import Counter
@@ -11,15 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 import fuzz.light
-import fuzz.warm
-from fuzz.cases import try_case
+from fuzz.cases import case_of, file_of, minimised, try_case
 from fuzz.faults import Fault, Run, complaints, left_behind
-from fuzz.light import READ, REFUSED, LightTrials, wrong_in
+from fuzz.light import LightTrials, WarmTrials, wrong_in
 from fuzz.mutations import Seed
-from fuzz.soak import reasons
-from fuzz.trials import Laboratory, Trial, seeds_from
+from fuzz.recipes import Shape
+from fuzz.seeds import seeds_from
+from fuzz.soak import totals
+from fuzz.trials import Laboratory, Trial
 from rlacd.solid.input_mesh import InputMesh
 
 CASES = sorted((Path(__file__).parent / "cases").glob("*.json"))
@@ -115,13 +118,10 @@ def test_a_file_is_read_or_refused_for_a_reason(light: LightTrials) -> None:
             ends[trial.end] += 1
     assert ends["loaded"] > 20
     assert ends["refused"] > 20
-    read = sum(number for name, number in counts.items() if name.endswith(READ))
-    assert read == ends["loaded"]
-    assert sum(number for name, number in counts.items() if REFUSED in name) == ends["refused"]
-    assert not any(letter.isdigit() for name in counts for letter in name.split(REFUSED)[-1] if REFUSED in name)
-    table = "\n".join(reasons(counts))
-    assert "| obj | " in table
-    assert "| refused | files |" in table
+    for what, end in (("read", "loaded"), ("refused", "refused")):
+        assert sum(number for name, number in counts.items() if name.endswith(what)) == ends[end]
+    rows = [{"ends": {f"read {end}": number for end, number in ends.items()}, "counts": counts, "cpu": 1}]
+    assert f"| read | {ends.total()} | 0 | {ends['loaded']} | {ends['refused']} |" in totals(rows)
 
 
 def test_a_small_shape_is_decomposed_and_judged(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,3 +164,27 @@ def test_a_mesh_that_is_none_is_seen() -> None:
     assert wrong_in(replace(good, faces=face + 1))
     assert wrong_in(replace(good, faces=face.astype(np.int32)))
     assert wrong_in(replace(good, node_of=np.array([0])))
+
+
+def test_a_failure_is_made_small(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To one triangle under the options that it takes, and to the bytes that it takes."""
+    monkeypatch.setattr(fuzz.light, "judge", lambda *_: ["it is wrong"])
+    monkeypatch.setattr(fuzz.light, "load_mesh", lambda path: {}[path.read_bytes().count(b"v")])
+    trial = next(t for t in map(light.trial, range(0, 200)) if t.kind == "small" and len(t.options) > 4)
+    small = minimised(light, case_of(trial), 100)
+    assert (len(small["faces"]), len(small["vertices"]), len(small["options"])) == (1, 3, 2)
+    assert try_case(light, small).said == ["it is wrong"]
+    trial = light.reread(Trial(0, 0, "read"), "obj", Seed(b"v 0 0 0\n" * 20))
+    small = minimised(light, case_of(trial) | file_of("obj", Seed(b"v 0 0 0\n" * 20)), 100)
+    assert len(small["content"]) == 4, "a byte"
+
+
+@pytest.mark.slow
+def test_a_process_that_takes_too_long_is_replaced() -> None:
+    with contextlib.closing(WarmTrials(0, SEEDS, cpu_seconds=6.0)) as trials:
+        ball = trimesh.creation.icosphere(6)
+        shape = Shape(np.array(ball.vertices), np.array(ball.faces), ("ball",))
+        late = trials.retry(Trial(0, 5, "small"), shape, {"threshold": 0.002, "quality": "best", "threads": 1})
+        assert (late.end, late.said) == ("hang", ["it took more than 6 s of a processor"])
+        number = first_of(trials, "read")
+        assert trials.trial(number).is_well

@@ -15,7 +15,7 @@ from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.decompose_mesh import decompose
 from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
-from rlacd.planes.sweep import SLIVER, SLIVERS, Sweep, SweepCache, least_excess, sweep
+from rlacd.planes.sweep import SLIVERS, Sweep, SweepCache, least_excess, sweep
 from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import excess_norm, hull_sum
 from rlacd.run import Run
@@ -203,35 +203,6 @@ def test_slivers_are_left_only_where_every_plane_leaves_one() -> None:
     assert plane.offset == 0.5, "the notch is not worth a sliver"
     assert least_excess(notched, Candidates(np.eye(3)[2:], np.array([[-1.0, 0.0, 1.0, 7.0]])), 1.0) is None
     assert least_excess(notched, Candidates(np.zeros((0, 3)), np.zeros((0, 1))), 1.0) is None
-
-
-@pytest.mark.parametrize(
-    ("offsets", "exponent", "tie", "says"),
-    [
-        ([0.5, 0.2], 1.3, 0.0, "finite and ascend"),
-        ([0.2, math.nan], 1.3, 0.0, "finite and ascend"),
-        ([math.inf, math.inf], 1.3, 0.0, "finite and ascend"),
-        ([0.2], 0.9, 0.0, "exponent"),
-        ([0.2], math.nan, 0.0, "exponent"),
-        ([0.2], 1.3, -1.0, "tie"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(offsets: list[float], exponent: float, tie: float, says: str) -> None:
-    component, planes = Component(gear()), (np.eye(3)[:1], np.array([offsets]))
-    with pytest.raises(ValueError, match=says):
-        _native.find_least_excess(component.vertices, component.faces, *planes, exponent, tie, 1e-11, [SLIVER], 1)
-    if says == "finite and ascend":
-        with pytest.raises(ValueError, match=says):
-            _native.sweep(component.vertices, component.faces, *planes, 1)
-
-
-def test_corners_that_are_not_finite_are_refused() -> None:
-    component = Component(gear())
-    vertices = np.where(component.vertices == component.vertices.max(), np.nan, component.vertices)
-    with pytest.raises(ValueError, match="not finite"):
-        _native.find_least_excess(
-            vertices, component.faces, np.eye(3)[:1], np.array([[0.2]]), 1.3, 0, 1e-11, [SLIVER], 1
-        )
 
 
 CRITERION = Concavity(0.02)

@@ -3,13 +3,13 @@
 LABELS is the folder that `labels.py` writes. The target is log(parts) less its mean over the component's labelled
 planes; the loss is a Huber loss within components, so that only the order of planes matters. Prints the mean change of
 log(parts) against greedy's plane, five-fold cross-validated by mesh, before it fits to everything, if there is a folder
-to write to. With `--without-hulls` the networks see nothing of hulls (the paper's 4.5.2).
+to write to.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,9 +25,6 @@ from rlacd.policies.plane_features import plane_features
 
 HIDDEN, EPOCHS, RATE, DECAY, DROPOUT, AT_ONCE = (64, 32), 15, 2e-3, 0.1, 0.2, 64
 FOLDS = 5
-
-WITHOUT_HULLS = [8, 10, 11, 12, 15, *range(22, 26), *range(32, 37)]
-"""Features of planes that no hull's volume has a part in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +121,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("labels", type=Path)
     parser.add_argument("--out", type=Path)
-    parser.add_argument("--without-hulls", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(1)
     labels = read(args.labels)
-    if args.without_hulls:
-        labels = replace(labels, features=labels.features[:, WITHOUT_HULLS])
     print(f"{len(labels.parts)} planes of {len(labels.mesh)} components of {labels.mesh.max() + 1} meshes")
     every = cross_validated(labels)
     print(f"held out: log(parts) {every.mean():+.4f} +- {every.std() / len(every) ** 0.5:.4f} against greedy's plane")

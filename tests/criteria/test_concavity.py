@@ -209,18 +209,3 @@ def test_bad_options_are_refused(threshold: float) -> None:
         Concavity(threshold)
     with pytest.raises(OptionError, match="must be positive"):
         Concavity().measure(from_manifold(box((0, 0, 0), (1, 1, 1))), threshold)
-
-
-def test_bad_meshes_are_refused() -> None:
-    good = from_manifold(box((0, 0, 0), (1, 1, 1)))
-    nothing = np.zeros((0, 3), dtype=np.int32)
-    flat = Closed(good.vertices, np.zeros((4, 3), dtype=np.int32))
-    for part, hull, says in (
-        ((good.vertices, nothing), (good.vertices, good.faces), "part has no faces"),
-        ((good.vertices, good.faces), (good.vertices, nothing), "hull has no faces"),
-        ((good.vertices, good.faces), (flat.vertices, flat.faces), "no facet with an area"),
-        ((good.vertices * np.nan, good.faces), (good.vertices, good.faces), "not finite"),
-        ((good.vertices, good.faces + 100), (good.vertices, good.faces), "out of range"),
-    ):
-        with pytest.raises(ValueError, match=says):
-            _native.meets_concavity(*part, _native.ConvexBody(*hull), 1.0, 1.0, 0.05)

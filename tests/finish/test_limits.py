@@ -24,7 +24,7 @@ from rlacd.merge.merge import united_in_turn
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run, Work
 from rlacd.solid.component import Component, Part
-from rlacd.solid.hull import NO_LIMITS, NO_SIDES, Hull, limit_hull
+from rlacd.solid.hull import NO_LIMITS, Hull, limit_hull
 from tests.hulls import assert_same_hulls
 from tests.shapes import box, trimesh_of
 
@@ -154,17 +154,6 @@ def test_redundant_corners_go_without_a_limit() -> None:
     assert len(limited.vertices) <= 10
     surface = _native.Surface(hull.vertices, hull.faces)
     assert surface.distance(limited.vertices).max() <= 1e-6 + 1e-9
-
-
-def test_bad_hulls_are_refused() -> None:
-    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
-    faces = np.array([[0, 1, 2], [0, 2, 1]], dtype=np.int32)
-    with pytest.raises(ValueError, match="flat"):
-        _native.simplify_hull(_native.ConvexBody(flat, faces), 4, 4, 1e-6, NO_SIDES)
-    with pytest.raises(ValueError, match="not finite"):
-        _native.ConvexBody(flat * np.nan, faces)
-    with pytest.raises(ValueError, match="no vertices"):
-        _native.simplify_hull(_native.ConvexBody(flat[:0], faces[:0]), 4, 4, 1e-6, NO_SIDES)
 
 
 def test_redundant_corners_stay_if_the_threshold_needs_them() -> None:

@@ -1,4 +1,4 @@
-"""A few damaged files of every format, always the same; `make fuzz-files` tries any number of them."""
+"""A few damaged files of every format, always the same; `python -m fuzz.soak --only file` tries any number of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import trimesh
 from trimesh import creation
 
 from fuzz import mutations
-from fuzz.damaged import written, written_by_extras
+from fuzz.seeds import written, written_by_extras
 from rlacd.errors import RlacdError
 from rlacd.io.read import apart
 from rlacd.io.read.load import load_mesh

@@ -15,8 +15,8 @@ import trimesh
 from click.testing import CliRunner
 
 import rlacd
-from fuzz.damaged import CASES, written_by_extras
 from fuzz.fbx import Model, fbx
+from fuzz.seeds import CASES, written_by_extras
 from rlacd import NavigableSpace
 from rlacd.cli.main import app
 from rlacd.errors import EmptyMeshError, MeshFileError, MissingExtraError

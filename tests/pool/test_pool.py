@@ -106,9 +106,12 @@ def test_a_process_that_hangs_is_ended(one: LocalPool) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_a_process_ends_by_itself_once_its_time_is_up_and_who_asked_is_gone(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("what", "seconds"), [("outlive", 600), ("outlive, holding the interpreter", 0.5)])
+def test_a_process_ends_by_itself_when_who_asked_is_gone_or_its_time_is_up(
+    tmp_path: Path, what: str, seconds: float
+) -> None:
     mark = tmp_path / "pid"
-    asking = f"ask('outlive', mark={str(mark)!r}, seconds=0.5)"
+    asking = f"ask({what!r}, mark={str(mark)!r}, seconds={seconds})"
     words = [sys.executable, "-c", f"from tests.pool.test_pool import *; LocalPool(1).submit({asking}).result()"]
     assert subprocess.run(words, check=False).returncode == -signal.SIGKILL
     until = time.monotonic() + 60

@@ -139,15 +139,6 @@ def test_edges_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: i
     np.testing.assert_allclose(_native.longest_edges(vertices, triangles), longest, rtol=1e-14)
 
 
-def test_indices_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match="out of range"):
-        _native.weld(np.zeros((3, 3)), np.array([[0, 1, 3]]))
-    with pytest.raises(ValueError, match="out of range"):
-        _native.edges(np.array([[0, 1, -1]]), 3)
-    with pytest.raises(ValueError, match="out of range"):
-        _native.components(2, np.array([0]), np.array([2]))
-
-
 def shapes() -> dict[str, trimesh.Trimesh]:
     box = trimesh.creation.box()
     there = box.copy().apply_translation([3, 0, 0])

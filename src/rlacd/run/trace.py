@@ -1,7 +1,4 @@
-"""What each thread of a run did, when and for how long, in the trace format that Chrome and Perfetto show.
-
-`python -m benchmarks replay` tells from it what other numbers of cores would take.
-"""
+"""What each thread of a run did, when and for how long, in the trace format that Chrome and Perfetto show."""
 
 from __future__ import annotations
 

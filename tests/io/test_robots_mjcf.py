@@ -1,0 +1,286 @@
+"""Rewriting MJCF: MuJoCo finds hulls where the meshes were, the same masses, and every other byte."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import rlacd
+from rlacd.errors import MeshFileError
+from tests.models import fall_in_mujoco, inside, mujoco_model, points_of_geom, table
+
+ARM = """<mujoco model="arm">
+  <compiler angle="radian" meshdir="assets"/>
+  <default>
+    <default class="arm">
+      <geom type="mesh"/>
+      <default class="visual"><geom contype="0" conaffinity="0" group="2"/></default>
+      <default class="collision"><geom group="3" mass="3"/></default>
+    </default>
+    <mesh scale="0.5 0.5 0.5"/>
+  </default>
+  <asset>
+    <mesh file="table.stl"/>
+    <mesh name="big" file="table.stl" scale="1 1 1"/>
+    <mesh name="tetrahedron" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
+  </asset>
+  <worldbody>
+    <body name="upper" childclass="arm">
+      <freejoint/>
+      <geom class="visual" mesh="table"/>
+      <geom name="elbow" class="collision" mesh="table" pos="0 0 0.1"/> <!-- kept -->
+    </body>
+    <body name="lower" pos="2 0 0">
+      <freejoint/>
+      <geom name="both" type="mesh" mesh="big" rgba="1 0 0 1"/>
+      <geom type="mesh" mesh="tetrahedron" pos="0 0 1"/>
+      <geom type="sphere" size="0.1"/>
+    </body>
+  </worldbody>
+  <contact><exclude body1="upper" body2="lower"/></contact>
+  <sensor><user name="s" dim="1" objtype="geom" objname="elbow"/></sensor>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    (tmp_path / "assets").mkdir()
+    table().export(tmp_path / "assets" / "table.stl")
+    (tmp_path / "arm.xml").write_text(ARM)
+    return tmp_path / "arm.xml"
+
+
+@pytest.mark.promise("robot-hulls")
+def test_mujoco_reads_the_rewritten_mjcf_and_hulls_lie_where_the_mesh_lay(arm: Path) -> None:
+    """MuJoCo moves every mesh into its own frame of inertia; placed by it, mesh and hulls still coincide."""
+    before = mujoco_model(arm)
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
+    after = mujoco_model(done.path)
+    for body in ("upper", "lower"):
+        assert bounds_of(after, body) == pytest.approx(bounds_of(before, body), abs=1e-5)
+    table_hulls, big_hulls = (len(link.files) for link in done.links)
+    # "upper" keeps its collision geom for its mass, "lower" the red one to look at too, with hulls beside them.
+    assert after.ngeom == before.ngeom + table_hulls + big_hulls
+    assert after.geom("elbow_mass").rgba[3] == 0.0, "what stays for its mass is not drawn"
+    assert int(after.geom_contype.astype(bool).sum()) == table_hulls + big_hulls + 2, "and tetrahedron and sphere"
+    red = after.geom("both_visual")
+    assert red.contype == red.conaffinity == 0
+    assert red.rgba.tolist() == [1.0, 0.0, 0.0, 1.0]
+    assert np.isfinite(fall_in_mujoco(done.path, 0.05).speed)
+
+
+def bounds_of(model: Any, body: str | int) -> np.ndarray:
+    points = points_of_body(model, body)
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def geoms_of_body(model: Any, body: str | int) -> list[np.ndarray]:
+    """The points of each mesh that a body collides with, in the world."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    own = (model.geom_bodyid == model.body(body).id) & (model.geom_dataid >= 0) & (model.geom_contype > 0)
+    return [points_of_geom(model, data, geom) for geom in np.flatnonzero(own)]
+
+
+def points_of_body(model: Any, body: str | int) -> np.ndarray:
+    return np.concatenate(geoms_of_body(model, body))
+
+
+def hulls_of_body(model: Any, body: str | int) -> list[trimesh.Trimesh]:
+    return [trimesh.Trimesh(points).convex_hull for points in geoms_of_body(model, body)]
+
+
+@pytest.mark.promise("robots")
+def test_an_mjcf_keeps_every_byte_but_meshes_and_their_geoms(arm: Path) -> None:
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), threads=1)
+    before, after = ARM.splitlines(), done.path.read_text().splitlines()
+    changed = [line for line in difflib.ndiff(before, after) if line.startswith("- ")]
+    assert [line for line in changed if 'name="elbow"' not in line and 'name="both"' not in line] == []
+    new = [line[2:].strip() for line in difflib.ndiff(before, after) if line.startswith("+ ")]
+    assert all(line.startswith(("<mesh ", "<geom ")) for line in new)
+    assert sum(line.endswith("<!-- kept -->") for line in new) == 1
+    assert "<sensor> names" not in " ".join(done.warnings)
+    assert any("elbow" in warning and "<user>" in warning for warning in done.warnings)
+    assert any("tetrahedron" in warning and "no file" in warning for warning in done.warnings)
+
+
+def mjcf(folder: Path, assets: str, geoms: str, more: str = "") -> Path:
+    """A model of one free body."""
+    body = f"<worldbody><body name='b' pos='0 0 3'><freejoint/>{geoms}</body></worldbody>"
+    (folder / "in.xml").write_text(f"<mujoco>{more}<asset>{assets}</asset>{body}</mujoco>")
+    return folder / "in.xml"
+
+
+GEOMS = "{inertial}<frame pos='1 0 0' euler='10 20 30'><geom class='c' type='mesh' mesh='t' group='{group}' {geom}/>\
+</frame><geom size='0.2' density='300'/><replicate count='2' offset='1 0 0'><geom class='c' type='mesh' mesh='t'\
+ pos='0 1 0' group='3'/></replicate>"
+
+
+MESH = "<mesh name='t' file='table.stl' scale='1 -1 2' refpos='0.1 0 0' refquat='1 1 0 0' {asset}/>"
+
+
+SETTINGS = "<compiler {compiler}/><default><default class='c'><geom {default}/></default></default>"
+
+
+@pytest.mark.parametrize("group", ["0", "3"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"geom": "mass='3'"},
+        {"geom": "density='7'"},
+        {"default": "mass='2'"},
+        {"default": "density='40'"},
+        *({"asset": f"inertia='{inertia}'"} for inertia in ("exact", "shell", "legacy", "convex")),
+        {"compiler": "inertiagrouprange='0 2'"},
+        {"compiler": "inertiagrouprange='3 5'"},
+        {"compiler": "inertiafromgeom='true'", "inertial": "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"},
+        {"inertial": "<inertial pos='1 0 0' mass='1' diaginertia='1 1 1'/>"},
+        {"compiler": "settotalmass='9' balanceinertia='true' boundmass='0.1' boundinertia='0.1'"},
+    ],
+    ids=str,
+)
+@pytest.mark.promise("robot-mass")
+def test_no_body_changes_its_mass_centre_or_inertia(tmp_path: Path, how: dict[str, str], group: str) -> None:
+    table().export(tmp_path / "table.stl")
+    blank = dict.fromkeys(("compiler", "default", "asset", "inertial", "geom"), "")
+    given = {**blank, **how, "group": group}
+    source = mjcf(tmp_path, *(text.format(**given) for text in (MESH, GEOMS, SETTINGS)))
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
+    before, after = (mujoco_model(path) for path in (source, done.path))
+    assert after.ngeom > before.ngeom
+    for name, size in (("body_mass", 1e-6), ("body_ipos", 1e-6)):
+        assert getattr(after, name) == pytest.approx(getattr(before, name), rel=size, abs=1e-9)
+    assert tensors(after) == pytest.approx(tensors(before), rel=1e-6, abs=1e-6 * before.body_inertia.max())
+
+
+def tensors(model: Any) -> np.ndarray:
+    """The inertia of each body along the axes of its frame."""
+    turns = [trimesh.transformations.quaternion_matrix(turn)[:3, :3] for turn in model.body_iquat]
+    return np.array([turn * inertia @ turn.T for turn, inertia in zip(turns, model.body_inertia, strict=True)])
+
+
+HAND = """<mujoco>
+<compiler angle="{angle}" eulerseq="xZy" autolimits="true"/>
+<default><default class="c"><geom type="mesh" group="3" quat="1 0 0.2 0"/></default></default>
+<asset><mesh name="t" file="table.stl" scale="1 -1 2" refpos="0.1 0 0" refquat="1 1 0 0"/>
+<mesh name="u" file="table.stl" scale="0.5 0.5 0.5"/></asset>
+<worldbody><geom class="c" mesh="u" pos="4 0 0"/><geom class="c" mesh="u" pos="5 0 0"/>
+<body name="palm" pos="1 2 3" axisangle="1 2 0 {turn}"><joint/>
+  <geom class="c" mesh="t" pos="0.3 0 0" density="500"/>
+  <frame pos="0 1 0" euler="{turn} {turn} {turn}"><geom class="c" mesh="u" xyaxes="1 1 0 0 0 2"/></frame>
+  <geom class="c" mesh="u" zaxis="1 2 -3" friction="0.1"/><!-- slippery -->
+  <geom name="pad" class="c" mesh="u" pos="0 0 1"/>
+  <replicate count="2" offset="2 0 0"><geom class="c" mesh="u" pos="0 3 0"/><geom class="c" mesh="u"/></replicate>
+  <body euler="0 {turn} 0" pos="0 0 1"><geom class="c" mesh="u"/><geom class="c" mesh="u" pos="0.1 0 0"/></body>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("angle", "turn"), [("degree", "20"), ("radian", "0.34906585")])
+@pytest.mark.promise("robot-hulls", "robot-mass")
+def test_geoms_of_a_body_become_one_solid_where_they_collide_alike(tmp_path: Path, angle: str, turn: str) -> None:
+    """Placed, turned, mirrored and scaled in every way that MJCF has; compared where MuJoCo puts them."""
+    table().export(tmp_path / "table.stl")
+    (tmp_path / "in.xml").write_text(HAND.format(angle=angle, turn=turn))
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threshold_abs=0.02, threads=1)
+    before, after = mujoco_model(tmp_path / "in.xml"), mujoco_model(done.path)
+    world, _, tip = done.links
+    assert [len(link.results) for link in done.links] == [2, 4, 1], "world apart; slippery, named, replicated apart"
+    assert (world.results[0], tip.name) == (world.results[1], "body_2")
+    assert "<!-- slippery -->" in done.path.read_text()
+    assert after.body_mass == pytest.approx(before.body_mass, rel=1e-6)
+    assert tensors(after) == pytest.approx(tensors(before), rel=1e-6, abs=1e-6 * before.body_inertia.max())
+    for body in ("palm", 2):
+        assert bounds_of(after, body) == pytest.approx(bounds_of(before, body), abs=1e-5)
+        corners, hulls = points_of_body(before, body), hulls_of_body(after, body)
+        assert inside(hulls, corners, 1e-5).all()
+    shape = trimesh.util.concatenate(tip.hulls).apply_transform(pose_of_body(after, 2))
+    assert shape.bounds == pytest.approx(bounds_of(before, 2), abs=1e-5), "in Python they are in the body's frame"
+
+
+def pose_of_body(model: Any, body: str | int) -> np.ndarray:
+    import mujoco
+
+    data, pose = mujoco.MjData(model), np.eye(4)
+    mujoco.mj_forward(model, data)
+    place = data.body(body)
+    pose[:3, :3], pose[:3, 3] = place.xmat.reshape(3, 3), place.xpos
+    return pose
+
+
+@pytest.mark.parametrize("inertia", ["", "inertia='exact'", "inertia='convex'"])
+def test_a_mesh_without_volume_compiles_once_it_is_rewritten(tmp_path: Path, inertia: str) -> None:
+    trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "flat.stl")
+    weight = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"
+    source = mjcf(tmp_path, f"<mesh file='flat.stl' {inertia}/>", f"{weight}<geom type='mesh' mesh='flat'/>")
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", threads=1)
+    assert mujoco_model(done.path).body_mass[1] == 1.0
+    assert any("no volume" in warning for warning in done.warnings)
+
+
+@pytest.mark.parametrize("ending", ["dae", "ply", "stl"])
+def test_a_mesh_that_mujoco_cannot_read_is_copied_for_it(tmp_path: Path, ending: str) -> None:
+    table().export(tmp_path / f"table.{ending}", file_type="stl_ascii" if ending == "stl" else ending)
+    asset = f"<mesh name='t' file='table.{ending}' scale='1 1 -2' inertia='exact'/>"
+    source = mjcf(tmp_path, asset, "<geom type='mesh' mesh='t' density='7'/>")
+    with pytest.raises(ValueError, match="decoder"):
+        mujoco_model(source)
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
+    assert mujoco_model(done.path).body_mass[1] == pytest.approx(table().volume * 2 * 7, rel=0.01)
+
+
+def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
+    """Assets, defaults, settings and bodies each in a file, found from the main file's folder or from their own."""
+    (tmp_path / "parts" / "meshes").mkdir(parents=True)
+    table().export(tmp_path / "parts" / "table.stl")
+    table().export(tmp_path / "parts" / "other.stl")
+    parts = {
+        "in.xml": '<mujoco>\n <!-- scene -->\n <include file="parts/robot.xml"/>'
+        '\n <include file="floor.xml"/>\n</mujoco>',
+        "floor.xml": '<mujocoinclude><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujocoinclude>',
+        "parts/robot.xml": '<?xml version="1.0"?><mujoco><!-- für --><compiler meshdir="nowhere"/>'
+        '<include file="assets.xml"/><worldbody><body name="b"><freejoint/><include file="parts/body.xml"/></body>'
+        "</worldbody></mujoco>",
+        "parts/assets.xml": '<mujoco><compiler meshdir="."/><asset><mesh file="table.stl"/><mesh file="other.stl"/>'
+        '</asset><default><default class="c"><geom mesh="table" type="mesh" mass="2"/></default></default></mujoco>',
+        "parts/body.xml": '<x><geom class="c" name="g" group="3"/></x>',
+    }
+    for name, text in parts.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    before = mujoco_model(tmp_path / "in.xml")
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threads=1)
+    after = mujoco_model(done.path)
+    assert after.ngeom == before.ngeom + len(done.links[0].files)
+    assert after.body_mass == pytest.approx(before.body_mass)
+    text = done.path.read_text(encoding="utf-8")
+    assert text.startswith("<mujoco>\n <!-- scene -->\n <!-- für -->")
+    assert text.endswith('\n <include file="floor.xml"/>\n</mujoco>'), "what does not change stays included"
+    assert 'file="parts/other.stl"' in text, "paths of inlined files follow"
+    assert {path: (tmp_path / path).read_text(encoding="utf-8") for path in parts} == parts
+    (tmp_path / "floor.xml").write_text('<mujoco><include file="parts/robot.xml"/></mujoco>')
+    with pytest.raises(MeshFileError, match="twice"):
+        rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "again.xml")
+
+
+def test_a_model_whose_paths_are_stripped_is_rewritten_with_the_paths_that_count(tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    for name in ("table", "other"):
+        table().export(tmp_path / "meshes" / f"{name}.stl")
+    source = mjcf(
+        tmp_path,
+        '<mesh file="C:\\robot/x/table.stl"/><mesh file="no/where/other.stl"/>',
+        '<geom type="mesh" mesh="table"/><geom type="mesh" mesh="other" contype="0" conaffinity="0"/>',
+        '<compiler strippath="true" meshdir="meshes"/>',
+    )
+    before = mujoco_model(source)
+    done = rlacd.rewrite_robot(source, tmp_path / "out.xml", quality="fast", threads=1)
+    after = mujoco_model(done.path)
+    assert after.ngeom == before.ngeom + len(done.links[0].files)
+    assert after.body_inertia == pytest.approx(before.body_inertia, rel=1e-6)
