@@ -128,7 +128,7 @@ def coverage(
     if reported is not None and missed.distance > reported + ROUNDING:
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, the report says {reported:.6g}")
     if missed.distance > COVERAGE_TOLERANCE + ROUNDING and not any(
-        word in case.warned for word in ("outside the hulls", "from the hulls")
+        word in case.warned for word in ("outside the hulls", "from the hulls", "no time to measure")
     ):
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, and no word of it")
     return found
@@ -172,7 +172,9 @@ def overhang(
     if reported is not None and reached.distance > reported + 2 * ROUNDING:
         found.append(f"the hulls reach {reached.distance:.6g} beyond the input, the report says {reported:.6g}")
     allowed = case.options.get("threshold", math.inf) + COVERAGE_TOLERANCE + ROUNDING
-    is_warned_of = any(word in case.warned for word in ("exceed", "beyond the input", "Incomplete"))
+    is_warned_of = any(
+        word in case.warned for word in ("exceed", "beyond the input", "Incomplete", "no time to measure")
+    )
     if reached.distance > allowed and not is_warned_of:
         found.append(f"the hulls reach {reached.distance:.6g} beyond the input, and no word of it")
     return found
