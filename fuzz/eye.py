@@ -156,8 +156,8 @@ def main() -> None:
         random = np.random.default_rng(0)
         over = seen_over(placed, where[faces], options.samples, random).distance
         under = seen_under(placed, where, faces, options.samples, random).distance
-        said = result.report["hausdorff"]
-        print(f"| {path.stem} | {said['over']:.4f} | {over:.4f} | {said['under']:.4f} | {under:.4f} |", flush=True)
+        said = result.report.hausdorff
+        print(f"| {path.stem} | {said.over:.4f} | {over:.4f} | {said.under:.4f} | {under:.4f} |", flush=True)
 
 
 if __name__ == "__main__":

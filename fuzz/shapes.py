@@ -135,9 +135,8 @@ def again(seed: int) -> None:
     shape, options = make_shape(seed), draw_options(seed)
     print(f"{len(shape.vertices)} points, {len(shape.faces)} faces: {', '.join(shape.steps)}\n{options}")
     result = rlacd.decompose((shape.vertices, shape.faces), **options)
-    report = dict(result.report)
+    report = result.report.as_dict()
     report["concavity"] = report.get("concavity", {}).get("max")
-    report["hausdorff"] = {name: pair and pair for name, pair in report["hausdorff"].items()}
     print({key: report[key] for key in ("parts", "hausdorff", "concavity", "complete", "warnings", "seconds")})
     print([(body["step"], round(body["deviation"], 6)) for body in report["repair"]])
     hulls = [(np.array(hull.vertices), np.array(hull.faces)) for hull in result]

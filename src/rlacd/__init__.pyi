@@ -19,6 +19,7 @@ from rlacd.options.presets import Preset as Preset
 from rlacd.planes.sweep import Sweep as Sweep
 from rlacd.planes.sweep import SweepCache as SweepCache
 from rlacd.policies import Policy as Policy
+from rlacd.report import Report as Report
 from rlacd.run import Progress as Progress
 from rlacd.solid.component import Component as Component
 from rlacd.solid.component import Plane as Plane

@@ -39,6 +39,7 @@ from rlacd.options.names import UNITS, PrimitiveKind, mesh_name
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.presets import PresetName
 from rlacd.policies import Policy, make_policy
+from rlacd.report import Provenance
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
@@ -122,7 +123,7 @@ def decompose(
         Whether it is a share of each part's own volume, the default, or of the whole solid's.
     max_hulls : int, optional
         Maximum number of hulls. It has no effect if the decomposition has no more anyway; otherwise the one with the
-        least concavity among those found under coarser thresholds is returned, and ``report["warnings"]`` says by how
+        least concavity among those found under coarser thresholds is returned, and ``report.warnings`` says by how
         much it exceeds the threshold. A larger limit never leads to a larger concavity.
     max_vertices, max_faces : int, optional
         Limits on the vertices and triangles of each hull. A limited hull contains its part and sticks out by at most
@@ -140,20 +141,20 @@ def decompose(
     overlap : float, optional
         Hulls that touch overlap by this share of the longest side, so that nothing thin slips between them: one takes
         in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and
-        ``report["warnings"]`` says at how many seams. At most 0.25. With `per_node`, hulls of different nodes do not
+        ``report.warnings`` says at how many seams. At most 0.25. With `per_node`, hulls of different nodes do not
         overlap.
     overlap_abs : float, optional
         The same in the input's unit, instead of `overlap`.
     keep_open : float, optional
         Passages stay open: in a hole, slot or mouth that holds a ball of at least `threshold` in radius, a ball of this
-        share of its radius still fits between the hulls, at the same place. ``report["warnings"]`` counts those not
-        kept and says what is left; ``report["passages"]`` lists them.
+        share of its radius still fits between the hulls, at the same place. ``report.warnings`` counts those not
+        kept and says what is left; ``report.passages`` lists them.
     keep_open_abs : float, optional
         Instead of a share, the radius of a ball in the input's unit that still passes wherever one 1 % larger does.
     avoid : list of meshes
         Meshes, each like `mesh`, in its frame and unit, that no hull enters: parts that would are cut finer, down to a
         hundredth of the threshold. Where the input itself crosses them, or limits on the hulls leave no way,
-        ``report["warnings"]`` says so.
+        ``report.warnings`` says so.
     merge : bool
         Unite parts whose joint hull still meets the threshold.
     policy : str or Policy, optional
@@ -195,7 +196,7 @@ def decompose(
     preset : str, optional
         The engine the hulls are for: ``mujoco``, ``physx``, ``physx-gpu``, ``unity``, ``unreal``, ``newton``,
         ``bullet`` or ``godot``. Each of its limits applies unless `max_vertices` or `max_faces`, respectively, is
-        given, and ``report["warnings"]`` says what the engine will not accept; see `rlacd.PRESETS`.
+        given, and ``report.warnings`` says what the engine will not accept; see `rlacd.PRESETS`.
     per_node : bool
         Decompose each node of a scene separately, such as the doors and drawers of a cupboard, which move. The limits
         on hulls hold for each. Nodes that do not touch do not touch as hulls either, or a warning names them (extra
@@ -226,7 +227,7 @@ def decompose(
     Warns
     -----
     DecompositionWarning
-        What ``report["warnings"]`` says, once a call.
+        What ``report.warnings`` says, once a call.
     """
     given = locals()
     options = Options.of({name: given[name] for name in OPTION_NAMES})
@@ -242,17 +243,17 @@ def decompose(
             alone = f"per_node had no effect: {source.name} was read as one node"
             source = replace(source, warnings=(*source.warnings, alone))
         done = _each_node(source, options, run) if apart else _as_one(source, options, run)
-    report = {
-        "name": Path(source.name).stem if isinstance(mesh, (str, os.PathLike)) else "mesh",
-        **done.report,
-        "provenance": [{"node": hull.metadata.get("node"), "body": hull.metadata.get("body")} for hull in done.hulls],
-        "up": source.up,
-        "metres": source.metres,
-        "deviation_abs": source.deviation,
-        "seconds": {**run.seconds, "total": run.elapsed},
-    }
-    if report["warnings"]:
-        said = f"{report['name']}: {' '.join(report['warnings'])}"
+    report = replace(
+        done.report,
+        name=Path(source.name).stem or "mesh" if isinstance(mesh, (str, os.PathLike)) else "mesh",
+        provenance=tuple(Provenance(hull.metadata.get("node"), hull.metadata.get("body")) for hull in done.hulls),
+        up=source.up,
+        metres=source.metres,
+        deviation_abs=source.deviation,
+        seconds={**run.seconds, "total": run.elapsed},
+    )
+    if report.warnings:
+        said = f"{report.name}: {' '.join(report.warnings)}"
         warnings.warn(said, DecompositionWarning, stacklevel=3)  # past the function that suggests names of options
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
@@ -316,16 +317,17 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
             body = hull.metadata["body"]
             whose = {"node": source.nodes[place].name, "node_index": place}
             hull.metadata |= whose | {"body": None if body is None else body + bodies}
-        bodies += len(one.report["repair"])
+        bodies += len(one.report.repair)
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
-    report["options"] = options.as_plain()
-    if report["hausdorff"]["under"] is not None:
+    said, distances = [*report.warnings, *said], report.hausdorff
+    if distances.under is not None:
         found = [hull for part in done for h in part.hulls if (hull := Hull.of(frame.to_frame(h.vertices))) is not None]
         left_out = missed(frame.to_frame(source.specks), found, frame, run)
-        report["hausdorff"]["under"] = max(report["hausdorff"]["under"], left_out.distance)
-        report["warnings"] += left_out.said
-    report["warnings"] = [*source.warnings, *report["warnings"], *said]
-    return Finished([hull for one in done for hull in one.hulls], report)
+        distances = replace(distances, under=max(distances.under, left_out.distance))
+        said[len(report.warnings) : len(report.warnings)] = left_out.said
+    told = (*source.warnings, *said)
+    joint = replace(report, options=options.as_plain(), hausdorff=distances, warnings=told)
+    return Finished([hull for one in done for hull in one.hulls], joint)
 
 
 def _clear_of_each_other(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import sys
@@ -41,7 +42,7 @@ def wooden() -> Decomposition:
 
 def renamed(result: Decomposition, name: str, **changes: Any) -> Decomposition:
     parts = {"hulls": result.hulls, "source": result.source, **changes}
-    return Decomposition(parts["hulls"], {**result.report, "name": name}, parts["source"])
+    return Decomposition(parts["hulls"], dataclasses.replace(result.report, name=name), parts["source"])
 
 
 # --- simulators -------------------------------------------------------------------------------------------------------

@@ -126,7 +126,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
         if path is not None:
             with writing(what, path, quiet=quiet):
                 write(path)
-    return bool(result.report.get("complete", True))
+    return result.report.complete
 
 
 def _write_report(wanted: OutputOptions, text: str) -> None:
@@ -167,7 +167,7 @@ def _rewrite(
         with writing("report", wanted.report, quiet=bool(wanted.quiet)):
             done.save_report(wanted.report)
     else:
-        _write_report(wanted, to_json(done.report()))
+        _write_report(wanted, to_json(done.as_dict()))
     return done.complete
 
 

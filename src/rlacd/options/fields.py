@@ -218,11 +218,11 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
     """
 
     def completed(options: type[Stated]) -> type[Stated]:
-        meanings = _meanings(options.__doc__)
+        said = meanings(options)
         for field in dataclasses.fields(options):  # type: ignore[arg-type]
             known: About = field.metadata["option"]
             word = field.name.replace("_", "-")
-            known.help = meanings.get(field.name, "")
+            known.help = said.get(field.name, "")
             known.flags = known.flags or (f"--{word}/--no-{word}" if field.default is True else f"--{word}",)
             known.panel = known.panel or panel
             known.python = python.format(field.name) if known.python is None else known.python
@@ -231,16 +231,19 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
     return completed
 
 
-def _meanings(docstring: str | None) -> dict[str, str]:
-    """Read the section ``Attributes``; nothing where Python leaves docstrings out (``-OO``)."""
-    section = inspect.cleandoc(docstring or "").partition("Attributes\n----------\n")[2].partition("\n\n")[0]
-    lines: dict[str, list[str]] = {}
-    for line in section.splitlines():
-        if not line.startswith(" "):
-            lines[name := line] = []
-        else:
-            lines[name].append(line.strip())
-    return {name: " ".join(words) for name, words in lines.items()}
+def meanings(options: type) -> dict[str, str]:
+    """Read what fields mean in the section ``Attributes`` of a class and its bases; nothing under ``-OO``."""
+    found: dict[str, list[str]] = {}
+    for kind in reversed(options.__mro__[:-1]):
+        section = inspect.cleandoc(kind.__doc__ or "").partition("Attributes\n----------\n")[2].partition("\n\n")[0]
+        lines: list[str] = []
+        for line in section.splitlines():
+            if not line.startswith(" "):
+                lines = []
+                found |= dict.fromkeys(line.split(", "), lines)
+            else:
+                lines.append(line.strip())
+    return {name: " ".join(words) for name, words in found.items()}
 
 
 def about(options: Any, name: str) -> About:

@@ -83,8 +83,7 @@ def frame_of(decomposition: Result) -> Frame:
     corners = [np.asarray(hull.bounds, dtype=np.float64) for hull in decomposition]
     if len(decomposition.source.faces):
         corners.append(np.asarray(decomposition.source.bounds, dtype=np.float64))
-    around = Frame.of(np.concatenate(corners))
-    return Frame(around.center, float(decomposition.report.get("scale", around.scale)))
+    return Frame(Frame.of(np.concatenate(corners)).center, decomposition.report.scale)
 
 
 def _divided(vertices: FloatArray, faces: IntArray, edge: float) -> tuple[FloatArray, IntArray]:

@@ -150,8 +150,7 @@ class Session:
                     return
                 is_last = number == len(passes) or self._stopped or error is not None
                 # A pass that was stopped before its search is worth less than the finished draft.
-                report = {} if result is None else result.report
-                if number > 1 and report.get("complete") is False and report.get("search") is None:
+                if number > 1 and result and not result.report.complete and result.report.search is None:
                     result = None
                 state = self._state
                 if result is not None:
