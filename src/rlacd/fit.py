@@ -19,76 +19,50 @@ COVERED = 5e-5
 
 @dataclass(frozen=True)
 class Measured:
-    """What the criterion measured of each part.
-
-    Attributes
-    ----------
-    per_part
-        An upper bound for the part of each hull, in the order of the hulls; null without time to measure.
-    max
-        The greatest of them.
-    """
+    """What the criterion measured of each part."""
 
     per_part: tuple[float, ...] | None
+    """An upper bound for the part of each hull, in the order of the hulls; null without time to measure."""
     max: float | None
+    """The greatest of them."""
 
 
 @dataclass(frozen=True)
 class LengthFit(Measured):
-    """How far parts and their hulls are apart.
-
-    Attributes
-    ----------
-    threshold
-        The limit, a length.
-    """
+    """How far parts and their hulls are apart."""
 
     threshold: float
+    """The limit, a length."""
 
 
 @dataclass(frozen=True)
 class VolumeFit(Measured):
-    """The share of volume that each hull adds.
-
-    Attributes
-    ----------
-    tolerance
-        The limit, a share.
-    relative_to
-        What it is a share of: each part's own volume, or the whole solid's.
-    """
+    """The share of volume that each hull adds."""
 
     tolerance: float
+    """The limit, a share."""
     relative_to: Literal["part", "whole"]
+    """What it is a share of: each part's own volume, or the whole solid's."""
 
 
 @dataclass(frozen=True)
 class SpaceFit:
-    """What is left of navigable space.
-
-    Attributes
-    ----------
-    radius
-        Of the ball that has to pass.
-    tolerance
-        Space nearer to the surface than this may be filled.
-    balls
-        Number of balls that no hull may touch.
-    shrunk, dropped
-        How many balls gave way, in part or altogether, to parts that no cut could keep off them.
-    most
-        The largest loss of radius.
-    intrusion
-        How deep the hulls reach into the final balls.
-    """
+    """What is left of navigable space."""
 
     radius: float
+    """Of the ball that has to pass."""
     tolerance: float
+    """Space nearer to the surface than this may be filled."""
     balls: int
+    """Number of balls that no hull may touch."""
     shrunk: int
+    """How many balls gave way in part to parts that no cut could keep off them."""
     dropped: int
+    """How many gave way altogether."""
     most: float
+    """The largest loss of radius."""
     intrusion: Measured
+    """How deep the hulls reach into the final balls."""
 
 
 class Fit(NamedTuple):

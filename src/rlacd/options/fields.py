@@ -1,6 +1,6 @@
 """Options stated once: a dataclass whose fields carry their type, range and place on the command line.
 
-Its docstring says what each means: ``stated`` reads the help from the section ``Attributes``.
+The docstring below a field says what it means.
 
 Lengths are shares of the longest side of the mesh, or in its own unit under the option's name and ``_abs``. The one
 exception is a bare threshold, which is CoACD's: given in the frame where the longest side is 2.
@@ -8,11 +8,15 @@ exception is a bare threshold, which is CoACD's: given in the frame where the lo
 
 from __future__ import annotations
 
+import ast
 import dataclasses
+import functools
 import inspect
+import itertools
 import math
 import numbers
 import os
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -144,8 +148,8 @@ class About:
         Whether None, its default, is one of them.
     flags
         Its names on the command line.
-    help
-        One or two sentences, for the command line and the table.
+    owner
+        The class that it is a field of.
     usual
         The default in words.
     panel
@@ -161,12 +165,18 @@ class About:
     kind: Kind
     optional: bool
     flags: tuple[str, ...] = ()
-    help: str = ""
+    owner: type | None = None
     usual: str = ""
     panel: str | None = None
     metavar: str | None = None
     python: str | None = None
     repeated: bool = False
+    name: str = ""
+
+    @property
+    def help(self) -> str:
+        """One or two sentences, for the command line and the table."""
+        return meanings(self.owner).get(self.name, "") if self.owner else ""
 
 
 def option(
@@ -207,7 +217,7 @@ def _kind_of(default: Any, **bounds: Any) -> Kind:
 
 
 def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[Stated]], type[Stated]]:
-    """Complete the fields of a dataclass by their names and by the section ``Attributes`` of its docstring.
+    """Complete the fields of a dataclass by their names and the docstrings below them.
 
     Parameters
     ----------
@@ -218,11 +228,10 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
     """
 
     def completed(options: type[Stated]) -> type[Stated]:
-        said = meanings(options)
         for field in dataclasses.fields(options):  # type: ignore[arg-type]
             known: About = field.metadata["option"]
             word = field.name.replace("_", "-")
-            known.help = said.get(field.name, "")
+            known.owner, known.name = options, field.name
             known.flags = known.flags or (f"--{word}/--no-{word}" if field.default is True else f"--{word}",)
             known.panel = known.panel or panel
             known.python = python.format(field.name) if known.python is None else known.python
@@ -231,19 +240,20 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
     return completed
 
 
+@functools.cache
 def meanings(options: type) -> dict[str, str]:
-    """Read what fields mean in the section ``Attributes`` of a class and its bases; nothing under ``-OO``."""
-    found: dict[str, list[str]] = {}
+    """What fields of a class and its bases mean: the docstring below each; nothing without the source."""
+    found = {}
     for kind in reversed(options.__mro__[:-1]):
-        section = inspect.cleandoc(kind.__doc__ or "").partition("Attributes\n----------\n")[2].partition("\n\n")[0]
-        lines: list[str] = []
-        for line in section.splitlines():
-            if not line.startswith(" "):
-                lines = []
-                found |= dict.fromkeys(line.split(", "), lines)
-            else:
-                lines.append(line.strip())
-    return {name: " ".join(words) for name, words in found.items()}
+        try:
+            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+        except OSError:
+            return {}
+        body = tree.body if isinstance(tree, ast.ClassDef) else []
+        for field, said in itertools.pairwise(body):
+            if isinstance(field, ast.AnnAssign) and isinstance(said, ast.Expr) and isinstance(said.value, ast.Constant):
+                found[ast.unparse(field.target)] = " ".join(str(said.value.value).split())
+    return found
 
 
 def about(options: Any, name: str) -> About:

@@ -39,22 +39,6 @@ _LINKS = custom("positive lengths by regular expressions of link names, such as 
 class RobotOptions:
     """How the links of a robot are decomposed.
 
-    Attributes
-    ----------
-    per
-        What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
-    links
-        Another distance for the links whose whole name matches a regular expression, such as 'finger.*=1mm', or in the
-        robot's own unit. May be repeated; the last that matches counts.
-    samples
-        Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
-        extra rlacd[clear].
-    exclude
-        Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD: adjacent,
-        always or never in contact at these positions.
-    srdf
-        Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.
-
     Raises
     ------
     OptionError
@@ -62,12 +46,20 @@ class RobotOptions:
     """
 
     per: Per = option("link", one_of=Per)
+    """What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh."""
     links: Mapping[str, float] | None = option(
         None, kind=_LINKS, flags=("--link",), metavar="REGEX=LENGTH", repeated=True
     )
+    """Another distance for the links whose whole name matches a regular expression, such as 'finger.*=1mm', or in the
+    robot's own unit. May be repeated; the last that matches counts."""
     samples: int = option(500, least=0, most=100_000)
+    """Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
+    extra rlacd[clear]."""
     exclude: str | Sequence[PairKind] = option((), kind=_KINDS, metavar="adjacent,always,…", usual="none")
+    """Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD: adjacent, always
+    or never in contact at these positions."""
     srdf: str | None = option(None, kind=path_like(), metavar="FILE")
+    """Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact."""
 
     def __post_init__(self) -> None:
         check_fields(self)
