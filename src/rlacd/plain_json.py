@@ -50,7 +50,7 @@ def schema_of(kind: Any) -> dict[str, Any]:
     """JSON schema of a dataclass as `as_plain` writes it, from its annotations and its docstring."""
     if isinstance(kind, type) and dataclasses.is_dataclass(kind):
         hints, said, fields = typing.get_type_hints(kind), meanings(kind), dataclasses.fields(kind)
-        known = {f.name: schema_of(hints[f.name]) | {"description": said.get(f.name, "")} for f in fields}
+        known = {f.name: schema_of(hints[f.name]) | {"description": " ".join(said[f.name].split())} for f in fields}
         needed = [f.name for f in fields if "if_asked" not in f.metadata]
         about = {"description": str(kind.__doc__).partition("\n")[0]}
         return about | {"type": "object", "properties": known, "required": needed, "additionalProperties": False}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Collection, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,19 +33,10 @@ class Argument(click.Argument):
 class Option(click.Option):
     """An option under a heading of the help; None unless it is given."""
 
-    def __init__(self, *words: str, panel: str = OPTIONS, help: str | Callable[[], str] = "", **known: Any) -> None:
+    def __init__(self, *words: str, panel: str = OPTIONS, **known: Any) -> None:
         usual = {} if known.get("required") else {"default": None}  # to click, None is a value
         super().__init__(list(words), **{**usual, **known})
-        self.panel, self.told = panel, help
-
-    @property
-    def help(self) -> str | None:
-        """What it means, read from the source when it is asked for."""
-        return self.told if isinstance(self.told, str) else self.told()
-
-    @help.setter
-    def help(self, said: str | None) -> None:
-        self.told = said or ""
+        self.panel = panel
 
 
 def help_option() -> click.Option:
@@ -146,7 +136,7 @@ def options_of(options: type[Any], *, only: Collection[str] | None = None, note:
                     is_flag=known.kind.typed is bool,
                     multiple=known.repeated,
                     metavar=known.metavar,
-                    help=partial(_help, known, note),
+                    help=_help(known, note),
                 )
             )
     return made
