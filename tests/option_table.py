@@ -1,13 +1,19 @@
-"""The documentation's table of options, made from where they are stated: ``python -m tests.option_table`` writes it."""
+"""The documentation's table of options and the public signature, made from where they are stated.
+
+``python -m tests.option_table`` writes both.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from rlacd.decompose_mesh import decompose
 from rlacd.options import Options
 from rlacd.options.fields import About
 from rlacd.options.navigable import NavigableSpace
@@ -47,5 +53,23 @@ def written(page: str) -> str:
     return "\n".join([*lines[:begin], *options_table().splitlines(), *lines[end:], ""])
 
 
+STUB = Path(__file__).parents[1] / "src" / "rlacd" / "__init__.pyi"
+
+
+def signature() -> str:
+    """`rlacd.decompose` with every option, for editors and type checkers; None is the same as leaving one out."""
+    lines = ["def decompose("]
+    for name, parameter in inspect.signature(decompose).parameters.items():
+        kind, is_option = str(parameter.annotation).replace("'", '"'), hasattr(Options, name)
+        kind += " | None" if is_option and not kind.endswith("None") else ""
+        default = "" if parameter.default is parameter.empty else f" = {parameter.default!r}".replace("'", '"')
+        lines += ["    *,"] if name == "file_type" else []
+        lines.append(f"    {name}: {kind}{default},")
+    said = textwrap.indent(f'"""{inspect.cleandoc(decompose.__doc__ or "")}\n"""', "    ")
+    return "\n".join([*lines, ") -> Decomposition:", *(line.rstrip() for line in said.splitlines()), ""])
+
+
 if __name__ == "__main__":
+    stub = STUB.read_text(encoding="utf-8").partition("def decompose(")[0]
+    STUB.write_text(stub + signature(), encoding="utf-8")
     PAGE.write_text(written(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

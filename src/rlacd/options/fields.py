@@ -1,6 +1,6 @@
 """Options stated once: a dataclass whose fields carry their type, range and place on the command line.
 
-The docstring below a field says what it means.
+The docstring below a field says what it means: its first paragraph everywhere, others where `TYPED` says.
 
 Lengths are shares of the longest side of the mesh, or in its own unit under the option's name and ``_abs``. The one
 exception is a bare threshold, which is CoACD's: given in the frame where the longest side is 2.
@@ -24,6 +24,9 @@ from rlacd.errors import OptionError
 
 LARGEST_INTEGER = 2**63 - 1
 """Bound of integers without another: what kernels and files can hold."""
+
+TYPED = "On the command line: "
+"""Begins the paragraph of a field's docstring that is for the command line only; those after it are for Python."""
 
 LONGEST_SHOWN = 80
 """Characters of a value that a message shows."""
@@ -147,10 +150,8 @@ class About:
         Whether None, its default, is one of them.
     flags
         Its names on the command line.
-    help
-        One or two sentences, for the command line and the table.
-    more
-        What else there is to say, for Python.
+    help, python_help
+        What it means, for the command line and the table, and for Python.
     usual
         The default in words.
     panel
@@ -167,7 +168,7 @@ class About:
     optional: bool
     flags: tuple[str, ...] = ()
     help: str = ""
-    more: str = ""
+    python_help: str = ""
     usual: str = ""
     panel: str | None = None
     metavar: str | None = None
@@ -228,7 +229,10 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
         for field in dataclasses.fields(options):  # type: ignore[arg-type]
             known: About = field.metadata["option"]
             word = field.name.replace("_", "-")
-            known.help, _, known.more = said.get(field.name, "").replace("\n\n", "§").replace("\n", " ").partition("§")
+            first, *others = (" ".join(each.split()) for each in said.get(field.name, "").split("\n\n"))
+            typed = [each.removeprefix(TYPED) for each in others if each.startswith(TYPED)]
+            known.help = " ".join([first, *(each[0].upper() + each[1:] for each in typed)])
+            known.python_help = " ".join([first, *(each for each in others if not each.startswith(TYPED))])
             known.flags = known.flags or (f"--{word}/--no-{word}" if field.default is True else f"--{word}",)
             known.panel = known.panel or panel
             known.python = python.format(field.name) if known.python is None else known.python

@@ -1,14 +1,17 @@
-"""Names of options that a function does not have: which one was meant."""
+"""Options as arguments of a function: in its signature and docstring, and which one a wrong name meant."""
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import functools
 import inspect
+import re
+import textwrap
 from collections.abc import Callable, Collection, Sequence
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
-from rlacd.options.fields import stated_in
+from rlacd.options.fields import About, stated_in
 
 Given = ParamSpec("Given")
 Returned = TypeVar("Returned")
@@ -43,5 +46,27 @@ def suggesting(
             return function(*args, **given)
 
         return call
+
+    return completed
+
+
+def taking(options: type[Any]) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:
+    """State in the signature and the docstring of a function that ends with ``**options`` every one of a dataclass."""
+    known: dict[str, About] = {field.name: field.metadata["option"] for field in dataclasses.fields(options)}
+    names = {flag: name for name, each in known.items() for flag in each.flags[0].split("/")}
+
+    def explained(name: str, kind: str) -> str:
+        said = re.sub(r"--[a-z-]+", lambda flag: f"`{names.get(flag[0], flag[0][2:])}`", known[name].python_help)
+        said += f" Default: {known[name].usual}." if known[name].usual else ""
+        return f"    {name} : {kind}\n{textwrap.indent(textwrap.fill(said, 112), ' ' * 8)}\n"
+
+    def completed(function: Callable[Given, Returned]) -> Callable[Given, Returned]:
+        signature, fields = inspect.signature(function), dataclasses.fields(options)
+        own = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+        more = [inspect.Parameter(f.name, own[-1].KEYWORD_ONLY, default=f.default, annotation=f.type) for f in fields]
+        function.__signature__ = signature.replace(parameters=[*own, *more])  # type: ignore[attr-defined]
+        said = "".join(explained(field.name, str(field.type)) for field in fields)
+        function.__doc__ = (function.__doc__ or "").replace("    **options\n", said)
+        return function
 
     return completed
