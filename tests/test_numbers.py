@@ -36,7 +36,7 @@ from rlacd.search.search import LEAST_WORK, MOST_WORK, PATIENCE, TIMES_FIRST_PAS
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.passages import FACES
-from rlacd.view import connections, server
+from rlacd.view import server
 
 ROOT = Path(__file__).resolve().parents[1]
 GB = 2**30
@@ -88,7 +88,6 @@ LIMITS = {
     ],
     "docs/viewer.md": [
         f"up to {server.LARGEST_MESH >> 20} MiB",
-        f"{connections.MOST_CONNECTIONS} connections and {connections.MOST_STREAMS} open pages are served",
         f"localhost:{server.USUAL_PORT}",
     ],
     "src/rlacd/report.py": [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,11 @@ import numpy as np
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write import file_stem
+from rlacd.io.write.target import MODEL_OF
 from rlacd.options import CRITERIA, FAST, Options, with_criterion
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
+from rlacd.options.presets import PRESETS
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.topology import used_points
 
@@ -137,3 +140,19 @@ def _word(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return ",".join(map(str, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def file_name(name: str) -> str:
+    """Clean the name of an uploaded file: no folders, and no characters that a file system may refuse."""
+    last = re.split(r"[/\\]", name)[-1]
+    plain = re.sub(r'[\x00-\x1f\x7f<>:"|?*]', "_", last).strip(". ")[-120:]
+    return plain.encode(errors="replace").decode() or "mesh"
+
+
+def preset_words(name: str) -> dict[str, Any]:
+    """Describe a preset for the page: its engine, limits and format."""
+    preset = PRESETS[name]
+    ending = preset.ending.lstrip(".")
+    stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
+    limits = " and ".join(f"{limit} {what}" for what, limit in stated.items() if limit)
+    return {"engine": preset.engine, "format": preset.file_format or MODEL_OF.get(ending, ending), "limits": limits}
