@@ -15,12 +15,12 @@ from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read import READERS
 from rlacd.io.read.beside import mesh_files
-from rlacd.io.read.load import FORMATS
 from rlacd.io.write.encode import GENERATOR
 from rlacd.io.write.folder import listed_hulls
 
-ENDINGS = tuple(f".{ending}" for ending in FORMATS)
+ENDINGS = tuple(f".{ending}" for ending in READERS)
 """File endings that count as meshes, in upper or lower case."""
 
 ROBOTS = (".urdf", ".xml")

@@ -37,7 +37,7 @@ from typing import Any
 
 from rlacd._version import __version__
 from rlacd.errors import OptionError, RlacdError, sentence_of
-from rlacd.io.read.load import FORMATS as READ
+from rlacd.io.read import READERS
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
@@ -89,7 +89,7 @@ class ViewServer(ThreadingHTTPServer):
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making, self._opening = threading.Lock(), threading.Lock()
         self.uploaded: tempfile.TemporaryDirectory[str] | None = None
-        config: dict[str, Any] = {"options": options, "formats": list(READ), "version": __version__}
+        config: dict[str, Any] = {"options": options, "formats": list(READERS), "version": __version__}
         config["downloads"] = [asdict(offer) for offer in offered()]
         config["presets"] = [{"name": name, **preset_words(name)} for name in PRESETS]
         page, policy = live_page(subject.name, config)
