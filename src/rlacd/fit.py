@@ -66,26 +66,17 @@ class SpaceFit:
 
 
 class Fit(NamedTuple):
-    """The measurement of a criterion.
-
-    Attributes
-    ----------
-    name : str
-        The measurement; also its key in summaries.
-    per_part : tuple of float or None
-        None, like `worst`, where there was no time.
-    worst : float or None
-    limit : float or None
-        None for navigable space, of which hulls may touch nothing.
-    balls : int
-        Number of balls of navigable space.
-    """
+    """The measurement of a criterion."""
 
     name: str
+    """The measurement; also its key in summaries."""
     per_part: tuple[float, ...] | None
+    """None, like `worst`, where there was no time."""
     worst: float | None
     limit: float | None
+    """None for navigable space, of which hulls may touch nothing."""
     balls: int = 0
+    """Number of balls of navigable space."""
 
     @classmethod
     def of(cls, *, volume: VolumeFit | None, navigable: SpaceFit | None, **lengths: LengthFit | None) -> Fit | None:

@@ -42,21 +42,14 @@ _MARK_BYTES = 128
 
 @dataclass(frozen=True)
 class Asset:
-    """A mesh file.
-
-    Attributes
-    ----------
-    name
-        Path relative to the folder of assets, with slashes.
-    path
-        The file.
-    place
-        Name of its result, relative to the folder of results, without an ending.
-    """
+    """A mesh file."""
 
     name: str
+    """Path relative to the folder of assets, with slashes."""
     path: Path
+    """The file."""
     place: str
+    """Name of its result, relative to the folder of results, without an ending."""
 
     def files(self) -> dict[str, bytes]:
         """Read every file the mesh depends on, by name relative to its folder; the mesh file comes first.

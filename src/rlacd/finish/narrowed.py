@@ -47,21 +47,14 @@ _NEIGHBOURS = 8
 
 
 class Narrowed(NamedTuple):
-    """The passages that hulls narrow by more than a tenth, the most narrowed first.
-
-    Attributes
-    ----------
-    passages
-        Their places, and how wide they were and are.
-    is_every
-        Whether all are listed: no triangle or ball was left out, and no passage widens, as several in a row do.
-    by_limits
-        Whether a limit on hulls undid what cutting had kept open.
-    """
+    """The passages that hulls narrow by more than a tenth, the most narrowed first."""
 
     passages: tuple[Passage, ...] = ()
+    """Their places, and how wide they were and are."""
     is_every: bool = True
+    """Whether all are listed: no triangle or ball was left out, and no passage widens, as several in a row do."""
     by_limits: bool = False
+    """Whether a limit on hulls undid what cutting had kept open."""
 
 
 def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> Narrowed:

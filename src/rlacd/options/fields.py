@@ -36,27 +36,18 @@ Stated = TypeVar("Stated")
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """What values an option takes.
-
-    Attributes
-    ----------
-    rule
-        What a value has to be, as the end of a sentence.
-    values
-        The same in a few characters, for tables; empty where the help says it.
-    read
-        Turns a value into a plain one; raises any exception for a value of another kind.
-    typed
-        What the command line turns a word into.
-    textual
-        Whether values are strings.
-    """
+    """What values an option takes."""
 
     rule: str
+    """What a value has to be, as the end of a sentence."""
     values: str
+    """The same in a few characters, for tables; empty where the help says it."""
     read: Callable[[Any], Any]
+    """Turns a value into a plain one; raises any exception for a value of another kind."""
     typed: type
+    """What the command line turns a word into."""
     textual: bool = False
+    """Whether values are strings."""
 
 
 def number(
@@ -140,40 +131,27 @@ def _text(value: Any) -> str:
 
 @dataclasses.dataclass
 class About:
-    """What is known of an option beside its name, type and default.
-
-    Attributes
-    ----------
-    kind
-        The values it takes.
-    optional
-        Whether None, its default, is one of them.
-    flags
-        Its names on the command line.
-    help, python_help
-        What it means, for the command line and the table, and for Python.
-    usual
-        The default in words.
-    panel
-        The heading it stands under in the command's help.
-    metavar
-        The word for its value in the help.
-    python
-        How Python gives it, where that is not its name as an argument; empty where Python has no such option.
-    repeated
-        Whether the command line takes it several times.
-    """
+    """What is known of an option beside its name, type and default."""
 
     kind: Kind
+    """The values it takes."""
     optional: bool
+    """Whether None, its default, is one of them."""
     flags: tuple[str, ...] = ()
+    """Its names on the command line."""
     help: str = ""
     python_help: str = ""
+    """What it means, for the command line and the table, and for Python."""
     usual: str = ""
+    """The default in words."""
     panel: str | None = None
+    """The heading it stands under in the command's help."""
     metavar: str | None = None
+    """The word for its value in the help."""
     python: str | None = None
+    """How Python gives it, where that is not its name as an argument; empty where Python has no such option."""
     repeated: bool = False
+    """Whether the command line takes it several times."""
 
 
 def option(

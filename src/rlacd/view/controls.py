@@ -64,33 +64,22 @@ def passes_of(controls: dict[str, Any]) -> list[dict[str, Any]]:
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """An input shown in the viewer.
-
-    Attributes
-    ----------
-    path : pathlib.Path
-        Read again for every decomposition.
-    name : str
-        Shown on the page.
-    up : {"x", "y", "z"}
-        The axis that points up.
-    unit : str
-        The unit of length if the format defines one; else empty.
-    mesh : InputMesh
-        The mesh as first read.
-    up_is_guess : bool
-        Whether the file does not say which axis points up.
-    is_robot : bool
-        Whether it is a robot, which becomes a robot.
-    """
+    """An input shown in the viewer."""
 
     path: Path
+    """Read again for every decomposition."""
     name: str
+    """Shown on the page."""
     up: str
+    """The axis that points up."""
     unit: str
+    """The unit of length if the format defines one; else empty."""
     mesh: InputMesh
+    """The mesh as first read."""
     up_is_guess: bool = False
+    """Whether the file does not say which axis points up."""
     is_robot: bool = False
+    """Whether it is a robot, which becomes a robot."""
 
 
 def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject:

@@ -26,27 +26,18 @@ FOLDERS = ("obj", "stl")
 
 @dataclass(frozen=True)
 class Offer:
-    """An entry of the download menu.
-
-    Attributes
-    ----------
-    name
-        The name that `download` takes.
-    label
-        Its text in the menu.
-    hint
-        A sentence about its content.
-    group
-        The heading it is listed under.
-    missing
-        Why it is unavailable here; None if it is available.
-    """
+    """An entry of the download menu."""
 
     name: str
+    """The name that `download` takes."""
     label: str
+    """Its text in the menu."""
     hint: str
+    """A sentence about its content."""
     group: str
+    """The heading it is listed under."""
     missing: str | None = None
+    """Why it is unavailable here; None if it is available."""
 
 
 def offered() -> list[Offer]:

@@ -21,27 +21,18 @@ from rlacd.io.robots.robot import Body, Collider, Results, Robot, Written
 
 @dataclass(frozen=True, eq=False)
 class RewrittenLink:
-    """A link (URDF), body (MJCF) or rigid body (USD) whose collision meshes were replaced.
-
-    Attributes
-    ----------
-    name
-        As in the file; of a USD stage its path.
-    meshes
-        The files of its collision meshes, or the paths of their prims.
-    hulls
-        In the frame of the link, in the robot's unit.
-    files
-        The names of the hulls' files.
-    results
-        The decomposition of each of its solids, in the frame of the solid's first mesh.
-    """
+    """A link (URDF), body (MJCF) or rigid body (USD) whose collision meshes were replaced."""
 
     name: str
+    """As in the file; of a USD stage its path."""
     meshes: Sequence[Path]
+    """The files of its collision meshes, or the paths of their prims."""
     hulls: Sequence[trimesh.Trimesh]
+    """In the frame of the link, in the robot's unit."""
     files: Sequence[str]
+    """The names of the hulls' files."""
     results: Sequence[Decomposition]
+    """The decomposition of each of its solids, in the frame of the solid's first mesh."""
 
     @classmethod
     def of(cls, body: Body, results: Results, names: Mapping[Collider, Sequence[str]]) -> RewrittenLink:
@@ -58,39 +49,26 @@ class RewrittenLink:
 
 @dataclass(frozen=True, eq=False)
 class Rewritten:
-    """The result of rewriting a robot.
-
-    Attributes
-    ----------
-    path
-        The new description.
-    folder
-        Where its hulls are, as OBJ files.
-    links
-        The links with collision meshes, which hulls replaced.
-    warnings
-        What the user should know: one sentence each.
-    seconds
-        Wall time.
-    size
-        The longest side of the box around all meshes that were replaced, with all joints at zero.
-    metres
-        The robot's unit of length.
-    pairs
-        What each two of the links do at the joint positions that were looked at; empty if none were.
-    samples
-        How many those are.
-    """
+    """The result of rewriting a robot."""
 
     path: Path
+    """The new description."""
     folder: Path
+    """Where its hulls are, as OBJ files."""
     links: list[RewrittenLink]
+    """The links with collision meshes, which hulls replaced."""
     warnings: list[str]
+    """What the user should know: one sentence each."""
     seconds: float
+    """Wall time."""
     size: float
+    """The longest side of the box around all meshes that were replaced, with all joints at zero."""
     metres: float = 1.0
+    """The robot's unit of length."""
     pairs: Sequence[LinkPair] = ()
+    """What each two of the links do at the joint positions that were looked at; empty if none were."""
     samples: int = 0
+    """How many those are."""
     _source: tuple[Robot, Checked] | None = None
 
     @property

@@ -33,33 +33,22 @@ TO_Z_UP = {
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A body to write; all lengths in the input's own unit and frame.
-
-    Attributes
-    ----------
-    name
-        Printable, without line breaks; from the name of the user's file.
-    hulls
-        At least one.
-    primitives
-        For each hull what it stands for, or None.
-    visual
-        The input as it was read; None for a point cloud.
-    mass
-        Of the repaired solid without its closed cavities, at the requested density.
-    up
-        The axis of the input that points up.
-    is_scene
-        Whether to add a floor and a light, where the format has them.
-    """
+    """A body to write; all lengths in the input's own unit and frame."""
 
     name: str
+    """Printable, without line breaks; from the name of the user's file."""
     hulls: Sequence[trimesh.Trimesh]
+    """At least one."""
     primitives: Sequence[Primitive | None]
+    """For each hull what it stands for, or None."""
     visual: trimesh.Trimesh | None
+    """The input as it was read; None for a point cloud."""
     mass: Mass
+    """Of the repaired solid without its closed cavities, at the requested density."""
     up: str
+    """The axis of the input that points up."""
     is_scene: bool = False
+    """Whether to add a floor and a light, where the format has them."""
 
 
 class Look(NamedTuple):
@@ -80,24 +69,16 @@ class Painted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """A mesh file beside the model: its name, content, and position in the body's frame.
-
-    Attributes
-    ----------
-    name
-        File name.
-    data
-        Its bytes.
-    shift
-        ``[3]``; zero unless the body lies too far from its origin for float32.
-    look
-        What it looks like, if that is known.
-    """
+    """A mesh file beside the model: its name, content, and position in the body's frame."""
 
     name: str
+    """File name."""
     data: bytes
+    """Its bytes."""
     shift: FloatArray
+    """``[3]``; zero unless the body lies too far from its origin for float32."""
     look: Look | None = None
+    """What it looks like, if that is known."""
 
     @property
     def picture_name(self) -> str:

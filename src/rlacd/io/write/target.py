@@ -56,21 +56,14 @@ SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
 
 @dataclass(frozen=True)
 class Target:
-    """A checked output: one file, or a folder with one file per hull.
-
-    Attributes
-    ----------
-    path
-        The file or folder.
-    file_format
-        One of `FORMATS` or of `MODELS`.
-    is_folder
-        Whether `path` is a folder.
-    """
+    """A checked output: one file, or a folder with one file per hull."""
 
     path: Path
+    """The file or folder."""
     file_format: str
+    """One of `FORMATS` or of `MODELS`."""
     is_folder: bool
+    """Whether `path` is a folder."""
 
 
 def hull_target(path: str | os.PathLike[str], asked: OutputOptions | None = None) -> Target:
