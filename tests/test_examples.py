@@ -22,7 +22,7 @@ import rlacd
 from rlacd.cli.main import app
 from rlacd.compat import coacd
 from rlacd.view import viewer
-from tests.option_table import PAGE, STUB, options_table, signature
+from tests.option_table import PAGE, STUB, options_table, signatures
 from tests.scripts import script
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -145,7 +145,7 @@ def test_the_table_names_every_option_and_the_command_offers_every_argument() ->
 
 
 def test_editors_and_type_checkers_see_the_options_as_they_are_stated_once() -> None:
-    assert STUB.read_text(encoding="utf-8").endswith(signature()), "run  python -m tests.option_table"
+    assert STUB.read_text(encoding="utf-8").endswith(signatures()), "run  python -m tests.option_table"
 
 
 @pytest.mark.nightly

@@ -1,4 +1,5 @@
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from numpy.typing import ArrayLike
@@ -17,13 +18,13 @@ from rlacd.errors import OptionError as OptionError
 from rlacd.errors import OutputError as OutputError
 from rlacd.errors import RlacdError as RlacdError
 from rlacd.io.robots import Rewritten as Rewritten
-from rlacd.io.robots import rewrite_robot as rewrite_robot
 from rlacd.options import DetailName, OpenName, QualityName, RelativeTo, UnitName, VolumeOf
 from rlacd.options.names import PrimitiveKind
 from rlacd.options.navigable import NavigableSpace as NavigableSpace
 from rlacd.options.presets import PRESETS as PRESETS
 from rlacd.options.presets import Preset as Preset
 from rlacd.options.presets import PresetName
+from rlacd.options.robots import PairKind, Per
 from rlacd.planes.sweep import Sweep as Sweep
 from rlacd.planes.sweep import SweepCache as SweepCache
 from rlacd.policies import Policy as Policy
@@ -197,6 +198,8 @@ def decompose(
         they are.
     scale : float | None
         Multiply the mesh's coordinates by this. A conversion by `unit` comes first. Default: 1.
+    **options
+        Given by their names.
 
     Returns
     -------
@@ -215,4 +218,103 @@ def decompose(
     -----
     DecompositionWarning
         What ``report.warnings`` says, once a call.
+    """
+
+def rewrite_robot(
+    robot: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    *,
+    package_dirs: Sequence[str] = (),
+    keep_input: bool = False,
+    progress: ProgressCallback | None = None,
+    per: Per | None = "link",
+    links: Mapping[str, float] | None = None,
+    samples: int | None = 500,
+    exclude: str | Sequence[PairKind] | None = (),
+    srdf: str | os.PathLike[str] | None = None,
+    criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = None,
+    threshold: float | None = None,
+    threshold_abs: float | None = None,
+    volume_tolerance: float | None = None,
+    volume_of: VolumeOf | None = None,
+    max_hulls: int | None = None,
+    max_vertices: int | None = None,
+    max_faces: int | None = None,
+    detail: DetailName | None = None,
+    primitives: bool | Sequence[PrimitiveKind] | None = None,
+    overlap: float | None = None,
+    overlap_abs: float | None = None,
+    keep_open: float | None = None,
+    keep_open_abs: float | None = None,
+    avoid: Sequence[MeshLike] | None = None,
+    merge: bool | None = None,
+    policy: str | Policy | None = None,
+    resolution: int | None = None,
+    open: OpenName | None = None,
+    keep_cavities: bool | None = None,
+    gap: float | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    timeout: float | None = None,
+    quality: QualityName | None = None,
+    budget: float | None = None,
+    search_steps: int | None = None,
+    preset: PresetName | None = None,
+    per_node: bool | None = None,
+    relative_to: RelativeTo | None = None,
+    unit: UnitName | None = None,
+    scale: float | None = None,
+) -> Rewritten:
+    """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
+
+    Parameters
+    ----------
+    robot : path-like
+        ``*.urdf``, ``*.xml`` for MJCF, or a USD stage (``*.usd``, ``*.usda``, ``*.usdc``). Its meshes are looked up
+        relative to it and in packages (``package://NAME/...``), never outside the packages it refers to and
+        `package_dirs`; a USD stage refers only to files in its folder or below.
+    output : path-like
+        The new file, of the same kind. Hulls go to a folder beside it, ``robot_acd_urdf`` for ``robot_acd.urdf``. For a
+        USD stage it is a layer over the original, which it refers to, and holds the hulls.
+    package_dirs : sequence of str
+        ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and is searched for packages.
+    keep_input : bool
+        Of a USD stage, write one file that holds all of it, instead of a layer over the original.
+    progress : callable, optional
+        As for `rlacd.decompose`.
+    per : Per
+        What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
+        Links that fixed joints connect stay apart; so do MJCF geoms with a name, and meshes that belong to no body.
+        Default: link.
+    links : Mapping[str, float] | None
+        Another distance for the links whose whole name matches a regular expression; the last that matches counts. It
+        stands for `threshold_abs`: ``{"finger.*": 0.001}``.
+    samples : int
+        Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
+        extra rlacd[clear]. Where hulls of such links would touch, they are cut finer, or a warning names both. USD
+        stages are looked at as they stand. Default: 500.
+    exclude : str | Sequence[PairKind]
+        Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD: adjacent,
+        always or never in contact at these positions. Of bodies of a stage, only those that a joint connects are known.
+        Default: none.
+    srdf : str | os.PathLike[str] | None
+        Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.
+    **options
+        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
+        the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
+        ``relative_to="mesh"`` to each solid, whose criterion and threshold are then those of `rlacd.decompose`. Lengths
+        such as `threshold_abs` are in the robot's unit, after the scale of a mesh. A `timeout` applies to each solid.
+
+    Returns
+    -------
+    Rewritten
+
+    Raises
+    ------
+    MeshError
+        The file or one of its meshes cannot be read, is not allowed to be read, or there is none to replace.
+    OptionError
+        An option is out of range, or `output` is not of the same kind as `robot`.
+    OutputError
+        The place cannot be written to.
     """

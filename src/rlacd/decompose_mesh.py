@@ -66,6 +66,7 @@ def decompose(
         Called with a `Progress` between steps, and several times a second during long ones; when it returns False
         (or 0, but not None), the decomposition reached so far is returned as promptly as after a timeout.
     **options
+        Given by their names.
 
     Returns
     -------

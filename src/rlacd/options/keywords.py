@@ -50,9 +50,13 @@ def suggesting(
     return completed
 
 
-def taking(options: type[Any]) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:
-    """State in the signature and the docstring of a function that ends with ``**options`` every one of a dataclass."""
-    known: dict[str, About] = {field.name: field.metadata["option"] for field in dataclasses.fields(options)}
+def taking(options: type[Any], *others: type[Any]) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:
+    """State the options of dataclasses in the signature of a function that ends with ``**options``.
+
+    Its docstring explains those of the first, before what it says of ``**options``. Defaults of the others are its own.
+    """
+    fields, more = dataclasses.fields(options), [field for one in others for field in dataclasses.fields(one)]
+    known: dict[str, About] = {field.name: field.metadata["option"] for field in fields}
     names = {flag: name for name, each in known.items() for flag in each.flags[0].split("/")}
 
     def explained(name: str, kind: str) -> str:
@@ -61,12 +65,13 @@ def taking(options: type[Any]) -> Callable[[Callable[Given, Returned]], Callable
         return f"    {name} : {kind}\n{textwrap.indent(textwrap.fill(said, 112), ' ' * 8)}\n"
 
     def completed(function: Callable[Given, Returned]) -> Callable[Given, Returned]:
-        signature, fields = inspect.signature(function), dataclasses.fields(options)
-        own = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
-        more = [inspect.Parameter(f.name, own[-1].KEYWORD_ONLY, default=f.default, annotation=f.type) for f in fields]
-        function.__signature__ = signature.replace(parameters=[*own, *more])  # type: ignore[attr-defined]
+        signature, keyword = inspect.signature(function), inspect.Parameter.KEYWORD_ONLY
+        own = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
+        own += [inspect.Parameter(f.name, keyword, default=f.default, annotation=f.type) for f in fields]
+        own += [inspect.Parameter(f.name, keyword, default=None, annotation=f.type) for f in more]
+        function.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
         said = "".join(explained(field.name, str(field.type)) for field in fields)
-        function.__doc__ = (function.__doc__ or "").replace("    **options\n", said)
+        function.__doc__ = (function.__doc__ or "").replace("    **options\n", f"{said}    **options\n")
         return function
 
     return completed
