@@ -41,9 +41,9 @@ def measure(mesh: Any, family: str, share: float) -> tuple[int, float, bool]:
     hulls = [hull for each in result if (hull := Hull.of(frame.to_frame(each.vertices)))]
     missed = hull_union(hulls, 1).distance(points, 1)
     under, lost = float(missed.max()), frame.to_input(points[missed.argmax()])
-    holes = result.report["holes"]
-    is_hole = any(np.linalg.norm(lost - hole["at_abs"]) <= hole["width_abs"] for hole in holes)
-    places = any(re.search(r" (at|near) \(", warning) for warning in result.report["warnings"])
+    holes = result.report.holes
+    is_hole = any(np.linalg.norm(lost - hole.at_abs) <= hole.width_abs for hole in holes)
+    places = any(re.search(r" (at|near) \(", warning) for warning in result.report.warnings)
     return len(result), under, under <= UNDER or (is_hole and places)
 
 

@@ -83,7 +83,7 @@ def app(bench: Bench, methods: str, piles: int, worlds: int | None) -> Page:
 def _decompositions(bench: Bench, mesh: str, ways: Sequence[str]) -> Iterator[tuple[str, Result | str, float]]:
     """Hulls, or why there are none, and the CPU seconds that they took."""
     scaled, factor, centre = scaled_source(bench.meshes / mesh)
-    mass = decompose(scaled, threads=1, **rlacd_options(ONE_HULL)).report["mass"]
+    mass = decompose(scaled, threads=1, **rlacd_options(ONE_HULL)).report.mass
     for way in ways:
         if way not in OTHERS:
             began = time.process_time()
@@ -97,7 +97,7 @@ def _decompositions(bench: Bench, mesh: str, ways: Sequence[str]) -> Iterator[tu
         hulls, _ = load_hulls(bench.hulls_of(task))
         shapes = [trimesh.Trimesh((v - centre) * factor, f, process=False) for v, f in hulls]
         source = trimesh.Trimesh(*scaled, process=False)
-        yield way, Result(shapes, {"name": "mesh", "mass": mass}, source), row["cpu"]
+        yield way, Result.of(shapes, source, mass=mass), row["cpu"]
 
 
 def _simulated(result: Result, piles: int, worlds: int | None) -> Row:
@@ -107,7 +107,7 @@ def _simulated(result: Result, piles: int, worlds: int | None) -> Row:
         "primitives": sum(each is not None for each in getattr(result, "primitives", [])),
         "vertices": statistics.fmean(len(hull.vertices) for hull in result.hulls),
         "bytes": model_size(result),
-        "over": result.report.get("hausdorff", {}).get("over"),  # unknown for other tools
+        "over": result.report.hausdorff.over,  # unknown for other tools
         "volume": float(sum(hull.volume for hull in result.hulls)),
         **asdict(drops_in_mujoco(result)),
         "rate": statistics.geometric_mean(rates),

@@ -56,7 +56,7 @@ def rewritten(robot: Path, way: str, options: dict[str, Any], packages: list[str
             how: dict[str, Any] = {"per": "mesh", "relative_to": "mesh"} if way == "own" else {}
             done = rlacd.rewrite_robot(robot, place, package_dirs=packages, threads=1, **how, **options)
             cpu, deepest = time.process_time() - began, max((pair.new_depth for pair in done.pairs), default=0.0)
-            row = {**done.report(), "links": len(done.links), "cpu": cpu, "deepest": deepest}
+            row = {**done.as_dict(), "links": len(done.links), "cpu": cpu, "deepest": deepest}
         write_file(kept, json.dumps(row).encode())
     return {**json.loads(kept.read_bytes()), "place": place}
 
@@ -68,7 +68,7 @@ def _by_coacd(robot: Path, place: Path, packages: list[str], store: Path) -> dic
     for collider in (collider for body in read.bodies for collider in body.colliders):
         mesh = collider.mesh()
         hulls, seconds = _stored(method, np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32), store)
-        results[collider] = Decomposition(hulls, {}, mesh)
+        results[collider] = Decomposition.of(hulls, mesh)
         cpu += seconds
     read.write(place, results, None, RobotOptions(), whole=False)
     bodies = [Body(body.name, _surface(body.mesh()), [*map(_surface, body.hulls(results))]) for body in read.bodies]

@@ -1,4 +1,4 @@
-"""What the site is made from at each build: the command line's help, the tests of the promises, a mesh to turn."""
+"""What the site is made from at each build: the commands' help, a schema, the tests of the promises, a mesh to turn."""
 
 from __future__ import annotations
 
@@ -23,6 +23,17 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
         return with_tests(markdown)
     return markdown
+
+
+def on_files(files: Any, config: Any) -> Any:
+    """Put the JSON schema of a report beside the page about it."""
+    from mkdocs.structure.files import File
+
+    from rlacd.plain_json import to_json
+    from rlacd.report import Report
+
+    files.append(File.generated(config, "reference/report.schema.json", content=to_json(Report.schema())))
+    return files
 
 
 def on_post_build(config: Any) -> None:

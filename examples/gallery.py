@@ -52,8 +52,8 @@ def main(meshes: Path, out: Path) -> None:
                 shown = picture.convert("RGB").crop((0, int(TITLE * picture.height), picture.width, picture.height))
                 shown.resize((WIDTH, shown.height * WIDTH // shown.width)).save(out / f"{stem}.webp", quality=80)
         report = result.report
-        cells = [f"{len(result.source.faces):,}", str(report["parts"]), f"{report['faces']:,}"]
-        print(f"| {stem} | {' | '.join(cells)} | {report['hausdorff']['over']:.3f} |", flush=True)
+        cells = [f"{len(result.source.faces):,}", str(report.parts), f"{report.faces:,}"]
+        print(f"| {stem} | {' | '.join(cells)} | {report.hausdorff.over:.3f} |", flush=True)
 
 
 if __name__ == "__main__":

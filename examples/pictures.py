@@ -15,6 +15,7 @@ import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -108,7 +109,7 @@ def kettles(path: Path) -> list[Image.Image]:
     theirs = coacd.run_coacd(coacd.Mesh(own.source.vertices, own.source.faces), seed=0)
     hulls = [trimesh.Trimesh(vertices, faces, process=False) for vertices, faces in theirs]
     rows = []
-    for name, result in (("CoACD", Result(hulls, {}, own.source, input=own.input)), ("rlacd", own)):
+    for name, result in (("CoACD", replace(Result.of(hulls, own.source), input=own.input)), ("rlacd", own)):
         row = panels(result, up="y")
         text = f"{name}: {len(result)} hulls, {sum(len(hull.faces) for hull in result):,} triangles"
         ImageDraw.Draw(row).text((24, 20), text, font=ImageFont.load_default(size=22), fill="black")

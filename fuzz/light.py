@@ -323,7 +323,7 @@ def _decomposed(shape: Shape, options: Options) -> tuple[str, list[str], int]:
         return "memory", [repr(error)], 0
     except Exception as error:
         return "untyped", [f"{type(error).__name__}: {error!s:.300}"], 0
-    report = {**result.report, "concavity": (result.report.get("concavity") or {}).get("max")}
+    report = {**(plain := result.report.as_dict()), "concavity": plain.get("concavity", {}).get("max")}
     hulls = [(np.array(hull.vertices), np.array(hull.faces)) for hull in result]
     said = judge(Case(shape, options, hulls, report), SAMPLES)
     return "wrong" if said else "done", said, len(hulls)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,6 +15,7 @@ import trimesh
 from fuzz.geometry import why_not_convex
 from rlacd._native import convex_hull
 from rlacd.decomposition import Decomposition
+from rlacd.report import Report
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.hull import Hull
 
@@ -32,7 +35,12 @@ def save_hulls(
     file_format: str | None = None,
 ) -> Path:
     """Write hulls without the mesh they come from."""
-    return Decomposition(list(hulls), {"name": stem}, trimesh.Trimesh()).save(path, file_format=file_format)
+    return Decomposition.of(list(hulls), trimesh.Trimesh(), name=stem).save(path, file_format=file_format)
+
+
+def strict_json(report: Report) -> str:
+    """The report as JSON; raises if a number is not finite."""
+    return json.dumps(dataclasses.asdict(report), allow_nan=False, default=np.ndarray.tolist)
 
 
 def random_hull(seed: int, count: int = 24) -> trimesh.Trimesh:

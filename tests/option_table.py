@@ -1,13 +1,20 @@
-"""The documentation's table of options, made from where they are stated: ``python -m tests.option_table`` writes it."""
+"""The documentation's table of options and the public signatures, made from where they are stated.
+
+``python -m tests.option_table`` writes both.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from rlacd.decompose_mesh import decompose
+from rlacd.io.robots import rewrite_robot
 from rlacd.options import Options
 from rlacd.options.fields import About
 from rlacd.options.navigable import NavigableSpace
@@ -47,5 +54,32 @@ def written(page: str) -> str:
     return "\n".join([*lines[:begin], *options_table().splitlines(), *lines[end:], ""])
 
 
+STUB = Path(__file__).parents[1] / "src" / "rlacd" / "__init__.pyi"
+
+
+def signatures() -> str:
+    """The public functions with every option, for editors and type checkers; None is the same as leaving one out."""
+    return "\n".join(map(_signature, (decompose, rewrite_robot)))
+
+
+def _signature(function: Callable[..., Any]) -> str:
+    lines, stars = [f"def {function.__name__}("], False
+    for name, parameter in inspect.signature(function).parameters.items():
+        kind, is_option = (
+            str(parameter.annotation).replace("'", '"'),
+            hasattr(Options, name) or hasattr(RobotOptions, name),
+        )
+        kind += " | None" if is_option and not kind.endswith("None") else ""
+        default = "" if parameter.default is parameter.empty else f" = {parameter.default!r}".replace("'", '"')
+        lines += ["    *,"] if parameter.kind is parameter.KEYWORD_ONLY and not stars else []
+        stars = parameter.kind is parameter.KEYWORD_ONLY
+        lines.append(f"    {name}: {kind}{default},")
+    said = textwrap.indent(f'"""{inspect.cleandoc(function.__doc__ or "")}\n"""', "    ")
+    made = inspect.signature(function).return_annotation
+    return "\n".join([*lines, f") -> {made}:", *(line.rstrip() for line in said.splitlines()), ""])
+
+
 if __name__ == "__main__":
+    stub = STUB.read_text(encoding="utf-8").partition("def decompose(")[0]
+    STUB.write_text(stub + signatures(), encoding="utf-8")
     PAGE.write_text(written(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

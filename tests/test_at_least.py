@@ -43,7 +43,7 @@ def points_of(solid: Component, count: int = 120) -> Floats:
 @pytest.mark.parametrize("teeth", [2, 3, 5])
 def test_a_comb_needs_a_hull_for_every_tooth(teeth: int) -> None:
     result = rlacd.decompose(trimesh_of(comb(teeth)), threads=1)
-    assert teeth <= result.report["at_least"] <= len(result)
+    assert teeth <= result.report.at_least <= len(result)
     solid, slices = Component(comb(teeth)), []
     for x in np.linspace(-0.8, 0.8, 15).tolist():
         below, solid = solid.cut(Plane((1.0, 0.0, 0.0), x))
@@ -94,7 +94,7 @@ def test_no_valid_hull_of_a_real_mesh_holds_two_of_the_points(corpus: Path, name
 
 def test_the_summary_says_what_is_proved() -> None:
     result = rlacd.decompose(trimesh_of(comb(3)), threads=1)
-    least = result.report["at_least"]
+    least = result.report.at_least
     words = "hulls" if least == len(result) else f"than {least} hulls"
     assert f"no decomposition to this tolerance has fewer {words}" in summary(result, "x.obj")
-    assert rlacd.decompose(trimesh_of(comb(3)), quality="fast", threads=1).report["at_least"] is None
+    assert rlacd.decompose(trimesh_of(comb(3)), quality="fast", threads=1).report.at_least is None

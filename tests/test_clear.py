@@ -82,7 +82,7 @@ def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: 
         element.get("reason") for element in etree.parse(str(tmp_path / "row.srdf")).iterfind("disable_collisions")
     ]
     assert reasons == ["Adjacent", "Default", "Adjacent"]
-    assert done.report()["pairs"][1]["contact"] == "always"
+    assert done.as_dict()["pairs"][1]["contact"] == "always"
 
 
 ARM = """<mujoco><asset><mesh name="box" file="box.obj"/></asset><worldbody>
@@ -218,7 +218,7 @@ def test_nodes_of_a_scene_that_do_not_touch_do_not_as_hulls() -> None:
     apart = [rlacd.decompose(mesh, threshold_abs=0.03 * 0.413, quality="fast", threads=1) for mesh in parts.values()]
     alone = [b.with_hulls([Surface(h.vertices, h.faces) for h in own]) for b, own in zip(bodies, apart, strict=True)]
     assert len(check(alone, at_rest(list(parts)))) == 1, "each for itself, their hulls touch"
-    assert not [warning for warning in done.report["warnings"] if "touch" in warning]
+    assert not [warning for warning in done.report.warnings if "touch" in warning]
 
 
 def test_a_model_that_mujoco_does_not_load_is_checked_at_rest_and_that_is_said(arm: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -17,7 +16,7 @@ from rlacd.criteria import Concavity
 from rlacd.policies import POLICIES
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import Hull
-from tests.hulls import assert_convex_hull, assert_same_hulls
+from tests.hulls import assert_convex_hull, assert_same_hulls, strict_json
 from tests.shapes import table, to_manifold, trimesh_of
 
 
@@ -31,15 +30,15 @@ SHAPES = {"table": table, "cup": cup, "torus": lambda: trimesh.creation.torus(1,
 
 def assert_keeps_promises(result: rlacd.Decomposition, threshold: float) -> None:
     report = result.report
-    assert report["complete"]
-    assert len(result) == report["parts"] == len(result.hulls) == len(report["concavity"]["per_part"])
-    assert report["faces"] == sum(len(hull.faces) for hull in result)
+    assert report.complete
+    assert len(result) == report.parts == len(result.hulls) == len(report.concavity.per_part)
+    assert report.faces == sum(len(hull.faces) for hull in result)
     for hull in result:
         assert_convex_hull(hull)
-    assert report["concavity"]["max"] == max(report["concavity"]["per_part"]) <= threshold
-    assert report["hausdorff"]["under"] < 0.005
-    assert report["hausdorff"]["over"] < threshold + 0.005
-    json.dumps(report, allow_nan=False)
+    assert report.concavity.max == max(report.concavity.per_part) <= threshold
+    assert report.hausdorff.under < 0.005
+    assert report.hausdorff.over < threshold + 0.005
+    strict_json(result.report)
 
 
 @pytest.mark.parametrize("threshold", [0.02, 0.05, 0.2])
@@ -56,7 +55,7 @@ def test_convex_input_is_one_hull_exactly() -> None:
     result = rlacd.decompose(ball, detail="full")
     assert len(result) == 1
     assert sorted(result.hulls[0].vertices.tolist()) == sorted(ball.vertices.tolist())
-    assert result.report["concavity"]["max"] < 1e-6
+    assert result.report.concavity.max < 1e-6
 
 
 @pytest.mark.slow
@@ -65,8 +64,8 @@ def test_dense_convex_input_is_one_hull_that_is_simple_only_as_the_threshold_all
     """What a simple hull adds all around counts for CoACD's concavity: here it alone would exceed the threshold."""
     result = rlacd.decompose(trimesh.creation.icosphere(5), threshold=0.003, quality="fast")
     assert len(result) == 1
-    assert result.report["concavity"]["max"] <= 0.003
-    assert not result.report["warnings"]
+    assert result.report.concavity.max <= 0.003
+    assert not result.report.warnings
 
 
 @pytest.mark.parametrize(
@@ -110,7 +109,7 @@ def test_every_kind_of_input_gives_the_same(source: str, tmp_path) -> None:
     assert len(result) == len(reference)
     for a, b in zip(result, reference, strict=True):
         assert a.vertices == pytest.approx(b.vertices)
-    assert result.report["name"] == ("table" if source == "path" else "mesh")
+    assert result.report.name == ("table" if source == "path" else "mesh")
 
 
 FAST: list[dict[str, Any]] = [
@@ -133,7 +132,7 @@ def test_same_bytes_for_any_number_of_threads_and_any_run(options: dict[str, Any
     assert_same_hulls(*runs)
     for other in runs[1:]:
         same = ("concavity", "volume", "navigable", "overlap", "passages", "repair", "warnings")
-        assert all(other.report.get(key) == runs[0].report.get(key) for key in same)
+        assert all(other.report.as_dict().get(key) == runs[0].report.as_dict().get(key) for key in same)
 
 
 @pytest.mark.slow
@@ -156,11 +155,11 @@ def test_under_low_limits_parts_are_cut_on_while_hulls_are_left_and_a_warning_te
     assert len(tiny) == len(none) == len(free) < len(few) <= len(free) + 1 < len(cut) <= 1.5 * len(free)
     for result, most in ((cut, 8), (few, 8), (none, 8), (tiny, 5)):
         assert max(len(hull.vertices) for hull in result) <= most
-        assert result.report["hausdorff"]["under"] < 0.005
-    assert not any("out by" in warning for warning in cut.report["warnings"])
+        assert result.report.hausdorff.under < 0.005
+    assert not any("out by" in warning for warning in cut.report.warnings)
     for result in (few, none, tiny):
-        assert result.report["concavity"]["max"] > 0.1
-        assert any("out by up to" in warning for warning in result.report["warnings"])
+        assert result.report.concavity.max > 0.1
+        assert any("out by up to" in warning for warning in result.report.warnings)
 
 
 @pytest.mark.promise("clock")
@@ -168,7 +167,7 @@ def test_a_timeout_after_the_work_is_done_changes_nothing() -> None:
     stages: list[str] = []
     result = rlacd.decompose(cup(), progress=lambda p: stages.append(p.stage) or p.stage not in ("finish", "measure"))
     assert stages[-1] == "measure"
-    assert result.report["complete"]
+    assert result.report.complete
 
 
 @pytest.mark.slow
@@ -190,7 +189,7 @@ def test_concavity_of_the_merged_parts_is_that_of_the_solid_inside_their_hulls()
     """A merged part is a glued surface; cut the solid anew along its hull and measure that instead."""
     mesh = SHAPES["torus"]()
     result = rlacd.decompose(mesh)
-    scale = result.report["scale"]
+    scale = result.report.scale
     center = mesh.bounds.mean(axis=0)
     solid = to_manifold((mesh.vertices - center) * scale, mesh.faces)
     total = 0.0
@@ -214,6 +213,6 @@ def test_real_meshes(corpus) -> None:
         report = result.report
         for hull in result:
             assert_convex_hull(hull)
-        assert report["concavity"]["max"] <= 0.05, name
-        assert report["hausdorff"]["over"] <= 0.055 or report["warnings"], name
-        assert report["hausdorff"]["under"] <= 0.01, name
+        assert report.concavity.max <= 0.05, name
+        assert report.hausdorff.over <= 0.055 or report.warnings, name
+        assert report.hausdorff.under <= 0.01, name

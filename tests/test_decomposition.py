@@ -20,6 +20,7 @@ from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.finish.finish import in_input
+from rlacd.fit import LengthFit
 from rlacd.options.presets import HullLimits
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
@@ -30,7 +31,7 @@ SOURCE = trimesh.creation.box()
 
 def result(count: int = 2, **report: object) -> Decomposition:
     hulls = [random_hull(seed) for seed in range(count)]
-    return Decomposition(hulls, {"name": "cup", "complete": True, "concavity": {"max": 0.0312}, **report}, SOURCE)
+    return Decomposition.of(hulls, SOURCE, **{"name": "cup", "concavity": LengthFit(None, 0.0312, 0.05), **report})
 
 
 def test_hulls_are_got_by_index_and_slice() -> None:
@@ -79,10 +80,10 @@ def test_show_opens_a_page_in_the_browser(real: Decomposition, monkeypatch: pyte
 def test_it_describes_itself_in_one_line() -> None:
     cup = result(2)
     faces = sum(len(hull.faces) for hull in cup)
-    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} triangles, concavity at most 0.0312>"
+    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} triangles, concavity at most 0.0312 (threshold 0.05)>"
     assert "1 hull of" in repr(result(1))
     assert "stopped early by timeout" in repr(result(2, complete=False, stopped_by="timeout"))
-    assert repr(Decomposition([], {}, SOURCE)) == "<Decomposition: 0 hulls of mesh, 0 triangles>"
+    assert repr(Decomposition.of([], SOURCE)) == "<Decomposition: 0 hulls of mesh, 0 triangles>"
 
 
 def test_it_cannot_be_changed_and_is_compared_by_identity() -> None:
@@ -162,4 +163,4 @@ def test_what_is_delivered_is_what_is_measured():
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
     scale = 2 / (upper - lower).max()
     beyond = max((hull.vertices - upper).max() for hull in result) * scale
-    assert result.report["hausdorff"]["over"] >= beyond - 1e-5
+    assert result.report.hausdorff.over >= beyond - 1e-5

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import inspect
 import re
@@ -24,9 +23,8 @@ from click.testing import CliRunner
 import rlacd
 from rlacd.cli.main import app
 from rlacd.compat import coacd
-from rlacd.options import Options
 from rlacd.view import viewer
-from tests.option_table import PAGE, options_table
+from tests.option_table import PAGE, STUB, options_table, signatures
 from tests.scripts import script
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -73,9 +71,9 @@ def test_rows_of_the_gallery_are_what_the_objects_give(corpus: Path, name: str) 
     pytest.importorskip("PIL", reason="the extra view is not installed")
     assert len(gallery()) == len(OBJECTS) == 12
     result = rlacd.decompose(corpus / "test" / name)
-    cells = [f"{len(result.source.faces):,}", str(len(result)), f"{result.report['faces']:,}"]
+    cells = [f"{len(result.source.faces):,}", str(len(result)), f"{result.report.faces:,}"]
     stem = Path(name).stem.partition("-")[0].lower()
-    assert gallery()[stem] == [*cells, f"{result.report['hausdorff']['over']:.3f}"]
+    assert gallery()[stem] == [*cells, f"{result.report.hausdorff.over:.3f}"]
     assert (ROOT / "docs" / "gallery_objects" / f"{stem}.webp").is_file()
 
 
@@ -148,14 +146,8 @@ def test_the_table_names_every_option_and_the_command_offers_every_argument() ->
     assert {name for name in arguments if f"`{name}`" not in table} == set()
 
 
-def test_the_function_has_the_options_as_they_are_stated_once() -> None:
-    given = inspect.signature(rlacd.decompose).parameters
-    for field in dataclasses.fields(Options):
-        overridable = given[field.name].annotation == f"{field.type} | None"
-        assert given[field.name].default == (None if overridable else field.default)
-        if field.name != "criterion":  # a class that has the criterion's own methods
-            assert overridable or given[field.name].annotation == field.type
-    assert set(given) == {field.name for field in dataclasses.fields(Options)} | INPUT | {"progress"}
+def test_editors_and_type_checkers_see_the_options_as_they_are_stated_once() -> None:
+    assert STUB.read_text(encoding="utf-8").endswith(signatures()), "run  python -m tests.option_table"
 
 
 @pytest.mark.nightly

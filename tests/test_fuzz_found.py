@@ -89,7 +89,7 @@ def test_a_hull_of_few_faces_that_leaves_the_room_for_balls_is_reported(faces: i
     """A tetrahedron around a cube reaches twice its length out of it; where it goes, no balls had been placed."""
     cube = trimesh.creation.box((1, 1, 1))
     result = rlacd.decompose(cube, criterion=rlacd.NavigableSpace(0.4, 0.005), max_faces=faces, quality="fast")
-    assert any("bounding box" in warning for warning in result.report["warnings"]) is said
+    assert any("bounding box" in warning for warning in result.report.warnings) is said
 
 
 def test_a_mesh_of_a_few_steps_of_floating_point_is_reported() -> None:
@@ -100,7 +100,7 @@ def test_a_mesh_of_a_few_steps_of_floating_point_is_reported() -> None:
     near.vertices = cube.vertices + 1e3
     for mesh, said in ((far, True), (near, False)):
         report = rlacd.decompose(mesh, quality="fast").report
-        assert any("move the mesh to the origin" in warning for warning in report["warnings"]) is said
+        assert any("move the mesh to the origin" in warning for warning in report.warnings) is said
 
 
 def test_a_needle_of_inverted_shells_has_a_mass() -> None:

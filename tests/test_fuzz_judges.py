@@ -27,7 +27,7 @@ ELL = from_manifold(box((0, 0, 0), (4, 1, 1)) + box((0, 0, 0), (1, 1, 4)))
 def case(solid: Closed = ELL, **options: Any) -> Case:
     options = {"quality": "fast", **({} if "criterion" in options else {"threshold": 0.05}), **options}
     result = rlacd.decompose((solid.vertices, solid.faces), **options)
-    report = dict(result.report)
+    report = result.report.as_dict()
     report["concavity"] = report["concavity"]["max"] if "concavity" in report else None
     hulls = [(np.array(hull.vertices), np.array(hull.faces)) for hull in result]
     return Case(Shape(solid.vertices, solid.faces, (), True), options, hulls, report)

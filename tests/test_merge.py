@@ -272,7 +272,7 @@ def test_hulls_of_crossing_beams_cover_them_and_no_more() -> None:
     hulls = [Manifold(Mesh64(np.array(h.vertices), np.array(h.faces, dtype=np.uint64))) for h in found]
     assert (window - Manifold.batch_boolean(hulls, OpType.Add)).volume() == pytest.approx(0, abs=1e-9)
     assert all((hull - window).volume() == pytest.approx(0, abs=1e-9) for hull in hulls)
-    assert found.report["concavity"]["max"] < 1e-3
+    assert found.report.concavity.max < 1e-3
 
 
 def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:

@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 
 import rlacd
 from rlacd.errors import OptionError
-from rlacd.fit import fit_words, length_unit
+from rlacd.fit import length_unit
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from tests.shapes import box, dense, from_manifold, point_to_triangles
@@ -129,13 +129,13 @@ def test_the_report_of_a_decomposition_says_the_same(corpus: Path) -> None:
     path = corpus / "test/vhacd/ob_chair_gothic.ply"
     result = rlacd.decompose(path, threads=1)
     found = measure(repair(load_mesh(path)), [(h.vertices, h.faces) for h in result], 0.05)
-    assert found.parts == result.report["parts"]
-    assert found.faces == result.report["faces"]
-    assert found.over == pytest.approx(result.report["hausdorff"]["over"], abs=3e-3)
-    assert found.under == pytest.approx(result.report["hausdorff"]["under"], abs=3e-3)
+    assert found.parts == result.report.parts
+    assert found.faces == result.report.faces
+    assert found.over == pytest.approx(result.report.hausdorff.over, abs=3e-3)
+    assert found.under == pytest.approx(result.report.hausdorff.under, abs=3e-3)
     assert found.exceeding == found.invalid == found.empty == 0
     # What of the solid lies in a hull may be more than the part it was made for, so this is no less by definition.
-    assert found.concavity <= result.report["concavity"]["max"] + 2 * TOLERANCE
+    assert found.concavity <= result.report.concavity.max + 2 * TOLERANCE
 
 
 @pytest.mark.promise("report-true")
@@ -159,12 +159,12 @@ def test_the_length_that_is_said_is_within_one_per_cent(how: dict[str, float]) -
         facets, near = np.repeat(facets[farthest], 60), np.repeat(weights[farthest], 60, axis=0)
         weights = np.maximum(near + 0.2 * step * rng.normal(size=near.shape), 0) + 1e-12
         weights /= weights.sum(axis=1, keepdims=True)
-    said = re.search(r"hulls reach ([\d.]+) beyond the input and cover it", fit_words(result.report))
+    said = re.search(r"hulls reach ([\d.]+) beyond the input and cover it", result.report.fit_words())
     assert said is not None
-    length = float(said[1]) * length_unit(result.report)[0] / result.report["scale"]
+    length = float(said[1]) * length_unit(result.report.options, result.report.scale)[0] / result.report.scale
     assert max(best) <= 1.0002 * length <= 1.01 * max(best)
 
 
 def test_of_the_shortest_lengths_only_a_bound_is_said() -> None:
-    words = fit_words(rlacd.decompose(trimesh.creation.icosphere(3), detail="full", threads=1).report)
+    words = rlacd.decompose(trimesh.creation.icosphere(3), detail="full", threads=1).report.fit_words()
     assert re.search(r"concavity at most .*; hulls reach at most 0.00\d+ beyond the input and cover it", words)

@@ -31,11 +31,12 @@ from rlacd.planes.sweep import SLIVER
 from rlacd.pool import ProcessLimits
 from rlacd.pool.on_ray import MACHINES
 from rlacd.repair import distance, holes, state, wraps
+from rlacd.report import Report
 from rlacd.search.search import LEAST_WORK, MOST_WORK, PATIENCE, TIMES_FIRST_PASS
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.passages import FACES
-from rlacd.view import connections, server
+from rlacd.view import server
 
 ROOT = Path(__file__).resolve().parents[1]
 GB = 2**30
@@ -87,13 +88,12 @@ LIMITS = {
     ],
     "docs/viewer.md": [
         f"up to {server.LARGEST_MESH >> 20} MiB",
-        f"{connections.MOST_CONNECTIONS} connections and {connections.MOST_STREAMS} open pages are served",
         f"localhost:{server.USUAL_PORT}",
     ],
-    "docs/reference/report.md": [
+    "src/rlacd/report.py": [
         f"narrower than {50 * 2 * narrowed.NARROWEST:g} % of the longest side",
         f"Over {FACES:,} triangles or {narrowed.MOST_BALLS} places",
-        f"at most {report.MOST_HOLES:,}: `body`",
+        f"most doubtful first, at most {report.MOST_HOLES:,}.",
     ],
     "docs/policies.md": [
         f"those of {WORDS[EDGES_PER_COMPONENT]} reflex edges",
@@ -120,7 +120,7 @@ def test_limits_of_a_page_are_those_of_the_program(name: str) -> None:
 
 
 @functools.cache
-def measured(corpus: Path, group: str, options: str) -> list[dict[str, Any]]:
+def measured(corpus: Path, group: str, options: str) -> list[Report]:
     """The reports of a group of meshes: a list of the corpus, or a folder."""
     assert (corpus / "train").is_dir()  # or not all meshes are there
     listed = Path(corpus, f"{group}.txt")
@@ -133,10 +133,10 @@ def measured(corpus: Path, group: str, options: str) -> list[dict[str, Any]]:
 
 
 STATISTICS: dict[str, Callable[[list[dict[str, Any]]], str]] = {
-    "hulls": lambda reports: f"{sum(report['parts'] for report in reports):,}",
-    "hulls a mesh": lambda reports: f"{sum(report['parts'] for report in reports) / len(reports):.1f}",
-    "triangles a mesh": lambda reports: f"{sum(report['faces'] for report in reports) / len(reports):,.0f}",
-    "primitives": lambda reports: f"{sum(report['parts'] - report['primitives']['hull'] for report in reports):,}",
+    "hulls": lambda reports: f"{sum(report.parts for report in reports):,}",
+    "hulls a mesh": lambda reports: f"{sum(report.parts for report in reports) / len(reports):.1f}",
+    "triangles a mesh": lambda reports: f"{sum(report.faces for report in reports) / len(reports):,.0f}",
+    "primitives": lambda reports: f"{sum(report.parts - report.primitives['hull'] for report in reports):,}",
 }
 
 FAST, DEFAULT = '{"quality": "fast"}', "{}"

@@ -19,6 +19,7 @@ import rlacd
 from fuzz.networks import ABOUT, q_network
 from rlacd.errors import WeightsError
 from rlacd.options.names import LEARNED
+from rlacd.plain_json import to_json
 from rlacd.planes.candidates import reflex_edge_planes
 from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import make_policy
@@ -48,8 +49,8 @@ def of_the_docs(name: str) -> Any:
 def test_policies_of_the_docs_decompose(name: str) -> None:
     result = rlacd.decompose(table(), policy=of_the_docs(name), quality="fast")
     assert len(result) > 1
-    assert result.report["concavity"]["max"] <= 0.05
-    assert json.loads(json.dumps(result.report))["options"]["policy"] == name
+    assert result.report.concavity.max <= 0.05
+    assert json.loads(to_json(result.report))["options"]["policy"] == name
 
 
 def test_the_least_hull_sum_written_by_a_user_is_ours() -> None:
@@ -113,14 +114,14 @@ def test_networks_choose_the_cuts_where_parts_are_not_merged() -> None:
     given = trimesh_of(hollow_table())
     for merge, policy in ((False, "learned"), (True, "greedy")):
         free, asked = (rlacd.decompose(given, merge=merge, quality="fast", **p) for p in ({}, {"policy": policy}))
-        assert free.report["options"]["policy"] == policy
+        assert free.report.options["policy"] == policy
         assert_same_hulls(free, asked)
 
 
 def test_none_leaves_components_as_they_are() -> None:
     result = rlacd.decompose(table(), policy=Answers(None), quality="fast")
     assert len(result) == 1
-    assert any("exceed" in warning for warning in result.report["warnings"])
+    assert any("exceed" in warning for warning in result.report.warnings)
 
 
 @pytest.mark.parametrize(
@@ -222,7 +223,7 @@ def test_alone_the_greatest_value_decides_and_deployed_the_least_hulls_of_the_te
 
 def test_decompose_takes_a_network(network: Path) -> None:
     one, two = (rlacd.decompose(trimesh_of(chair()), policy=str(network), threads=n, quality="fast") for n in (1, 2))
-    assert one.report["concavity"]["max"] <= 0.05
+    assert one.report.concavity.max <= 0.05
     assert_same_hulls(one, two)
 
 

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 import trimesh
 
 import rlacd
 from fuzz.faults import Fault, command, tree
 from rlacd.cli.exit_codes import ExitCode
+from rlacd.plain_json import to_json
+from rlacd.report import Report
 from tests.promises import PAGE, holders, promises, with_tests
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -89,6 +94,7 @@ ELL = [trimesh.creation.box((2, 0.4, 0.4)), trimesh.creation.box((0.4, 0.4, 2))]
 REPORTS: list[dict[str, Any]] = [
     {},
     {"criterion": "volume"},
+    {"threshold_abs": 0.1},
     {"criterion": rlacd.NavigableSpace(radius=0.1, tolerance=0.05)},
     {"primitives": True, "overlap": 0.005},
     {"per_node": True, "avoid": [trimesh.creation.box(bounds=[(9, 9, 9), (10, 10, 10)])]},
@@ -102,17 +108,27 @@ def rows(page: str) -> list[list[str]]:
     return [re.findall(r"`([^`]+)`", cell) or [cell] for cell in cells]
 
 
-def test_the_reference_names_every_key_of_a_report_and_no_other() -> None:
-    documented = set()
-    for names in rows("reference/report.md"):
-        documented |= {names[0].partition(".")[0] + name if name.startswith(".") else name for name in names}
-    found = set()
+def test_reports_fit_their_schema_and_every_key_is_explained() -> None:
+    schema = Report.schema()
+    judge = jsonschema.Draft202012Validator(schema)
+    judge.check_schema(schema)
+    found = set[str]()
     for options in REPORTS:
         report = rlacd.decompose(trimesh.Scene(ELL), quality="fast", threads=1, **options).report
-        for key, value in report.items():
-            parts = {f"{key}.{part}" for part in value} if isinstance(value, dict) else set()
-            found |= parts if any(name.startswith(f"{key}.") for name in documented) else {key}
-    assert found == documented
+        plain = json.loads(to_json(report))
+        assert [error.message for error in judge.iter_errors(plain)] == []
+        assert plain == report.as_dict()
+        found |= plain.keys()
+    assert found == schema["properties"].keys()
+    assert all(value["description"] for value in inner(schema))
+
+
+def inner(schema: Any) -> Iterator[Any]:
+    """The schema of every key, of those in others too."""
+    for key, value in schema.items() if isinstance(schema, dict) else ():
+        yield from value.values() if key == "properties" else ()
+        for below in value if isinstance(value, list) else [value]:
+            yield from inner(below)
 
 
 @pytest.mark.promise("exit-codes")

@@ -78,9 +78,9 @@ def uncovered(hulls: Iterable[trimesh.Trimesh], mesh: trimesh.Trimesh) -> float:
 def test_promises_hold_on_the_solid_itself(shape: str, quality: rlacd.QualityName) -> None:
     mesh = SHAPES[shape]()
     result = rlacd.decompose(mesh, quality=quality)
-    assert "transfer" in result.report["seconds"]
-    assert not result.report["warnings"]
-    assert result.report["concavity"]["max"] <= 0.05
+    assert "transfer" in result.report.seconds
+    assert not result.report.warnings
+    assert result.report.concavity.max <= 0.05
     assert uncovered(result, mesh) <= 1e-3
     # The strict test, with parts made by another library: the solid clipped to each hull.
     solid = to_manifold(Frame.of(mesh.vertices).to_frame(mesh.vertices), mesh.faces)
@@ -109,7 +109,7 @@ def test_a_part_without_room_below_the_threshold_keeps_its_own_hull() -> None:
 def test_noise_and_density_cost_hardly_any_parts(shape: str) -> None:
     dense = SHAPES[shape]()
     plain = {"ring": trimesh.creation.torus(1.0, 0.3, 32, 16), "cross": bars()}[shape]
-    assert "transfer" not in rlacd.decompose(plain, quality="fast").report["seconds"], "it is decomposed as it is"
+    assert "transfer" not in rlacd.decompose(plain, quality="fast").report.seconds, "it is decomposed as it is"
     assert len(rlacd.decompose(dense, quality="fast")) <= len(rlacd.decompose(plain, quality="fast")) + 1
 
 
@@ -117,19 +117,19 @@ def test_noisy_walls_of_bodies_that_touch_need_no_cuts() -> None:
     mesh = bricks(4, 0.03)
     result = rlacd.decompose(mesh, quality="fast")
     assert len(result) == 1
-    assert not result.report["warnings"]
-    assert result.report["hausdorff"]["over"] <= 0.012  # a bar that is noisy in one piece: 0.010
+    assert not result.report.warnings
+    assert result.report.hausdorff.over <= 0.012  # a bar that is noisy in one piece: 0.010
 
 
 @pytest.mark.slow
 def test_limits_hold_and_are_met_by_the_threshold() -> None:
     result = rlacd.decompose(ring(), quality="fast", max_vertices=32)
     assert max(len(hull.vertices) for hull in result) <= 32
-    assert result.report["concavity"]["max"] <= 0.05
-    assert not result.report["warnings"]
+    assert result.report.concavity.max <= 0.05
+    assert not result.report.warnings
     few = rlacd.decompose(ring(), quality="fast", max_hulls=3)
     assert len(few) <= 3
-    assert few.report["hausdorff"]["under"] <= 1e-3
+    assert few.report.hausdorff.under <= 1e-3
 
 
 @pytest.mark.slow
@@ -138,7 +138,7 @@ def test_stopped_at_any_time_the_hulls_cover_the_solid() -> None:
     mesh = ring()
     for stage in ("simplify", "cut", "merge", "transfer"):
         result = rlacd.decompose(mesh, progress=lambda p, stage=stage: p.stage != stage)
-        assert not result.report["complete"]
+        assert not result.report.complete
         assert uncovered(result, mesh) <= 1e-3
 
 
@@ -192,7 +192,7 @@ def test_simple_hulls_hold_the_full_ones_and_have_fewer_corners() -> None:
     )
     (held,) = in_frame(full, mesh)
     assert hull_union(in_frame(simple, mesh), 1).distance(held.vertices, 1).max() <= 1e-9
-    assert simple.report["concavity"]["max"] <= 0.05
+    assert simple.report.concavity.max <= 0.05
 
 
 def test_pieces_make_a_proxy_of_a_union_full_of_tunnels() -> None:

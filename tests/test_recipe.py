@@ -35,7 +35,7 @@ def test_a_report_is_the_recipe_of_its_run(given: dict[str, Any], tmp_path: Path
     (tmp_path / "report.json").write_text(to_json(first.report))
     options = json.loads(to_json(first.report))["options"]
     again = rlacd.decompose(tmp_path / "pipe.obj", **options)
-    assert again.report["options"] == first.report["options"]
+    assert again.report.options == first.report.options
     assert [h.vertices.tobytes() for h in again] == [h.vertices.tobytes() for h in first]
     first.save(tmp_path / "first.ply")
     words = [str(tmp_path / "pipe.obj"), "-o", str(tmp_path / "again.ply"), "--like", str(tmp_path / "report.json")]
@@ -62,7 +62,7 @@ def test_what_the_report_warns_of_is_a_python_warning_too(tmp_path: Path) -> Non
     with pytest.warns(rlacd.DecompositionWarning, match="mesh: per_node had no effect") as heard:
         found = rlacd.decompose(box, per_node=True)
     assert len(heard) == 1
-    assert all(sentence in str(heard[0].message) for sentence in found.report["warnings"])
+    assert all(sentence in str(heard[0].message) for sentence in found.report.warnings)
     assert heard[0].filename == __file__
     with warnings.catch_warnings():
         warnings.simplefilter("error")

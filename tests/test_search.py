@@ -190,7 +190,7 @@ def test_no_level_makes_more_hulls_than_the_one_before() -> None:
             for options in ({"quality": "fast"}, {}, {"quality": "best", "search_steps": 16})
         )
         assert len(best) <= len(fast) >= len(balanced)
-        assert balanced.report["search"]["steps"] > 0 or len(balanced) == balanced.report["at_least"]
+        assert balanced.report.search.steps > 0 or len(balanced) == balanced.report.at_least
 
 
 @pytest.mark.nightly
@@ -203,11 +203,11 @@ def test_levels_are_ordered(name: str, corpus: Path) -> None:
     assert len(best) <= len(balanced) <= len(fast)
     assert len(best) < len(fast)  # these shapes have something to gain
     for result in (balanced, best):
-        assert result.report["concavity"]["max"] <= 0.05
+        assert result.report.concavity.max <= 0.05
         assert all(hull.is_convex and hull.is_watertight for hull in result)
-        assert result.report["complete"]
-    assert fast.report["search"] is None
-    assert balanced.report["search"]["work"] <= balanced.report["search"]["allowed"]
+        assert result.report.complete
+    assert fast.report.search is None
+    assert balanced.report.search.work <= balanced.report.search.allowed
 
 
 @pytest.mark.nightly
@@ -228,10 +228,10 @@ def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
         return progress.stage != "search" or progress.done < 8
 
     result = rlacd.decompose(corpus / SHAPES[0], quality="best", search_steps=1000, progress=stop)
-    assert result.report["stopped_by"] == "cancel"
-    assert result.report["concavity"]["max"] <= 0.05
-    assert any("search for fewer hulls early" in warning for warning in result.report["warnings"])
-    assert 8 <= result.report["search"]["steps"] < 1000
+    assert result.report.stopped_by == "cancel"
+    assert result.report.concavity.max <= 0.05
+    assert any("search for fewer hulls early" in warning for warning in result.report.warnings)
+    assert 8 <= result.report.search.steps < 1000
     counts = [progress.parts for progress in told if progress.stage == "search"]
     assert counts == sorted(counts, reverse=True)
 
@@ -242,21 +242,21 @@ def test_time_does_not_make_the_best_level_worse_than_balanced(corpus: Path, mon
     monkeypatch.setattr(module, "BEST_SECONDS", 0.01)
     balanced, best = (rlacd.decompose(corpus / SHAPES[0], quality=quality) for quality in ("balanced", "best"))
     assert len(best) <= len(balanced)
-    assert best.report["search"]["steps"] >= balanced.report["search"]["steps"]
+    assert best.report.search.steps >= balanced.report.search.steps
 
 
 @pytest.mark.slow
 def test_a_budget_ends_the_search_and_not_the_work(corpus: Path) -> None:
     result = rlacd.decompose(corpus / SHAPES[0], quality="best", budget=0.01)
-    assert result.report["complete"]
-    assert result.report["search"]["steps"] <= 8  # those begun in time
-    assert result.report["concavity"]["max"] <= 0.05
+    assert result.report.complete
+    assert result.report.search.steps <= 8  # those begun in time
+    assert result.report.concavity.max <= 0.05
 
 
 def test_a_convex_solid_needs_no_search() -> None:
     result = rlacd.decompose(trimesh.creation.icosphere(), quality="best")
     assert len(result) == 1
-    assert result.report["search"]["steps"] == 0
+    assert result.report.search.steps == 0
 
 
 @pytest.mark.parametrize(

@@ -27,9 +27,9 @@ def test_each_choice_is_what_its_threshold_leads_to(given: dict[str, object]) ->
     for choice in found.choices:
         alone = rlacd.decompose(mesh, quality="fast", threads=1, **{**given, found.option: choice.threshold})
         assert choice.hulls == len(alone)
-        assert choice.triangles == alone.report["faces"]
-        unit = alone.report["scale"] if found.option == "threshold_abs" else 1.0
-        assert choice.farthest == pytest.approx(alone.report["hausdorff"]["over"] / unit, abs=1e-6)
+        assert choice.triangles == alone.report.faces
+        unit = alone.report.scale if found.option == "threshold_abs" else 1.0
+        assert choice.farthest == pytest.approx(alone.report.hausdorff.over / unit, abs=1e-6)
         if found.option != "volume_tolerance":
             assert choice.farthest <= 1.001 * choice.threshold
     assert found.choices[0].added < found.choices[-1].added

@@ -17,6 +17,7 @@ _NAMES = {
     "options.presets": "PRESETS Preset",
     "planes.sweep": "Sweep SweepCache",
     "policies": "Policy",
+    "report": "Report",
     "run": "Progress",
     "solid.component": "Component Plane",
     "solid.primitive": "Primitive",

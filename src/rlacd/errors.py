@@ -51,7 +51,7 @@ class WeightsError(RlacdError, ValueError):
 
 
 class DecompositionWarning(UserWarning):
-    """What falls short in a result, or had no effect: the sentences in ``report["warnings"]``."""
+    """What falls short in a result, or had no effect: the sentences in ``report.warnings``."""
 
 
 class ImplausibleBodyWarning(UserWarning):

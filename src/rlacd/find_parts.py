@@ -22,8 +22,9 @@ from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy.model import Model
 from rlacd.repair.repair import repair
+from rlacd.report import SearchSummary
 from rlacd.run import Run
-from rlacd.search import SearchContext, SearchSummary, at_least, cost, eliminate_parts, search
+from rlacd.search import SearchContext, at_least, cost, eliminate_parts, search
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover

@@ -1,9 +1,10 @@
-"""How well hulls fit, as a report says it: the criterion's measurement of each part, beside its limit, in words."""
+"""How well hulls fit: the criterion's measurement of each part, beside its limit, in a report and in words."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
 
 from rlacd.options.names import UNITS
 
@@ -16,41 +17,77 @@ COVERED = 5e-5
 """Hulls that miss no more than this of an input cover it."""
 
 
-class Fit(NamedTuple):
-    """The measurement of a criterion.
+@dataclass(frozen=True)
+class Measured:
+    """What the criterion measured of each part."""
 
-    Attributes
-    ----------
-    name : str
-        The measurement; also its key in summaries.
-    per_part : list of float or None
-        None, like `worst`, where there was no time.
-    worst : float or None
-    limit : float or None
-        None for navigable space, of which hulls may touch nothing.
-    balls : int
-        Number of balls of navigable space.
-    """
+    per_part: tuple[float, ...] | None
+    """An upper bound for the part of each hull, in the order of the hulls; null without time to measure."""
+    max: float | None
+    """The greatest of them."""
+
+
+@dataclass(frozen=True)
+class LengthFit(Measured):
+    """How far parts and their hulls are apart."""
+
+    threshold: float
+    """The limit, a length."""
+
+
+@dataclass(frozen=True)
+class VolumeFit(Measured):
+    """The share of volume that each hull adds."""
+
+    tolerance: float
+    """The limit, a share."""
+    relative_to: Literal["part", "whole"]
+    """What it is a share of: each part's own volume, or the whole solid's."""
+
+
+@dataclass(frozen=True)
+class SpaceFit:
+    """What is left of navigable space."""
+
+    radius: float
+    """Of the ball that has to pass."""
+    tolerance: float
+    """Space nearer to the surface than this may be filled."""
+    balls: int
+    """Number of balls that no hull may touch."""
+    shrunk: int
+    """How many balls gave way in part to parts that no cut could keep off them."""
+    dropped: int
+    """How many gave way altogether."""
+    most: float
+    """The largest loss of radius."""
+    intrusion: Measured
+    """How deep the hulls reach into the final balls."""
+
+
+class Fit(NamedTuple):
+    """The measurement of a criterion."""
 
     name: str
-    per_part: list[float] | None
+    """The measurement; also its key in summaries."""
+    per_part: tuple[float, ...] | None
+    """None, like `worst`, where there was no time."""
     worst: float | None
     limit: float | None
+    """None for navigable space, of which hulls may touch nothing."""
     balls: int = 0
+    """Number of balls of navigable space."""
 
     @classmethod
-    def of(cls, report: Mapping[str, Any]) -> Fit | None:
-        """Read a report; None if it holds no measurement."""
-        for name in _LENGTHS:
-            if name in report:
-                found = report[name]
-                return cls(name, found.get("per_part"), found["max"], found.get("threshold"))
-        if "volume" in report:
-            found = report["volume"]
-            return cls("added_volume", found["per_part"], found["max"], found["tolerance"])
-        if "navigable" in report:
-            space = report["navigable"]
-            return cls("intrusion", space["intrusion"]["per_part"], space["intrusion"]["max"], None, space["balls"])
+    def of(cls, *, volume: VolumeFit | None, navigable: SpaceFit | None, **lengths: LengthFit | None) -> Fit | None:
+        """That of the criterion that was measured; None if none was."""
+        for name, found in lengths.items():
+            if found is not None:
+                return cls(name, found.per_part, found.max, found.threshold)
+        if volume is not None:
+            return cls("added_volume", volume.per_part, volume.max, volume.tolerance)
+        if navigable is not None:
+            return cls("intrusion", navigable.intrusion.per_part, navigable.intrusion.max, None, navigable.balls)
         return None
 
     @property
@@ -75,10 +112,8 @@ class Fit(NamedTuple):
             if self.worst <= 0:
                 return f"no hull touches any of the {self.balls} balls"
             return f"hulls reach {self.worst / scale:.4g} into the {self.balls} balls"
-        if self.worst is None:
+        if self.worst is None or self.limit is None:
             return None
-        if self.limit is None:
-            return f"{self.name} at most {self.worst / scale:.4g}"
         if self.name == "added_volume":
             most, tolerance = told_apart(100 * self.worst, 100 * self.limit)
             return f"hulls add up to {most} % of volume (tolerance {tolerance} %)"
@@ -86,13 +121,15 @@ class Fit(NamedTuple):
         return f"{self.name} at most {most} (threshold {threshold}{', exceeded' * (self.worst > self.limit)})"
 
 
-def length_unit(report: Mapping[str, Any], unit: str | None = None) -> tuple[float, str]:
+def length_unit(options: Mapping[str, Any], scale: float, unit: str | None = None) -> tuple[float, str]:
     """The unit in which a report's lengths are written: the threshold's, so that they can be compared.
 
     Parameters
     ----------
-    report : mapping
-        Its `scale` and its option `threshold_abs` are read.
+    options : mapping
+        Those of the decomposition; its `threshold_abs` is read.
+    scale : float
+        Units of the frame per unit of the input.
     unit : str, optional
         In which the threshold was typed: ``%`` of the longest side, or of `UNITS` for an input in metres.
 
@@ -104,25 +141,10 @@ def length_unit(report: Mapping[str, Any], unit: str | None = None) -> tuple[flo
     if unit == "%":
         return 0.02, "in % of the longest side"
     if unit is not None:
-        return report["scale"] * UNITS[unit], f"in {unit}"
-    if report.get("options", {}).get("threshold_abs") is not None:
-        return report["scale"], "in the input's unit"
+        return scale * UNITS[unit], f"in {unit}"
+    if options.get("threshold_abs") is not None:
+        return scale, "in the input's unit"
     return 1.0, "longest side = 2"
-
-
-def fit_words(report: Mapping[str, Any], unit: str | None = None) -> str:
-    """Say how well hulls fit: by the criterion, and how far they reach beyond the input; empty if nothing is known."""
-    scale, in_words = length_unit(report, unit)
-    fit, (over, under) = Fit.of(report), (report.get("hausdorff", {}).get(side) for side in ("over", "under"))
-    words = [said] if fit is not None and (said := fit.words(scale)) else []
-    if over is not None and under is not None:
-        missed = "and cover it" if under <= COVERED else f"and miss it by {_length(under, scale)}"
-        words.append(f"hulls reach {_length(over, scale)} beyond the input {missed}")
-    return "; ".join(words) + (f" ({in_words})" if words else "")
-
-
-def _length(length: float, scale: float) -> str:
-    return f"{'at most ' * (length <= RESOLVED)}{length / scale:.4g}"
 
 
 def told_apart(value: float, limit: float) -> tuple[str, str]:

@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
+import numpy as np
 import trimesh
 
-from rlacd.fit import Fit, length_unit
+from rlacd.fit import length_unit
 from rlacd.options.fields import checked
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.output import Axis, OutputOptions
+from rlacd.report import Report
+from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
+from rlacd.solid.mass import mass_of
 from rlacd.solid.primitive import PRIMITIVE, Balls, Primitive
+
+Made = TypeVar("Made", bound="Result")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -22,10 +28,28 @@ class Result:
     """A mesh as convex hulls; `rlacd.Decomposition` documents the attributes and adds saving and showing."""
 
     hulls: list[trimesh.Trimesh]
-    report: dict[str, Any]
+    report: Report
     source: trimesh.Trimesh
     balls: Balls | None = None
     input: InputMesh | None = None
+
+    @classmethod
+    def of(cls: type[Made], hulls: list[trimesh.Trimesh], source: trimesh.Trimesh, **known: Any) -> Made:
+        """Hulls from elsewhere: their counts, size and mass, as the hulls stand for the solid, and what else is known.
+
+        Parameters
+        ----------
+        hulls : list of trimesh.Trimesh
+        source : trimesh.Trimesh
+            The input.
+        **known
+            Other fields of `rlacd.Report`.
+        """
+        whole = trimesh.util.concatenate([trimesh.Trimesh(), *hulls])
+        counts = {"parts": len(hulls), "faces": len(whole.faces), "vertices": len(whole.vertices)}
+        mass = mass_of(whole.vertices, whole.faces, Frame(np.zeros(3), 1.0))
+        scale = Frame.of(np.concatenate([whole.vertices, source.vertices])).scale if hulls else 1.0
+        return cls(hulls, Report(**{**counts, "scale": scale, "mass": mass, **known}), source)
 
     def up_axis(self, up: str | None = None) -> Axis:
         """The axis that points up: as given, or by the convention of the input's format."""
@@ -34,8 +58,8 @@ class Result:
 
     @property
     def name(self) -> str:
-        """What the input is called: ``report["name"]``."""
-        return str(self.report.get("name") or "mesh")
+        """What the input is called."""
+        return self.report.name
 
     @property
     def primitives(self) -> list[Primitive | None]:
@@ -58,13 +82,13 @@ class Result:
 
     def facts(self) -> list[str]:
         """Say how many hulls and triangles there are and how well they fit, in words that are the same everywhere."""
-        shapes, fit = Counter(each.kind for each in self.primitives if each is not None), Fit.of(self.report)
-        unit, _ = length_unit(self.report)
+        shapes, fit = Counter(each.kind for each in self.primitives if each is not None), self.report.fit
+        unit, _ = length_unit(self.report.options, self.report.scale)
         words = [f"{len(self)} hull{'s' * (len(self) != 1)}"]
         words += [f"{shapes[kind]} as {kind}" for kind in PRIMITIVE_KINDS if shapes[kind]]
         words.append(f"{sum(len(hull.faces) for hull in self.hulls)} triangles")
         words += [said] if fit is not None and (said := fit.words(unit)) else []
-        return words + ([] if self.report.get("complete", True) else [f"stopped early by {self.report['stopped_by']}"])
+        return words + ([] if self.report.complete else [f"stopped early by {self.report.stopped_by}"])
 
     def __repr__(self) -> str:
         count, *others = self.facts()

@@ -33,51 +33,34 @@ FINEST = 0.4
 
 
 class Choice(NamedTuple):
-    """What one threshold leads to.
-
-    Attributes
-    ----------
-    threshold : float
-        As `rlacd.decompose` takes it; with the criterion ``volume``, its `volume_tolerance`.
-    hulls, triangles : int
-    farthest : float
-        How far the hulls reach beyond the input: where the longest side is 2, or in the input's unit if the threshold
-        is.
-    added : float
-        The volume of all hulls together, less that of the solid, as a share of that.
-    """
+    """What one threshold leads to."""
 
     threshold: float
+    """As `rlacd.decompose` takes it; with the criterion ``volume``, its `volume_tolerance`."""
     hulls: int
     triangles: int
     farthest: float
+    """How far the hulls reach beyond the input: where the longest side is 2, or in the input's unit if the threshold
+    is."""
     added: float
+    """The volume of all hulls together, less that of the solid, as a share of that."""
 
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """Hulls against tightness; printing it gives a table.
-
-    Attributes
-    ----------
-    name : str
-        Of the object.
-    option : str
-        What the thresholds are given as: ``threshold``, ``threshold_abs`` or ``volume_tolerance``.
-    choices : list of Choice
-        The finest first; one with a single hull ends them.
-    pick : int or None
-        The choice to take: the finest with at most `max_hulls`, if that was given; else the knee of the curve, beyond
-        which a finer threshold costs ever more hulls. None without choices.
-    complete : bool
-        False if there was no time for coarser thresholds.
-    """
+    """Hulls against tightness; printing it gives a table."""
 
     name: str
+    """Of the object."""
     option: str
+    """What the thresholds are given as: ``threshold``, ``threshold_abs`` or ``volume_tolerance``."""
     choices: list[Choice]
+    """The finest first; one with a single hull ends them."""
     pick: int | None
+    """The choice to take: the finest with at most `max_hulls`, if that was given; else the knee of the curve, beyond
+    which a finer threshold costs ever more hulls. None without choices."""
     complete: bool
+    """False if there was no time for coarser thresholds."""
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as values that ``json`` can write."""

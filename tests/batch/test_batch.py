@@ -20,7 +20,7 @@ from click.testing import CliRunner, Result
 
 from rlacd.batch import find_assets
 from rlacd.cli.main import app
-from rlacd.io.read.load import FORMATS
+from rlacd.io.read import READERS as FORMATS
 from tests.batch.trouble import make_trouble, tree, write_ell
 
 TIMES = "timings.jsonl"

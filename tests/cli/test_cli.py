@@ -23,7 +23,8 @@ from rlacd.cli.terminal import summary
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
-from rlacd.fit import told_apart
+from rlacd.fit import LengthFit, told_apart
+from rlacd.report import Hausdorff
 from rlacd.run import Progress, ProgressCallback
 from tests.batch.trouble import write_ell
 from tests.hulls import hull_of
@@ -49,7 +50,7 @@ class StandIn:
     def __init__(self) -> None:
         self.calls: list[dict[str, Any]] = []
         self.during: Callable[[], object] = lambda: None
-        self.report: dict[str, Any] = {}
+        self.known: dict[str, Any] = {}
 
     def __call__(self, mesh: Path, *, progress: ProgressCallback, **options: Any) -> Decomposition:
         self.calls.append(options)
@@ -60,18 +61,17 @@ class StandIn:
                 break
             self.during()
         source = trimesh.load(mesh, force="mesh")
-        report = {
+        known = {
             "name": mesh.stem,
             "complete": complete,
             "stopped_by": None if complete else "cancel",
-            "parts": 1,
             "options": {"threshold": 0.05},
-            "concavity": {"threshold": 0.05, "per_part": [0.01], "max": 0.01},
-            "hausdorff": {"over": 0.02, "under": float("nan")},
+            "concavity": LengthFit((0.01,), 0.01, 0.05),
+            "hausdorff": Hausdorff(0.02, float("nan")),
             "seconds": {"total": 0.3},
-            "warnings": ["one body was open"],
+            "warnings": ("one body was open",),
         }
-        return Decomposition([hull_of(source.vertices)], {**report, **self.report}, source)
+        return Decomposition.of([hull_of(source.vertices)], source, **{**known, **self.known})
 
 
 @pytest.fixture
@@ -102,8 +102,7 @@ def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path,
     ],
 )
 def test_lengths_are_said_in_the_unit_that_was_given(mesh: Path, stand_in: StandIn, typed: str, said: str) -> None:
-    stand_in.report = {"options": {"threshold": 0.05}, "concavity": {"threshold": 0.05, "max": 0.0498}, "scale": 10.0}
-    stand_in.report["hausdorff"] = {"over": 0.2, "under": 0.0}
+    stand_in.known = {"concavity": LengthFit(None, 0.0498, 0.05), "scale": 10.0, "hausdorff": Hausdorff(0.2, 0.0)}
     glb = trimesh.load(mesh).export(mesh.with_suffix(".glb")) and mesh.with_suffix(".glb")
     assert said in rlacd("decompose", glb, "--threshold", typed).stderr
 
@@ -172,11 +171,11 @@ def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> N
 def test_the_summary_says_what_more_time_may_gain() -> None:
     frame = trimesh.creation.annulus(0.8, 1.0, 0.3, sections=64)
     best = decompose(frame, quality="best", budget=0.2, threads=1)
-    search = best.report["search"]
-    assert 0 <= search["last_gain"] <= search["seconds"]
-    idle = search["seconds"] - search["last_gain"]
-    said = f"saved no hull in the last {idle:.1f} of {search['seconds']:.1f} s"
-    assert (said in summary(best, "out.xml")) == (best.report["at_least"] < len(best))
+    search = best.report.search
+    assert 0 <= search.last_gain <= search.seconds
+    idle = search.seconds - search.last_gain
+    said = f"saved no hull in the last {idle:.1f} of {search.seconds:.1f} s"
+    assert (said in summary(best, "out.xml")) == (best.report.at_least < len(best))
     assert "saved no hull" not in summary(decompose(frame, threads=1), "out.xml")
 
 

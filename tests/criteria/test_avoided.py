@@ -11,6 +11,7 @@ import trimesh
 
 import rlacd
 from rlacd.errors import OptionError
+from rlacd.report import Avoids
 
 RING = trimesh.creation.torus(1.0, 0.25)
 DENSE = trimesh.creation.torus(1.0, 0.25, major_sections=160, minor_sections=60)
@@ -50,8 +51,8 @@ def test_no_hull_enters_what_it_is_to_avoid(options: dict[str, Any]) -> None:
     assert deepest(free.hulls, rod(0.7)) > 0.005
     assert deepest(clear.hulls, rod(0.7)) <= 1e-6
     assert len(clear) <= 2.5 * len(free)
-    assert clear.report["avoid"] == {"crossed": [], "entered": []}
-    assert clear.report["warnings"] == []
+    assert clear.report.avoid == Avoids((), ())
+    assert clear.report.warnings == ()
 
 
 @pytest.mark.slow
@@ -62,7 +63,7 @@ def test_hulls_of_a_dense_mesh_avoid_what_its_simpler_copy_may_cross() -> None:
     near = rod(0.742)
     done = rlacd.decompose(noisy, threshold=0.1, avoid=[near], quality="fast", threads=1)
     assert deepest(done.hulls, near) <= 1e-6
-    assert done.report["warnings"] == []
+    assert done.report.warnings == ()
 
 
 def test_parts_far_from_what_they_avoid_stay_as_coarse_as_asked() -> None:
@@ -82,31 +83,31 @@ def test_what_the_input_itself_crosses_is_said_and_the_rest_is_avoided() -> None
     floor = trimesh.creation.box((100, 100, 0.2), transform=trimesh.transformations.translation_matrix([0, 0, -0.5]))
     done = rlacd.decompose(box, avoid=[floor], quality="fast")
     assert len(done) == 1
-    assert done.report["warnings"] == ["The input itself crosses a mesh, so hulls are not kept out of it there."]
+    assert done.report.warnings == ("The input itself crosses a mesh, so hulls are not kept out of it there.",)
     arch = trimesh.boolean.difference([trimesh.creation.box((2, 1, 2)), trimesh.creation.box((1.8, 2, 1.8))])
     # It stands through a floor under its foot; a beam in its opening is avoided all the same.
     beam = trimesh.creation.box((1.7, 3, 1.7))
     low = trimesh.creation.box((100, 100, 0.02), transform=trimesh.transformations.translation_matrix([0, 0, -0.95]))
     done = rlacd.decompose(arch, threshold=0.5, avoid=[low, beam], quality="fast")
     assert deepest(done.hulls, beam) <= 1e-6
-    assert [warning.split(",")[0] for warning in done.report["warnings"]] == ["The input itself crosses a mesh"]
+    assert [warning.split(",")[0] for warning in done.report.warnings] == ["The input itself crosses a mesh"]
 
 
 def test_what_hulls_may_touch_is_not_entered() -> None:
     """A box that stands on a floor of large triangles is one hull."""
     floor = trimesh.Trimesh([[-1e3, -1e3, -0.5], [1e3, -1e3, -0.5], [0, 1e3, -0.5]], [[0, 1, 2]])
     done = rlacd.decompose(trimesh.creation.box(), avoid=[floor], quality="fast")
-    assert (len(done), done.report["warnings"]) == (1, [])
+    assert (len(done), done.report.warnings) == (1, ())
 
 
 @pytest.mark.promise("avoid")
 def test_limits_that_leave_no_way_are_said() -> None:
     done = rlacd.decompose(RING, threshold=0.1, max_hulls=4, avoid=[rod(0.7)], quality="fast", threads=1)
     depth = deepest(done.hulls, rod(0.7))
-    (entered,) = done.report["avoid"]["entered"]
-    assert entered["hulls"] == len(done) == 4
-    assert entered["depth_abs"] == pytest.approx(depth, rel=0.01)
-    assert any(f"4 hulls enter a mesh, up to {entered['depth_abs']:.4g} deep" in w for w in done.report["warnings"])
+    (entered,) = done.report.avoid.entered
+    assert entered.hulls == len(done) == 4
+    assert entered.depth_abs == pytest.approx(depth, rel=0.01)
+    assert any(f"4 hulls enter a mesh, up to {entered.depth_abs:.4g} deep" in w for w in done.report.warnings)
 
 
 def test_lengths_and_scale_are_those_of_the_input(tmp_path: Path) -> None:
@@ -117,7 +118,7 @@ def test_lengths_and_scale_are_those_of_the_input(tmp_path: Path) -> None:
     large = rod(0.7)
     large.apply_scale(1000)
     assert deepest(done.hulls, large) <= 1e-3
-    assert done.report["options"]["avoid"] == ["rod.obj"]
+    assert done.report.options["avoid"] == ["rod.obj"]
 
 
 @pytest.mark.parametrize("given", ["rod.obj", 3, [3], (np.zeros((3, 3)), np.array([[0, 1, 2]]))])

@@ -43,15 +43,15 @@ def test_a_round_hole_takes_few_more_hulls_than_its_tolerance_takes_chords(toler
     chords = math.ceil(math.pi / math.acos(1 - tolerance / 10))
     result = rlacd.decompose(bored(), threshold_abs=tolerance, quality="fast", threads=1)
     assert chords / 1.15 <= len(result) <= 1.4 * chords  # a polygon of 128 sides allows slightly longer chords
-    assert result.report["warnings"] == []
+    assert result.report.warnings == ()
 
 
 def test_no_hull_is_farther_from_its_part_than_the_threshold() -> None:
     mesh = comb()
     result = rlacd.decompose(mesh, criterion="distance", threshold=0.05, quality="fast", threads=1)
-    per_part = result.report["distance"]["per_part"]
+    per_part = result.report.distance.per_part
     assert len(per_part) == len(result)
-    assert max(per_part) == result.report["distance"]["max"] <= 0.05
+    assert max(per_part) == result.report.distance.max <= 0.05
     for hull in result:  # what of it lies outside the solid lies near the solid's surface
         points = hull.sample(2000, seed=0)
         outside = points[~mesh.contains(points)]
@@ -82,8 +82,8 @@ def test_a_length_is_a_distance_unless_the_criterion_is_named(tmp_path: Path) ->
 
     for given in ({"threshold_abs": 0.1}, {"threshold_abs": 0.1, "criterion": "concavity"}, {"threshold": 0.1}):
         report = rlacd.decompose(path, quality="fast", threads=1, **given).report  # type: ignore[arg-type]
-        assert report["options"]["criterion"] == ("distance" if given == {"threshold_abs": 0.1} else "concavity")
-        assert ("distance" in report) != ("concavity" in report)
+        assert report.options["criterion"] == ("distance" if given == {"threshold_abs": 0.1} else "concavity")
+        assert (report.distance is None) != (report.concavity is None)
     assert "distance at most" in said("--threshold", "100mm")
     assert "distance at most" in said("--threshold-abs", "0.1")
     assert "distance at most" in said("--threshold", "0.1", "--criterion", "distance")
@@ -98,9 +98,9 @@ def test_a_length_is_a_distance_unless_the_criterion_is_named(tmp_path: Path) ->
 def test_the_parts_of_all_nodes_are_measured_in_the_frame_of_the_scene(criterion: str) -> None:
     scene = trimesh.Scene({"large": comb(), "small": comb().apply_scale(0.2).apply_translation((3, 0, 0))})
     result = rlacd.decompose(scene, criterion=criterion, per_node=True, quality="fast", threads=1)  # type: ignore[arg-type]
-    measured = result.report[criterion]
-    assert len(measured["per_part"]) == len(result) > 2
-    assert measured["max"] == max(measured["per_part"]) <= (0.01 if criterion == "volume" else 0.05)
+    measured = getattr(result.report, criterion)
+    assert len(measured.per_part) == len(result) > 2
+    assert measured.max == max(measured.per_part) <= (0.01 if criterion == "volume" else 0.05)
 
 
 def cup() -> trimesh.Trimesh:
@@ -127,11 +127,11 @@ def test_no_hull_adds_more_than_the_share(shape: object, tolerance: float) -> No
         assert_convex_hull(hull)
         inside = (to_manifold(hull.vertices, hull.faces) ^ solid).volume()
         assert hull.volume - inside <= tolerance * max(inside, least) * (1 + 1e-6) + 1e-9
-    measured = result.report["volume"]
-    assert len(measured["per_part"]) == len(result)
-    assert measured["max"] == max(measured["per_part"]) <= tolerance
-    assert result.report["hausdorff"]["under"] < 0.005
-    assert result.report["warnings"] == []
+    measured = result.report.volume
+    assert len(measured.per_part) == len(result)
+    assert measured.max == max(measured.per_part) <= tolerance
+    assert result.report.hausdorff.under < 0.005
+    assert result.report.warnings == ()
 
 
 def test_a_tighter_share_takes_more_hulls_and_is_a_share_of_what_was_said() -> None:
@@ -139,18 +139,18 @@ def test_a_tighter_share_takes_more_hulls_and_is_a_share_of_what_was_said() -> N
     assert counts[0] < counts[1] < counts[2]
     of_whole = rlacd.decompose(torus(), criterion="volume", volume_tolerance=0.02, volume_of="whole")
     assert len(of_whole) < counts[2]
-    added = [share * torus().volume for share in of_whole.report["volume"]["per_part"]]
+    added = [share * torus().volume for share in of_whole.report.volume.per_part]
     assert max(added) <= 0.02 * torus().volume
-    assert of_whole.report["volume"]["relative_to"] == "whole"
+    assert of_whole.report.volume.relative_to == "whole"
 
 
 def test_a_limit_on_hulls_may_exceed_the_share_and_says_by_how_much() -> None:
     result = rlacd.decompose(torus(), criterion="volume", max_hulls=6, quality="best", threads=1)
     assert len(result) <= 6
-    assert result.report["search"] is None
-    assert any("Nothing was searched" in warning for warning in result.report["warnings"])
-    assert result.report["volume"]["max"] > 0.01
-    assert any("add more than 1 % of volume" in warning for warning in result.report["warnings"])
+    assert result.report.search is None
+    assert any("Nothing was searched" in warning for warning in result.report.warnings)
+    assert result.report.volume.max > 0.01
+    assert any("add more than 1 % of volume" in warning for warning in result.report.warnings)
 
 
 @pytest.mark.parametrize(
@@ -173,9 +173,9 @@ def test_primitives_add_no_more_volume_than_hulls_may() -> None:
     mesh = trimesh.boolean.union([*legs, top, pole])
     hulls = rlacd.decompose(mesh, criterion="volume", volume_tolerance=0.05, threads=1)
     result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=0.05, primitives=True, threads=1)
-    assert result.report["volume"]["max"] <= 0.05
-    assert result.report["primitives"]["box"] >= 5
-    assert result.report["primitives"]["cylinder"] == 1
+    assert result.report.volume.max <= 0.05
+    assert result.report.primitives["box"] >= 5
+    assert result.report.primitives["cylinder"] == 1
     for hull, primitive in zip(hulls, result.primitives, strict=True):
         if primitive is not None:
             assert primitive.volume <= 1.05 * hull.volume + 1e-9

@@ -28,7 +28,7 @@ from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
-from tests.hulls import assert_convex_hull
+from tests.hulls import assert_convex_hull, strict_json
 from tests.shapes import Floats, box, elbow, from_manifold, point_to_triangles, trimesh_of
 
 # With these the balls are 0.1 wide in a frame 2 wide.
@@ -391,15 +391,15 @@ def test_a_door_wider_than_the_ball_opens_the_inside() -> None:
 def test_the_report_and_a_file_tell_of_the_balls(tmp_path: Path) -> None:
     result = rlacd.decompose(elbow(), criterion=rlacd.NavigableSpace(0.05, 0.02), policy="navacd")
     report = result.report
-    space = report["navigable"]
-    assert space["balls"] == len(result.balls) > 0
-    assert space["radius"] == pytest.approx(0.1)
-    assert space["intrusion"]["max"] == 0
-    assert len(space["intrusion"]["per_part"]) == len(result)
+    space = report.navigable
+    assert space.balls == len(result.balls) > 0
+    assert space.radius == pytest.approx(0.1)
+    assert space.intrusion.max == 0
+    assert len(space.intrusion.per_part) == len(result)
     assert len(result.save_balls(tmp_path / "balls.csv").read_text().splitlines()) == 1 + len(result.balls)
-    assert "concavity" not in report
-    assert report["options"]["criterion"]["radius"] == 0.05
-    json.dumps(report, allow_nan=False)
+    assert report.concavity is None
+    assert report.options["criterion"]["radius"] == 0.05
+    strict_json(result.report)
     for hull in result:
         assert_convex_hull(hull)
 
@@ -436,9 +436,9 @@ def test_one_pass_eliminates_parts_that_others_can_hold_together() -> None:
     merged = rlacd.decompose(mesh, criterion=space, quality="fast", policy="greedy-excess-norm+edges")
     assert len(divided) < len(merged)
     assert intrusion(divided) < 1e-6
-    assert divided.report["hausdorff"]["under"] < 5e-3
-    assert "search" in divided.report["seconds"]
-    assert "search" not in merged.report["seconds"]
+    assert divided.report.hausdorff.under < 5e-3
+    assert "search" in divided.report.seconds
+    assert "search" not in merged.report.seconds
 
 
 @pytest.mark.slow
@@ -467,7 +467,7 @@ def test_the_command_takes_seeds_and_planes_and_writes_the_balls(tmp_path: Path)
 def test_no_hull_overlaps_a_final_ball_on_real_meshes(corpus: Path) -> None:
     for name in (corpus / "quick.txt").read_text().split()[::4]:
         result = rlacd.decompose(corpus / name, criterion=rlacd.NavigableSpace(0.05, 0.01), policy="navacd")
-        assert result.report["navigable"]["intrusion"]["max"] == 0, name
+        assert result.report.navigable.intrusion.max == 0, name
         assert result.balls is not None
         scale = np.ptp(result.source.vertices, axis=0).max()
         assert intrusion(result) <= 1e-7 * scale, name

@@ -193,9 +193,8 @@ def decomposed(name: str, preset: str | None, meshes: Path | None) -> Decomposit
 
 def probes() -> Decomposition:
     """Balls of more and more corners, and slabs that are thinner and thinner, as the hulls of one body."""
-    return Decomposition(
-        hulls := [*map(ball, BALLS), *map(slab, SLABS)], {"name": "probes"}, trimesh.util.concatenate(hulls)
-    )
+    hulls = [*map(ball, BALLS), *map(slab, SLABS)]
+    return Decomposition.of(hulls, trimesh.util.concatenate(hulls), name="probes")
 
 
 def ball(corners: int) -> trimesh.Trimesh:

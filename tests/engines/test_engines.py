@@ -58,7 +58,7 @@ def test_every_hull_is_a_convex_shape_with_all_its_corners_and_its_volume(
         assert taken.get("volume", hull.volume) == pytest.approx(hull.volume, abs=close)
     if name == "PhysX on a GPU":
         refused = sum(not taken["gpu"] for taken in found.hulls)
-        warned = [int(said.split()[0]) for said in found.given.report["warnings"] if "PhysX on a GPU" in said]
+        warned = [int(said.split()[0]) for said in found.given.report.warnings if "PhysX on a GPU" in said]
         assert refused <= sum(warned)
     if body == "table" and "mass" in found.hulls[0]:
         assert found.hulls[0]["mass"] == pytest.approx(1000 * found.given.source.volume, rel=1e-6)

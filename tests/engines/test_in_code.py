@@ -38,9 +38,9 @@ class Fallen(NamedTuple):
 
 def moments(result: Decomposition) -> tuple[Any, Any, list[float]]:
     """The centre and inertia of a body as heavy as it should be; the inertia also as its diagonal and xy, xz, yz."""
-    mass = result.report["mass"]
-    inertia = MASS / mass["volume_abs"] * np.array(mass["inertia_abs"])
-    return np.array(mass["centre_abs"]), inertia, [*np.diag(inertia), *inertia[np.triu_indices(3, 1)]]
+    mass = result.report.mass
+    inertia = MASS / mass.volume_abs * np.array(mass.inertia_abs)
+    return np.array(mass.centre_abs), inertia, [*np.diag(inertia), *inertia[np.triu_indices(3, 1)]]
 
 
 def in_mujoco(weighed: Decomposition, mesh: Any, options: dict[str, Any]) -> Fallen:

@@ -199,8 +199,8 @@ CRITERIA: list[tuple[str, dict[str, Any]]] = [
 
 
 def error(result: rlacd.Decomposition, criterion: str) -> float:
-    entry = result.report[criterion]
-    return float(entry["intrusion"]["max"] if criterion == "navigable" else entry["max"])
+    entry = getattr(result.report, criterion)
+    return float(entry.intrusion.max if criterion == "navigable" else entry.max)
 
 
 CASES = [pytest.param(drawer, 8, marks=pytest.mark.slow)]
@@ -219,15 +219,15 @@ def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(
     for limit in range(1, most + 1):
         result = rlacd.decompose(mesh, max_hulls=limit, **options)
         assert len(result) <= limit
-        assert result.report["hausdorff"]["under"] < 0.005
+        assert result.report.hausdorff.under < 0.005
         if limit >= len(free):
             assert_same_hulls(result, free)
-            assert result.report["warnings"] == free.report["warnings"]
+            assert result.report.warnings == free.report.warnings
             break
         worst = error(result, criterion)
         assert worst <= last + (ACCURACY if criterion == "concavity" else 1e-9)
         assert worst > error(free, criterion)
-        assert result.report["warnings"], "it says by how much"
+        assert result.report.warnings, "it says by how much"
         last = worst
 
 

@@ -21,6 +21,7 @@ from rlacd.errors import OptionError
 from rlacd.finish.overlap import overlap_parts
 from rlacd.io.write import save
 from rlacd.options import Options
+from rlacd.report import Overlap
 from rlacd.result import Result
 from rlacd.solid.component import Component, Plane
 from tests.hulls import assert_convex_hull
@@ -80,14 +81,14 @@ def test_no_needle_slips_between_hulls_that_overlap(options: dict[str, Any]) -> 
     mesh = stool()
     flush = rlacd.decompose(mesh, quality="fast", threads=1, **options)
     result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=OVERLAP / 2, **options)
-    overlap = OVERLAP / result.report["scale"]
+    overlap = OVERLAP / result.report.scale
     places, deep = needles(mesh, flush.hulls, overlap / 10)
     assert len(places) > 100
     assert slips(flush.hulls, places, deep, overlap) > 0.9
     assert slips(result.hulls, places, deep, overlap) == 0.0
-    assert result.report["overlap"]["short"] == 0
-    assert result.report["overlap"]["seams"] >= 3
-    assert result.report["warnings"] == flush.report["warnings"]
+    assert result.report.overlap.short == 0
+    assert result.report.overlap.seams >= 3
+    assert result.report.warnings == flush.report.warnings
     for hull in result:
         assert_convex_hull(hull)
         assert len(hull.vertices) <= options.get("max_vertices", np.inf)
@@ -97,8 +98,8 @@ def test_no_needle_slips_between_hulls_that_overlap(options: dict[str, Any]) -> 
 def test_the_threshold_holds_and_each_hull_contains_its_own() -> None:
     flush, result = (rlacd.decompose(stool(), quality="fast", threads=1, overlap=depth / 2) for depth in (0.0, OVERLAP))
     assert len(flush) == len(result)
-    assert result.report["concavity"]["max"] <= 0.05
-    assert result.report["hausdorff"]["over"] <= 0.05
+    assert result.report.concavity.max <= 0.05
+    assert result.report.hausdorff.over <= 0.05
     for before, after in zip(flush, result, strict=True):
         assert depths([after], before.vertices).min() > -1e-9
     assert sum(hull.volume for hull in result) > sum(hull.volume for hull in flush)
@@ -136,18 +137,18 @@ def test_a_seam_without_room_is_told() -> None:
     """Two blocks of a stair: what either takes in of the other spans the step between them."""
     mesh = trimesh_of(Manifold.cube((1.0, 1.0, 1.0)) + Manifold.cube((1.0, 1.0, 1.0)).translate((1.0, 0.5, 0.5)))
     result = rlacd.decompose(mesh, threshold=0.003, overlap=0.1, quality="fast", threads=1)
-    overlap = result.report["overlap"]
-    assert overlap["short"] > 0
-    (told,) = (warning for warning in result.report["warnings"] if "seams" in warning)
-    assert f"{overlap['short']} of {overlap['seams']} seams" in told
-    assert len(overlap["short_seams"]) == overlap["short"]
-    for seam in overlap["short_seams"]:
-        place = np.array([seam["at_abs"]])
-        between = depths([result[part] for part in seam["parts"]], place)
-        assert between.max() == pytest.approx(seam["depth_abs"], abs=1e-3)
-        assert between.min() > -0.003 / result.report["scale"], "a place on both hulls"
-        assert seam["depth_abs"] < 0.1 / result.report["scale"]
-    assert result.report["concavity"]["max"] <= 0.003
+    overlap = result.report.overlap
+    assert overlap.short > 0
+    (told,) = (warning for warning in result.report.warnings if "seams" in warning)
+    assert f"{overlap.short} of {overlap.seams} seams" in told
+    assert len(overlap.short_seams) == overlap.short
+    for seam in overlap.short_seams:
+        place = np.array([seam.at_abs])
+        between = depths([result[part] for part in seam.parts], place)
+        assert between.max() == pytest.approx(seam.depth_abs, abs=1e-3)
+        assert between.min() > -0.003 / result.report.scale, "a place on both hulls"
+        assert seam.depth_abs < 0.1 / result.report.scale
+    assert result.report.concavity.max <= 0.003
 
 
 def test_nodes_that_move_do_not_overlap_each_other() -> None:
@@ -161,7 +162,7 @@ def test_nodes_that_move_do_not_overlap_each_other() -> None:
     frame = [hull for hull in result if hull.metadata["node"] == "frame"]
     flush = rlacd.decompose(ell(), quality="fast", threads=1)
     assert sum(hull.volume for hull in frame) > sum(hull.volume for hull in flush)
-    assert result.report["overlap"] == {"seams": 1, "short": 0, "short_seams": []}
+    assert result.report.overlap == Overlap(1, 0, ())
 
 
 @pytest.mark.slow
@@ -171,11 +172,11 @@ def test_few_needles_slip_between_hulls_of_real_objects(corpus: Path, name: str,
     mesh = corpus / "test" / "vhacd" / name
     flush = rlacd.decompose(mesh, quality="fast", threads=1, detail="full")
     result = rlacd.decompose(mesh, quality="fast", threads=1, overlap=0.01)
-    overlap = 0.02 / result.report["scale"]
+    overlap = 0.02 / result.report.scale
     places, deep = needles(flush.source, flush.hulls, overlap / 10)
     assert slips(flush.hulls, places, deep, overlap) > 0.9
     assert slips(result.hulls, places, deep, overlap) < least
-    assert result.report["concavity"]["max"] <= 0.05
+    assert result.report.concavity.max <= 0.05
 
 
 FORCE = 100.0

@@ -116,14 +116,14 @@ def test_of_equal_holes_each_is_listed_once_and_only_wide_ones_are_warned_of(
 ) -> None:
     mesh, axes, free = perforated(kind, side, radius, thickness, turn)
     result = rlacd.decompose(mesh, quality="fast", threads=1, max_hulls=1)  # all close
-    report, size = result.report, result.report["scale"]
-    away = [np.linalg.norm(np.array(p["at_abs"]) - axes, axis=-1).min(axis=1) for p in report["passages"]]
+    report, size = result.report, result.report.scale
+    away = [np.linalg.norm(np.array(p.at_abs) - axes, axis=-1).min(axis=1) for p in report.passages]
     assert sorted(int(one.argmin()) for one in away) == list(range(side * side))
     assert max(one.min() for one in away) <= max(1.05 * radius, 0.1 * thickness)
-    for passage in report["passages"]:
-        assert passage["radius_abs"] == pytest.approx(free, rel=0.02)
-        assert passage["left_abs"] == 0
-    told = [said for said in report["warnings"] if "passage" in said]
+    for passage in report.passages:
+        assert passage.radius_abs == pytest.approx(free, rel=0.02)
+        assert passage.left_abs == 0
+    told = [said for said in report.warnings if "passage" in said]
     if free * size < 0.05:
         assert told == []
     else:
@@ -136,22 +136,22 @@ def test_what_is_left_of_each_hole_is_measured() -> None:
     scale = 50.0
     mesh = trimesh_of(plate(*(bore(0.1, x, y) for x, y in places))).apply_scale(scale)
     result = rlacd.decompose(mesh, threshold=0.09, max_hulls=10, quality="fast", threads=1)
-    listed = result.report["passages"]
-    seen = {min(range(8), key=lambda i: np.hypot(*(np.array(p["at_abs"][:2]) / scale - places[i]))) for p in listed}
+    listed = result.report.passages
+    seen = {min(range(8), key=lambda i: np.hypot(*(np.array(p.at_abs[:2]) / scale - places[i]))) for p in listed}
     lost = [clearance(result.hulls, scale * axis(x, y)).min() < 0.85 * 5 for x, y in places]
     assert len(listed) == len(seen)
     assert seen.issuperset(np.flatnonzero(lost).tolist())
     assert len(seen) > 4
-    shares = [passage["left_abs"] / passage["radius_abs"] for passage in listed]
+    shares = [passage.left_abs / passage.radius_abs for passage in listed]
     assert shares == sorted(shares)
     for passage in listed:
-        assert 0.97 * 5 <= passage["radius_abs"] <= 5
-        assert passage["left_abs"] == pytest.approx(clearance(result.hulls, np.array([passage["at_abs"]]))[0], abs=1e-6)
-    (warning,) = (said for said in result.report["warnings"] if "passages" in said)
+        assert 0.97 * 5 <= passage.radius_abs <= 5
+        assert passage.left_abs == pytest.approx(clearance(result.hulls, np.array([passage.at_abs]))[0], abs=1e-6)
+    (warning,) = (said for said in result.report.warnings if "passages" in said)
     assert f"{sum(share < 1 / 2 for share in shares)} passages narrow by over half" in warning
     assert warning.endswith("; --keep-open, or a smaller threshold, keeps more open.")
     result = rlacd.decompose(mesh, criterion="volume", volume_tolerance=1.0, quality="fast", threads=1)
-    assert result.report["warnings"][-1].endswith("; --keep-open, or a smaller tolerance, keeps more open.")
+    assert result.report.warnings[-1].endswith("; --keep-open, or a smaller tolerance, keeps more open.")
 
 
 def lugs(gap: float) -> Manifold:
@@ -178,22 +178,22 @@ def test_each_passage_is_listed_once_however_long_and_holes_on_one_axis_are_two(
     solid: Manifold, threshold: float, listed: int
 ) -> None:
     report = rlacd.decompose(trimesh_of(solid), threshold=threshold, quality="fast", threads=1).report
-    assert len(report["passages"]) == listed
+    assert len(report.passages) == listed
 
 
 @pytest.mark.promise("passages")
 def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     block = box((0, 0, 0), (100, 40, 30)) - box((5, 19.5, 10), (95, 20.5, 40))
     report = rlacd.decompose(trimesh_of(block), quality="fast", threads=1).report
-    (slot,) = report["passages"]
-    assert (slot["radius_abs"], slot["left_abs"]) == pytest.approx((0.5, 0.0), abs=0.01)
-    assert report["warnings"] == []
+    (slot,) = report.passages
+    assert (slot.radius_abs, slot.left_abs) == pytest.approx((0.5, 0.0), abs=0.01)
+    assert report.warnings == ()
     report = rlacd.decompose(trimesh_of(block), threshold=0.005, max_hulls=1, quality="fast", threads=1).report
     assert any(
         said.startswith("1 passage narrows by") and "1 to nothing" in said and "from a radius of 0.5 to 0;" in said
-        for said in report["warnings"]
+        for said in report.warnings
     )
-    assert rlacd.decompose(trimesh_of(block), threshold_abs=0.05, quality="fast", threads=1).report["passages"] == []
+    assert rlacd.decompose(trimesh_of(block), threshold_abs=0.05, quality="fast", threads=1).report.passages == ()
 
 
 CRITERIA: list[dict[str, Any]] = [
@@ -214,7 +214,7 @@ def test_a_share_of_every_wide_hole_stays_open_whatever_decides_the_hulls(given:
     result = rlacd.decompose(mesh, keep_open=0.9, quality="fast", threads=1, **given)
     for radius, x, y in wide:
         assert clearance(result.hulls, axis(x, y)).min() >= 0.985 * 0.9 * radius * np.cos(np.pi / 64)
-    assert not any("Passage" in said for said in result.report["warnings"])
+    assert not any("Passage" in said for said in result.report.warnings)
 
 
 @pytest.mark.slow
@@ -224,7 +224,7 @@ def test_of_equal_holes_each_keeps_its_share(kind: str, side: int, thickness: fl
     mesh, axes, free = perforated(kind, side, 0.09, thickness, turn)
     result = rlacd.decompose(mesh, threshold=0.04, keep_open=0.9, quality="fast", threads=1)
     assert clearance(result.hulls, axes.reshape(-1, 3)).min() >= 0.885 * free
-    assert not any("passage" in said for said in result.report["warnings"])
+    assert not any("passage" in said for said in result.report.warnings)
 
 
 @pytest.mark.promise("keep-open")
@@ -249,13 +249,13 @@ def test_a_ball_of_a_given_radius_still_passes_and_narrower_holes_may_close() ->
 def test_where_a_limit_forbids_it_a_warning_says_so() -> None:
     mesh = trimesh_of(plate(bore(0.3, 0, 0)))
     report = rlacd.decompose(mesh, keep_open=0.95, max_hulls=2, quality="fast", threads=1).report
-    (passage,) = report["passages"]
-    at = ", ".join(f"{x:.4g}" for x in passage["at_abs"])
-    size = f"from a radius of {passage['radius_abs']:.4g} to {passage['left_abs']:.4g}"
+    (passage,) = report.passages
+    at = ", ".join(f"{x:.4g}" for x in passage.at_abs)
+    size = f"from a radius of {passage.radius_abs:.4g} to {passage.left_abs:.4g}"
     assert any(
         said.startswith("1 passage narrows by more than --keep-open allows")
         and said.endswith(f"near ({at}) {size}; limits on the hulls leave no other way.")
-        for said in report["warnings"]
+        for said in report.warnings
     )
 
 

@@ -143,7 +143,7 @@ def test_a_solid_that_is_a_primitive_becomes_it(kind: PrimitiveKind) -> None:
     result = rlacd.decompose(mesh, primitives=True, quality="fast", threads=1)
     (found,) = result.primitives
     assert found.kind == kind
-    assert result.report["primitives"] == {**dict.fromkeys((*PRIMITIVE_KINDS, "hull"), 0), kind: 1}
+    assert result.report.primitives == {**dict.fromkeys((*PRIMITIVE_KINDS, "hull"), 0), kind: 1}
     assert found.volume == pytest.approx(mesh.volume, rel=0.02)
     assert depth(found, mesh.vertices).min() >= 0
     assert f"1 as {kind}" in repr(result)
@@ -154,10 +154,10 @@ def test_a_table_is_five_boxes_of_the_right_size() -> None:
     boxes = primitives_of(result)
     assert [box.kind for box in boxes] == ["box"] * 5
     assert sorted(max(boxes, key=lambda box: box.volume).size) == pytest.approx([0.02, 0.3, 0.4], abs=1e-6)
-    assert result.report["mass"]["volume_abs"] == pytest.approx(TABLE_VOLUME, rel=1e-9)
+    assert result.report.mass.volume_abs == pytest.approx(TABLE_VOLUME, rel=1e-9)
     plain = rlacd.decompose(table(), threads=1)
     assert plain.primitives == [None] * len(plain)
-    assert "primitives" not in plain.report
+    assert plain.report.primitives is None
 
 
 def test_what_a_cut_at_an_angle_left_out_of_a_box_is_solid_so_that_it_may_be_a_box() -> None:
@@ -170,18 +170,18 @@ def test_what_a_cut_at_an_angle_left_out_of_a_box_is_solid_so_that_it_may_be_a_b
     for box, extents in zip(primitives_of(result), (bounds[0][1], bounds[1][1]), strict=True):
         assert sorted(box.size) == pytest.approx(sorted(extents), abs=1e-6)
     assert_true(result)
-    assert result.report["hausdorff"]["over"] < 5e-3
+    assert result.report.hausdorff.over < 5e-3
 
 
 def assert_true(result: rlacd.Decomposition, threshold: float = 0.05) -> None:
     """Every hull contains its primitive, the primitives cover the input, and reach no farther than the threshold."""
-    scale = result.report["scale"]
+    scale = result.report.scale
     for hull, primitive in zip(result, result.primitives, strict=True):
         assert_convex_hull(hull)
         if primitive is not None:
             assert ((hull.vertices @ DIRECTIONS.T).max(axis=0) - support_of(primitive)).min() * scale > -1e-8
-    assert result.report["concavity"]["max"] <= threshold
-    assert result.report["hausdorff"]["over"] <= threshold + 5e-3
+    assert result.report.concavity.max <= threshold
+    assert result.report.hausdorff.over <= threshold + 5e-3
     surface, _ = trimesh.sample.sample_surface(result.source, 3000, seed=0)
     inside = np.zeros(len(surface), dtype=bool)
     for hull, primitive in zip(result, result.primitives, strict=True):
@@ -190,7 +190,7 @@ def assert_true(result: rlacd.Decomposition, threshold: float = 0.05) -> None:
         else:
             planes = hull.face_normals, np.einsum("fi,fi->f", hull.face_normals, hull.triangles[:, 0])
             inside |= ((surface @ planes[0].T - planes[1]) * scale <= 1e-6).all(axis=1)
-    assert inside.mean() > 0.999 - result.report["hausdorff"]["under"] * 100
+    assert inside.mean() > 0.999 - result.report.hausdorff.under * 100
     for primitive in result.primitives:
         if primitive is not None:
             _, distances, _ = trimesh.proximity.closest_point(result.source, samples_on(primitive, 60))
@@ -223,7 +223,7 @@ def test_only_the_kinds_named_are_used() -> None:
     for kinds in (["box"], "box", ("box", "sphere"), " box , sphere "):
         result = rlacd.decompose(solid("cylinder"), primitives=kinds, threshold=0.5, quality="fast", threads=1)  # type: ignore[arg-type]
         assert all(each is None or each.kind in ("box", "sphere") for each in result.primitives)
-    assert result.report["options"]["primitives"] == ["sphere", "box"]
+    assert result.report.options["primitives"] == ["sphere", "box"]
 
 
 @pytest.mark.parametrize("wrong", ["ball", ["box", "cone"], "", 3, [3], {"box": 1}])

@@ -104,7 +104,7 @@ def test_hulls_lie_around_their_node_wherever_it_goes_in_the_unit_of_the_scene(
         assert_convex_hull(there)
         assert there.volume == pytest.approx(hull.volume * factor**3, rel=1e-5)
         assert np.allclose(there.bounds, hull.bounds * factor, atol=1e-5)
-        assert result.report["provenance"][number]["node"] == hull.metadata["node"]
+        assert result.report.provenance[number].node == hull.metadata["node"]
     alone = trimesh.load_scene(result.save(tmp_path / "hulls.glb"), process=False)
     assert np.allclose(alone.extents, before.extents / factor, rtol=0.02)
 
@@ -112,9 +112,9 @@ def test_hulls_lie_around_their_node_wherever_it_goes_in_the_unit_of_the_scene(
 def test_hulls_of_a_scene_as_a_whole_know_their_node(tmp_path: Path, cart: Path) -> None:
     result = rlacd.decompose(cart, threads=1)
     nodes = [hull.metadata["node"] for hull in result]
-    assert {one["node"] for one in result.report["provenance"]} == set(nodes)
+    assert {one.node for one in result.report.provenance} == set(nodes)
     assert {"Axle", "Flag pole"} <= set(nodes) <= {"Axle", "Wheel", "wheel", "Flag pole"}
-    bodies = {repair["body"] for repair in result.report["repair"]}
+    bodies = {repair.body for repair in result.report.repair}
     assert {hull.metadata["body"] for hull in result} <= bodies
     header, _, _ = read_glb(result.save(tmp_path / "out.glb", file_format="godot"))
     assert sum(node.get("name", "").endswith("-convcolonly") for node in header["nodes"]) == len(result)
@@ -137,11 +137,11 @@ def test_nodes_apart_share_the_threshold_of_the_scene() -> None:
     for relative_to in ("scene", "node"):
         result = rlacd.decompose(scene, per_node=True, relative_to=relative_to, threads=1)
         counts[relative_to] = [hull.metadata["node"] for hull in result]
-        worst = result.report["concavity"]
-        assert len(worst["per_part"]) == len(result)
-        assert result.report["parts"] == len(result)
-        assert result.report["mass"]["volume_abs"] == pytest.approx(3.0 + 0.1 * 0.02**2 + 0.08 * 0.02**2, rel=1e-6)
-        assert [body["body"] for body in result.report["repair"]] == list(range(len(result.report["repair"])))
+        worst = result.report.concavity
+        assert len(worst.per_part) == len(result)
+        assert result.report.parts == len(result)
+        assert result.report.mass.volume_abs == pytest.approx(3.0 + 0.1 * 0.02**2 + 0.08 * 0.02**2, rel=1e-6)
+        assert [body.body for body in result.report.repair] == list(range(len(result.report.repair)))
     assert counts["scene"] == ["cupboard", "handle"]
     assert counts["node"].count("handle") == 2
     tight = rlacd.decompose(scene, per_node=True, threshold_abs=0.002, threads=1)
@@ -240,7 +240,7 @@ def test_hulls_of_an_earlier_run_give_way_to_new_ones(
     again = rlacd.decompose(first, per_node=True, threads=1)
     assert [hull.metadata["node"] for hull in again] == [hull.metadata["node"] for hull in apart]
     assert all(np.array_equal(a.vertices, b.vertices) for a, b in zip(again, apart, strict=True))
-    assert f"{len(apart)} of {len(apart) + 4} nodes, hulls of an engine" in again.report["warnings"][0]
+    assert f"{len(apart)} of {len(apart) + 4} nodes, hulls of an engine" in again.report.warnings[0]
 
     second = again.save(tmp_path / "second.glb", file_format=file_format, keep_input=keep)
     before, after = (trimesh.load_scene(path, process=False) for path in (first, second))
@@ -260,7 +260,7 @@ def test_hulls_of_a_scene_in_memory_and_of_other_files_give_way(tmp_path: Path) 
     for source in (scene, tmp_path / "post.3mf", tmp_path / "post.obj"):
         result = rlacd.decompose(source, threads=1, quality="fast")
         assert [hull.volume for hull in result] == pytest.approx([3.0])
-        assert "1 of 2 nodes, hulls of an engine (UCX_post_00) were left out" in result.report["warnings"]
+        assert "1 of 2 nodes, hulls of an engine (UCX_post_00) were left out" in result.report.warnings
         read = trimesh.load_scene(result.save(tmp_path / "out.glb", file_format="unreal"), process=False)
         assert read.extents.max() == pytest.approx(3.0)
         assert len(read.graph.nodes_geometry) == 2
@@ -269,5 +269,5 @@ def test_hulls_of_a_scene_in_memory_and_of_other_files_give_way(tmp_path: Path) 
 def test_a_file_of_hulls_alone_is_decomposed() -> None:
     scene = trimesh.Scene({f"UCX_post_0{number}": trimesh.creation.box((1, 1, number + 1)) for number in range(2)})
     result = rlacd.decompose(scene, threads=1, quality="fast")
-    assert result.report["warnings"] == []
+    assert result.report.warnings == ()
     assert max(hull.extents.max() for hull in result) == pytest.approx(2.0)

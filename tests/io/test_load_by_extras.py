@@ -125,12 +125,12 @@ def test_triangles_are_nearer_to_a_surface_than_a_tenth_of_the_threshold_and_tha
     options: dict[str, Any], wanted: float
 ) -> None:
     result = rlacd.decompose(BALL, quality="fast", threads=1, **options)
-    said = result.report["deviation_abs"]
+    said = result.report.deviation_abs
     size = np.ptp(result.source.vertices, axis=0).max()
     assert said == pytest.approx(wanted, rel=0.01)
     shrunk = trimesh.Trimesh(result.source.vertices * 0.06 / size, result.source.faces, process=False)
     assert sag(shrunk) <= said * 0.06 / size
-    assert sum("overrides" in said for said in result.report["warnings"]) == ("unit" in options)
+    assert sum("overrides" in said for said in result.report.warnings) == ("unit" in options)
 
 
 @CAD

@@ -165,7 +165,7 @@ def test_nodes_that_a_file_hides_neither_count_nor_stretch_the_others(rig: Rig, 
     assert mesh.faces.shape == BOX.faces.shape
     np.testing.assert_array_equal(np.sort(mesh.vertices[mesh.faces], axis=0), np.sort(BOX.triangles, axis=0))
     result = rlacd.decompose(tmp_path / "box.glb", quality="fast", threads=1, per_node=True)
-    assert (len(result), result.report["scale"]) == (1, 2.0)
+    assert (len(result), result.report.scale) == (1, 2.0)
 
 
 def test_what_a_gltf_adds_to_its_triangles_is_read_refused_or_named(tmp_path: Path) -> None:

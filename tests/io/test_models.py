@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import sys
@@ -41,7 +42,7 @@ def wooden() -> Decomposition:
 
 def renamed(result: Decomposition, name: str, **changes: Any) -> Decomposition:
     parts = {"hulls": result.hulls, "source": result.source, **changes}
-    return Decomposition(parts["hulls"], {**result.report, "name": name}, parts["source"])
+    return Decomposition(parts["hulls"], dataclasses.replace(result.report, name=name), parts["source"])
 
 
 # --- simulators -------------------------------------------------------------------------------------------------------
@@ -115,7 +116,7 @@ def test_bodies_stand_up_whatever_axis_points_up(tmp_path: Path, wooden: Decompo
 # --- USD and engines --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ending", MODELS["usd"])
+@pytest.mark.parametrize("ending", MODELS["usd"].endings)
 def test_usd_opens_and_its_validators_find_nothing(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
     pytest.importorskip("pxr", reason="the extra usd is not installed")
     from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
@@ -164,7 +165,7 @@ def test_usd_turns_the_inertia_the_right_way(tmp_path: Path) -> None:
     assert np.array(api.GetCenterOfMassAttr().Get()) == pytest.approx(hull.center_mass, abs=1e-5)
 
 
-@pytest.mark.parametrize("ending", MODELS["unreal"])
+@pytest.mark.parametrize("ending", MODELS["unreal"].endings)
 def test_unreal_finds_the_hulls_of_the_mesh_by_name(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
     path = renamed(wooden, "my table").save(tmp_path / f"table.{ending}", file_format="unreal")
     read = trimesh.load_scene(path, process=False, **({"split_objects": True} if ending == "obj" else {}))

@@ -101,7 +101,7 @@ def test_the_meshes_of_a_link_become_one_solid_where_its_first_mesh_was(lever: P
     """Turned, moved and mirrored; what collides differently stays apart, and primitives stay."""
     done = rlacd.rewrite_robot(lever, lever.with_name("out.urdf"), threshold_abs=0.01, threads=1)
     arm, hand = done.links
-    assert [len(result.report["repair"]) for result in arm.results] == [2, 1]
+    assert [len(result.report.repair) for result in arm.results] == [2, 1]
     assert hand.results[0] is arm.results[1], "alike, wherever it is"
     after = done.path.read_text()
     assert after.count("<!-- between -->") == after.count('<sphere radius="1"/>') == after.count('group="soft"') == 1
@@ -133,11 +133,11 @@ def test_lengths_are_shares_of_the_robot_at_rest(lever: Path) -> None:
     for how, length in (({}, 0.015 * size), ({"threshold": 0.1}, 0.05 * size), ({"threshold_abs": 0.2}, 0.2)):
         done = rlacd.rewrite_robot(lever, lever.with_name("out.urdf"), links={"h.nd": 0.01}, threads=1, **how)  # type: ignore[arg-type]
         for link, want in zip(done.links, (length, 0.01), strict=True):
-            options = link.results[0].report["options"]
+            options = link.results[0].report.options
             assert options["criterion"] == "distance"
             assert options["threshold_abs"] == pytest.approx(want, rel=5e-3)
     own = rlacd.rewrite_robot(lever, lever.with_name("own.urdf"), relative_to="mesh", per="mesh", threads=1)
-    options = own.links[0].results[0].report["options"]
+    options = own.links[0].results[0].report.options
     assert (options["criterion"], options["threshold"], options["threshold_abs"]) == ("concavity", 0.05, None)
     with pytest.raises(OptionError, match=r"matches the regular expression 'han': arm, hand"):
         rlacd.rewrite_robot(lever, lever.with_name("no.urdf"), links={"han": 0.01})
@@ -214,7 +214,7 @@ def test_lengths_are_in_the_robots_unit(tmp_path: Path) -> None:
     big.export(tmp_path / "big.stl")
     robot = urdf(tmp_path, "filename='big.stl' scale='0.001 0.001 0.001'")
     done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threshold_abs=0.004, threads=1)
-    assert done.links[0].results[0].report["options"]["threshold_abs"] == 0.004  # metres, as it was given
+    assert done.links[0].results[0].report.options["threshold_abs"] == 0.004  # metres, as it was given
     (hulls,) = [trimesh.util.concatenate(collisions(done.path))]
     assert hulls.bounds == pytest.approx(table().bounds, abs=1e-6)
 

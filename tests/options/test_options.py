@@ -285,10 +285,8 @@ def test_a_length_may_be_a_share_or_in_metres() -> None:
 
 
 @pytest.mark.parametrize("options", [Options, NavigableSpace, OutputOptions, TrainOptions])
-def test_every_option_and_no_other_name_is_explained(options: Any) -> None:
-    explained = [line.strip() for line in options.__doc__.splitlines() if re.fullmatch(r" {4}\w+", line)]
+def test_every_option_is_explained(options: Any) -> None:
     fields = dataclasses.fields(options)
-    assert explained[: len(fields) + 1] == ["Attributes", *(field.name for field in fields)]
     assert all(field.metadata["option"].help.endswith(".") for field in fields)
 
 

@@ -54,9 +54,9 @@ def test_a_convex_body_is_one_hull_within_any_limits_and_a_warning_tells_how_far
         assert len(hull.faces) <= (limits.get("max_faces") or (preset and preset.max_faces) or np.inf)
         assert Polytope(hull.vertices, hull.faces).height(np.asarray(body.vertices)).max() <= 1e-9
         out = trimesh.proximity.closest_point(body, hull.vertices)[1].max() * 2 / body.extents.max()
-        told = [warning for warning in result.report["warnings"] if "sticks out by up to" in warning]
+        told = [warning for warning in result.report.warnings if "sticks out by up to" in warning]
         assert len(told) == (out > 0.0501) or out > 0.0499
-        assert result.report["hausdorff"]["over"] == pytest.approx(out, abs=0.003)
+        assert result.report.hausdorff.over == pytest.approx(out, abs=0.003)
 
 
 @pytest.mark.slow
@@ -68,23 +68,23 @@ def test_a_preset_takes_at_most_twice_the_hulls(name: str) -> None:
     result = rlacd.decompose(mesh, preset=name, threads=1, quality="fast")
     assert max(len(hull.vertices) for hull in result) <= (preset.max_vertices or np.inf)
     assert max(len(hull.faces) for hull in result) <= (preset.max_faces or np.inf)
-    assert result.report["options"]["preset"] == name
+    assert result.report.options["preset"] == name
     assert len(free) <= len(result) <= 2 * len(free)
-    over = result.report["concavity"]["max"] > 0.05
-    assert over == any("stick" in warning for warning in result.report["warnings"])
+    over = result.report.concavity.max > 0.05
+    assert over == any("stick" in warning for warning in result.report.warnings)
 
 
 def test_options_given_go_before_the_preset() -> None:
     result = rlacd.decompose(ball(), preset="newton", max_vertices=100, threads=1)
     assert 64 < max(len(hull.vertices) for hull in result) <= 100
-    (warning,) = result.report["warnings"]
+    (warning,) = result.report.warnings
     assert warning.endswith("more than 64, the limit for Newton.")
 
 
 def test_a_sheet_that_a_gpu_refuses_is_reported() -> None:
     sheet = trimesh.creation.box((1.0, 1.0, 0.004))
-    assert rlacd.decompose(sheet, preset="physx", threads=1).report["warnings"] == []
-    (warning,) = rlacd.decompose(sheet, preset="physx-gpu", threads=1).report["warnings"]
+    assert rlacd.decompose(sheet, preset="physx", threads=1).report.warnings == ()
+    (warning,) = rlacd.decompose(sheet, preset="physx-gpu", threads=1).report.warnings
     assert warning.startswith("1 hull is thinner than 1/100")
 
 

@@ -41,7 +41,7 @@ def test_python_and_the_command_line_agree_on_what_points_up(tmp_path: Path, end
     if ending == "dae":
         told(path, up, 1.0)
     result = rlacd.decompose(path, threads=1)
-    assert result.report["up"] == up
+    assert result.report.up == up
     result.save(tmp_path / "python" / "chair.xml")
     run = CliRunner().invoke(
         app,
@@ -55,18 +55,18 @@ def test_python_and_the_command_line_agree_on_what_points_up(tmp_path: Path, end
 
 
 def test_units_that_files_state(tmp_path: Path) -> None:
-    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.glb"), threads=1).report["metres"] == 1.0
-    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.3mf"), threads=1).report["metres"] == 1e-3
-    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.stl"), threads=1).report["metres"] is None
+    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.glb"), threads=1).report.metres == 1.0
+    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.3mf"), threads=1).report.metres == 1e-3
+    assert rlacd.decompose(write_mesh(table(), tmp_path / "chair.stl"), threads=1).report.metres is None
     path = write_mesh(table(), tmp_path / "chair.dae")
     told(path, "z", 0.0254)
     in_inches = rlacd.decompose(path, threads=1)
-    assert in_inches.report["metres"] == pytest.approx(0.0254)
+    assert in_inches.report.metres == pytest.approx(0.0254)
     assert np.allclose(in_inches.source.extents, table().extents, atol=1e-6)  # as they are, unless asked for
     in_metres = rlacd.decompose(path, threads=1, unit="file")
     assert np.allclose(in_metres.source.extents, table().extents * 0.0254, atol=1e-7)
-    assert not any("overrides" in said for said in in_metres.report["warnings"])
-    otherwise = rlacd.decompose(path, threads=1, unit="mm").report["warnings"]
+    assert not any("overrides" in said for said in in_metres.report.warnings)
+    otherwise = rlacd.decompose(path, threads=1, unit="mm").report.warnings
     assert any("the unit of chair.dae is 0.0254 m" in said and "--unit mm overrides" in said for said in otherwise)
     with pytest.raises(OptionError, match="does not say its unit"):
         rlacd.decompose(write_mesh(table(), tmp_path / "chair.ply"), unit="file")
@@ -78,7 +78,7 @@ def test_a_unit_and_a_factor_convert_everything(unit: str, metres: float) -> Non
     result = rlacd.decompose(table(), quality="fast", unit=unit, scale=2.0, threads=1)  # type: ignore[arg-type]
     factor = 2 * metres
     assert len(result) == len(plain)
-    assert result.report["mass"]["volume_abs"] == pytest.approx(TABLE_VOLUME * factor**3, rel=1e-6)
+    assert result.report.mass.volume_abs == pytest.approx(TABLE_VOLUME * factor**3, rel=1e-6)
     volumes = [sorted(hull.volume for hull in each) for each in (result, plain)]
     assert np.allclose(volumes[0], np.array(volumes[1]) * factor**3, rtol=1e-6, atol=0)
     assert np.allclose(result.source.vertices, plain.source.vertices * factor, rtol=1e-12, atol=0)
@@ -122,8 +122,8 @@ def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> N
     walls = trimesh.creation.box((0.2, 0.2, 0.2))
     walls.update_faces(walls.face_normals[:, 2] < 0.5)
     shell = rlacd.decompose(walls, open="thin", quality="fast", threads=1)
-    assert [body["step"] for body in shell.report["repair"]] == [SHEET]
-    assert shell.report["mass"]["volume_abs"] == pytest.approx(5 * 0.2**2 * 2 * HALF_THICKNESS * 0.1, rel=0.02)
+    assert [body.step for body in shell.report.repair] == [SHEET]
+    assert shell.report.mass.volume_abs == pytest.approx(5 * 0.2**2 * 2 * HALF_THICKNESS * 0.1, rel=0.02)
     with pytest.warns(rlacd.ImplausibleBodyWarning, match=r"hollow shell .* walls 0.0002 thick"):
         shell.save(tmp_path / "shell.xml")
     with warnings.catch_warnings():

@@ -201,8 +201,8 @@ def test_a_deep_hair_thin_slit_in_a_body_is_filled(width, filled):
 def test_closed_furniture_is_a_few_hulls(name, corpus):
     result = rlacd.decompose(corpus / "train" / "kenney_cc0" / f"furniture_pack__{name}.ply", quality="fast")
     assert len(result) <= 6
-    assert result.report["hausdorff"]["over"] < 0.05
-    assert result.report["hausdorff"]["under"] == 0
+    assert result.report.hausdorff.over < 0.05
+    assert result.report.hausdorff.under == 0
 
 
 @pytest.mark.parametrize("reach", [0.1, 0.5, 2.0])
@@ -285,8 +285,8 @@ def test_warnings_and_report_name_where_a_damaged_scan_may_have_lost_something(f
         [trimesh.Trimesh(v + place, f, process=False) for (v, f), place in zip(damaged, places, strict=True)]
     )
     result = rlacd.decompose(scan, quality="fast", threads=1)
-    holes = result.report["holes"]
-    assert {tuple(places[np.linalg.norm(places - hole["at_abs"], axis=1).argmin()]) for hole in holes} == {
+    holes = result.report.holes
+    assert {tuple(places[np.linalg.norm(places - hole.at_abs, axis=1).argmin()]) for hole in holes} == {
         (0, 0, 0),
         (30, 0, 0),
     }
@@ -297,16 +297,14 @@ def test_warnings_and_report_name_where_a_damaged_scan_may_have_lost_something(f
     lost = points[missed > 0.005 * np.ptp(points, axis=0).max() / 2]
     assert (len(lost) > 0) == (family == "missing patches")
     for point in lost:
-        assert any(np.linalg.norm(point - hole["at_abs"]) <= hole["width_abs"] for hole in holes)
-    (said,) = [line for line in result.report["warnings"] if "holes" in line.lower() or "open at" in line]
+        assert any(np.linalg.norm(point - hole.at_abs) <= hole.width_abs for hole in holes)
+    (said,) = [line for line in result.report.warnings if "holes" in line.lower() or "open at" in line]
     named = re.findall(r"\(([^()]*, [^()]*, [^()]*)\), body (\d+)", said)
     assert len(named) == 5
     for place, body in named:
-        hole = min(
-            holes, key=lambda one: np.linalg.norm(np.array(one["at_abs"]) - [float(x) for x in place.split(",")])
-        )
-        assert np.allclose(hole["at_abs"], [float(x) for x in place.split(",")], rtol=1e-3, atol=1e-6)
-        assert int(body) == hole["body"]
+        hole = min(holes, key=lambda one: np.linalg.norm(np.array(one.at_abs) - [float(x) for x in place.split(",")]))
+        assert np.allclose(hole.at_abs, [float(x) for x in place.split(",")], rtol=1e-3, atol=1e-6)
+        assert int(body) == hole.body
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -341,10 +339,10 @@ def test_a_person_with_fins_loses_nothing(corpus, share, seed):
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
     damaged = FAMILIES["fins"](vertices, faces, share, np.random.default_rng(seed))
     report = rlacd.decompose(trimesh.Trimesh(*damaged, process=False), quality="fast", threads=1).report
-    assert report["hausdorff"]["under"] <= 0.005
-    over = report["hausdorff"]["over"]
+    assert report.hausdorff.under <= 0.005
+    over = report.hausdorff.over
     assert over <= 0.062
-    beyond = [line for line in report["warnings"] if "beyond the input's surface" in line]
+    beyond = [line for line in report.warnings if "beyond the input's surface" in line]
     assert len(beyond) == (over > 0.055)
     for line in beyond:  # where it says, the surface is that far away
         place = [float(x) for x in re.search(r"farthest near \(([^)]*)\)", line)[1].split(",")]

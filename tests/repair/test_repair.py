@@ -245,17 +245,15 @@ ACROSS_A_GAP = CROSSING[0]
 @pytest.mark.promise("covered")
 def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name):
     report = rlacd.decompose(noisy_copy(corpus, name)[1] if name in CROSSING else corpus / name, quality="fast").report
-    under = report["hausdorff"]["under"]
+    under = report.hausdorff.under
     if name == ACROSS_A_GAP:
         assert under <= 0.006  # up to DEFAULT_GAP / √3 is possible, 0.0052 is what happens
-        assert any(
-            f"up to {under:.4g} (longest side = 2) outside the hulls" in warning for warning in report["warnings"]
-        )
+        assert any(f"up to {under:.4g} (longest side = 2) outside the hulls" in warning for warning in report.warnings)
     else:
         assert under <= 1e-3
-    assert report["concavity"]["max"] <= 0.0501
+    assert report.concavity.max <= 0.0501
     radii = math.sqrt(2) if "class5" in name else 1  # a wrap ends at balls, a right angle at most from where they touch
-    assert max(body["deviation"] for body in report["repair"]) < radii * DEFAULT_GAP
+    assert max(body.deviation for body in report.repair) < radii * DEFAULT_GAP
 
 
 # Faces without an area beside a box, and how far from its hull a corner lies that no other face has.
@@ -284,12 +282,10 @@ def test_corners_of_faces_without_an_area_are_covered_or_named(name: str) -> Non
     missed = np.min([trimesh.proximity.signed_distance(hull, corners) * -1 for hull in result], axis=0).max()
     assert max(missed, 0) == pytest.approx(away, abs=2e-3)
     report = result.report
-    assert report["hausdorff"]["under"] / report["scale"] == pytest.approx(away, abs=2e-3)
-    said = [warning for warning in report["warnings"] if "only a point or an edge were left out" in warning]
+    assert report.hausdorff.under / report.scale == pytest.approx(away, abs=2e-3)
+    said = [warning for warning in report.warnings if "only a point or an edge were left out" in warning]
     assert len(said) == (away > 0)
-    assert (
-        not said or f"lie{'s' if '1 corner ' in said[0] else ''} up to {away * report['scale']:.4g} outside" in said[0]
-    )
+    assert not said or f"lie{'s' if '1 corner ' in said[0] else ''} up to {away * report.scale:.4g} outside" in said[0]
 
 
 @pytest.mark.parametrize("per_node", [False, True])
@@ -297,7 +293,5 @@ def test_a_node_without_size_is_named_if_hulls_miss_it(per_node: bool) -> None:
     speck = trimesh.Trimesh([[3, 0, 0]] * 3, [[0, 1, 2]], process=False)
     scene = trimesh.Scene({"one": BOX, "two": moved(BOX, -2, 0, 0), "speck": speck})
     report = rlacd.decompose(scene, per_node=per_node, quality="fast", threads=1).report
-    assert report["hausdorff"]["under"] == pytest.approx(1.0)
-    assert (
-        "1 corner lies up to 1 outside the hulls (longest side = 2), farthest near (3, 0, 0)" in report["warnings"][0]
-    )
+    assert report.hausdorff.under == pytest.approx(1.0)
+    assert "1 corner lies up to 1 outside the hulls (longest side = 2), farthest near (3, 0, 0)" in report.warnings[0]

@@ -123,8 +123,8 @@ def test_a_body_with_large_faces_that_is_inside_out_here_and_there_is_a_tangle()
     """A bracket of 28 triangles, one of them gone and two with a wrong corner."""
     result = rlacd.decompose(FAULTY_BRACKET, threads=2, quality="fast")
     assert len(result) < 60
-    assert result.report["hausdorff"]["under"] < 1e-3
-    assert result.report["hausdorff"]["over"] < 0.06
+    assert result.report.hausdorff.under < 1e-3
+    assert result.report.hausdorff.over < 0.06
 
 
 @pytest.mark.slow
@@ -133,12 +133,12 @@ def test_a_body_with_large_faces_that_is_inside_out_here_and_there_is_a_tangle()
 def test_a_tangle_takes_bounded_work(seed: int) -> None:
     mesh = tangle(seed)
     result = rlacd.decompose(mesh, threads=2)
-    assert result.report["complete"]
+    assert result.report.complete
     assert len(result) < 60
-    assert result.report["hausdorff"]["under"] < 1e-3
-    assert result.report["hausdorff"]["over"] < 0.055
-    assert result.report["concavity"]["max"] <= 0.05
-    assert "1 body crosses" in result.report["warnings"][0]
+    assert result.report.hausdorff.under < 1e-3
+    assert result.report.hausdorff.over < 0.055
+    assert result.report.concavity.max <= 0.05
+    assert "1 body crosses" in result.report.warnings[0]
 
 
 @pytest.mark.slow
@@ -147,9 +147,9 @@ def test_cutting_stops_at_its_bound_and_says_so(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(rlacd.cut_and_merge, "MOST_CUTTING", 2e4)
     monkeypatch.setattr(rlacd.cut_and_merge, "MOST_PER_FACE", 0)
     one, two = (rlacd.decompose(torus, quality="fast", threads=threads) for threads in (1, 2))
-    assert "cutting stopped at its bound" in " ".join(one.report["warnings"])
-    assert one.report["complete"]
-    assert one.report["hausdorff"]["under"] < 1e-6
+    assert "cutting stopped at its bound" in " ".join(one.report.warnings)
+    assert one.report.complete
+    assert one.report.hausdorff.under < 1e-6
     assert [hull.vertices.tolist() for hull in one] == [hull.vertices.tolist() for hull in two]
 
 
@@ -170,7 +170,7 @@ def test_stopped_while_a_tangle_or_pockets_are_cut_the_hulls_cover_them(mesh: Me
 
     options = {"threshold": 0.1, "policy": "greedy-max-excess"} if mesh is CROSSING else {}
     result = rlacd.decompose(mesh, quality="fast", threads=1, progress=go_on, **options)
-    assert result.report["stopped_by"] == "cancel"
+    assert result.report.stopped_by == "cancel"
     assert farthest(mesh, result) < within
 
 
@@ -191,8 +191,8 @@ def test_bodies_that_cross_each_other_too_often_are_enclosed_instead_of_united()
         some.append(body)
     mesh = trimesh.util.concatenate(some)
     hulls = rlacd.decompose((mesh.vertices, mesh.faces), quality="fast")
-    assert any("crosses itself too often to be united exactly" in said for said in hulls.report["warnings"])
-    assert hulls.report["complete"]
+    assert any("crosses itself too often to be united exactly" in said for said in hulls.report.warnings)
+    assert hulls.report.complete
     assert all(hull.is_convex and hull.is_volume for hull in hulls)
-    assert hulls.report["hausdorff"]["under"] < 1e-3
-    assert hulls.report["concavity"]["max"] <= 0.05
+    assert hulls.report.hausdorff.under < 1e-3
+    assert hulls.report.concavity.max <= 0.05

@@ -137,9 +137,9 @@ def test_the_default_stays_within_its_account(shape: Callable[[], Any]) -> None:
     solid = shape()
     one, three = (rlacd.decompose(solid, threads=threads) for threads in (1, 3))
     fast = rlacd.decompose(solid, quality="fast")
-    search = one.report["search"]
-    assert 0 < search["work"] <= search["allowed"]
-    assert search["work"] == three.report["search"]["work"]
+    search = one.report.search
+    assert 0 < search.work <= search.allowed
+    assert search.work == three.report.search.work
     assert len(one) <= len(fast)
     assert_same_hulls(one, three)
 
@@ -151,9 +151,9 @@ def test_a_pass_whose_merging_is_cut_short_meets_the_threshold_and_says_so(monke
     monkeypatch.setattr(cut_and_merge, "MOST_MERGING", 1e5)
     short = rlacd.decompose(solid, quality="fast")
     assert len(short) > len(whole)
-    assert short.report["concavity"]["max"] <= 0.05
+    assert short.report.concavity.max <= 0.05
     for result, expected in ((whole, False), (short, True)):
-        assert any("merging stopped" in warning for warning in result.report["warnings"]) == expected
+        assert any("merging stopped" in warning for warning in result.report.warnings) == expected
 
 
 def test_a_trace_holds_the_work_of_all_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

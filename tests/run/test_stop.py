@@ -18,6 +18,7 @@ import trimesh
 
 import rlacd
 from rlacd import _native
+from rlacd.fit import LengthFit
 from rlacd.io.read.load import load_mesh
 from rlacd.run import Run
 from rlacd.solid.cover import MOST_HULLS, cover
@@ -89,13 +90,13 @@ def test_stopped_at_any_poll_the_hulls_cover_the_input(
     for number in (round(ratio**k) for k in itertools.count()):
         polls[:] = [number]
         result = rlacd.decompose(SMALL[name], **{"threads": 1, **options})
-        if result.report["stopped_by"] is None:
+        if result.report.stopped_by is None:
             break
         assert number < 10**7, "it never comes to its end"
-        assert not result.report["complete"]
-        assert any("early" in sentence for sentence in result.report["warnings"])
+        assert not result.report.complete
+        assert any("early" in sentence for sentence in result.report.warnings)
         assert_covers(result, *SMALL[name])
-        stages |= set(result.report["seconds"])
+        stages |= set(result.report.seconds)
         assert max(len(hull.vertices) for hull in result) <= options.get("max_vertices", np.inf)
         assert max(len(hull.faces) for hull in result) <= options.get("max_faces", np.inf)
     assert {"repair", "cut"} <= stages or options is not WHOLE
@@ -113,8 +114,8 @@ def test_hulls_of_bodies_that_had_no_repair_hold_them() -> None:
     result = rlacd.decompose(boxes(40), timeout=1e-9)
     assert len(result) == 40
     assert sum(hull.volume for hull in result) == pytest.approx(trimesh.Trimesh(*boxes(40)).volume)
-    assert result.report["repair"] == []
-    assert result.report["concavity"] == {"threshold": 0.05, "per_part": None, "max": None}
+    assert result.report.repair == ()
+    assert result.report.concavity == LengthFit(None, None, 0.05)
 
 
 def test_bodies_by_the_thousand_share_hulls_with_those_near_them() -> None:
@@ -155,7 +156,7 @@ def test_a_timeout_ends_the_work_however_large_the_input(name: str) -> None:
     result = rlacd.decompose(mesh, timeout=1.0, progress=seen.append)
     # The step that notices the timeout is the last: see `python -m benchmarks late`.
     assert sum(step.seconds > 1.0 for step in seen) <= 1
-    assert result.report["stopped_by"] == "timeout"
+    assert result.report.stopped_by == "timeout"
     # Corners: for the surface between them there is no time here either.
     corners = np.ascontiguousarray(mesh[0][:: max(1, len(mesh[0]) // 2000)], dtype=np.float64)
     union = hull_union([hull for part in result if (hull := Hull.of(part.vertices))], 1)

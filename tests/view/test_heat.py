@@ -31,7 +31,7 @@ def test_the_hottest_spot_is_as_far_as_the_report_says(threshold: float, place: 
     mesh.apply_scale(place[1])
     mesh.apply_translation([place[0], 0, -place[0]])
     result = rlacd.decompose(mesh, threshold=threshold)
-    over = result.report["hausdorff"]["over"]
+    over = result.report.hausdorff.over
     # Distance is 1-Lipschitz: the farthest point of a triangle lies within an edge of a corner.
     assert over - FINEST - MEASURED_WITHIN <= hottest(heat_map(result)) <= over + MEASURED_WITHIN
 
@@ -51,7 +51,7 @@ def test_one_hull_of_an_elbow_is_hot_where_it_bridges_the_corner() -> None:
 
 def test_a_perfect_fit_is_cold_and_inner_walls_are_marked() -> None:
     halves = [box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (2, 1, 1))]
-    result = Decomposition([hull_of(half.vertices) for half in halves], {"scale": 1.0}, box((0, 0, 0), (2, 1, 1)))
+    result = Decomposition.of([hull_of(half.vertices) for half in halves], box((0, 0, 0), (2, 1, 1)))
     for part in heat_map(result):
         wall = np.isclose(part.vertices[:, 0], 0.0)
         assert wall.any()

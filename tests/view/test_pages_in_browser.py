@@ -159,7 +159,7 @@ def rows(page: Any) -> int:
 @pytest.mark.slow
 def test_the_hulls_are_seen_listed_and_downloaded(seen: Watched, viewer: ViewServer, tmp_path: Path) -> None:
     page = seen.page
-    faces = viewer.session.result[1].report["faces"]
+    faces = viewer.session.result[1].report.faces
     assert page.title() == "table: 5 hulls"
     assert page.locator("#name").inner_text() == "table"
     assert page.locator("#summary").inner_text().startswith(f"5 hulls · {faces} triangles · concavity")
@@ -203,7 +203,7 @@ def test_every_control_decomposes_again_and_a_bad_value_is_said(seen: Watched, v
     for run, (act, option, value, place, text) in enumerate(steps, start=2):
         act()
         wait_for_run(page, run)
-        assert viewer.session.result[1].report["options"][option] == (value and pytest.approx(value)), option
+        assert viewer.session.result[1].report.options[option] == (value and pytest.approx(value)), option
         assert text in page.locator(place).inner_text()
     assert page.locator("#download .suited").inner_text() == "MJCF"
     assert page.locator("#threshold").is_hidden()

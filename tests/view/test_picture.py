@@ -14,6 +14,7 @@ import trimesh
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.fit import LengthFit
 from rlacd.view.picture import check_picture, draw_picture
 from tests.hulls import hull_of, moved
 
@@ -27,8 +28,8 @@ def towers(scale: float = 1.0, shift: float = 0.0) -> Decomposition:
     """Four boxes in a row, none of which hides another."""
     boxes = [trimesh.creation.box((0.6, 0.6, 1.0 + 0.3 * i)).vertices + np.array([1.2 * i, 0.0, 0.0]) for i in range(4)]
     hulls = [moved(hull_of(box), scale, [shift, shift, shift]) for box in boxes]
-    report = {"name": "towers", "complete": True, "concavity": {"threshold": 0.05, "max": 0.04}}
-    return Decomposition(hulls, report, trimesh.util.concatenate(hulls))
+    concavity = LengthFit(None, 0.04, 0.05)
+    return Decomposition.of(hulls, trimesh.util.concatenate(hulls), name="towers", concavity=concavity)
 
 
 def pixels(path: Path) -> npt.NDArray[np.int64]:
@@ -75,14 +76,14 @@ def test_up_turns_the_picture(tmp_path: Path) -> None:
 def test_a_single_point_like_hull_and_a_sheet_as_input_can_be_drawn(tmp_path: Path) -> None:
     sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
     slab = hull_of(trimesh.creation.box((1.0, 1.0, 1e-6)).vertices)
-    path = Decomposition([slab], {}, sheet).picture(tmp_path / "sheet.png", width=WIDTH)
+    path = Decomposition.of([slab], sheet).picture(tmp_path / "sheet.png", width=WIDTH)
     assert pixels(path).min() < 200
 
 
 def test_the_caption_tells_the_numbers_that_are_known() -> None:
     assert towers().facts() == ["4 hulls", "48 triangles", "concavity at most 0.04 (threshold 0.05)"]
     one = towers()
-    bare = Decomposition(one.hulls[:1], {"complete": False, "stopped_by": "timeout"}, one.source)
+    bare = Decomposition.of(one.hulls[:1], one.source, complete=False, stopped_by="timeout")
     assert bare.facts() == ["1 hull", "12 triangles", "stopped early by timeout"]
 
 
@@ -121,7 +122,7 @@ def test_drawing_leaves_stdout_and_stderr_alone(tmp_path: Path) -> None:
     """In a process of its own: what Mitsuba's libraries say, they say once, when they are loaded."""
     code = (
         "import sys, trimesh; from rlacd.decomposition import Decomposition; box = trimesh.creation.box();"
-        "Decomposition([box], {}, box).picture(sys.argv[1], width=300); print('drawn', file=sys.stderr)"
+        "Decomposition.of([box], box).picture(sys.argv[1], width=300); print('drawn', file=sys.stderr)"
     )
     command = [sys.executable, "-c", code, str(tmp_path / "out.png")]
     run = subprocess.run(command, capture_output=True, text=True, timeout=120)

@@ -20,6 +20,8 @@ import rlacd
 from rlacd.cli.main import app
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
+from rlacd.plain_json import to_json
+from rlacd.report import Hausdorff
 from rlacd.view.page import MODULES
 from rlacd.view.report import report_page, save_report_page
 from rlacd.view.scene import scene
@@ -46,12 +48,12 @@ def triangles(text: str) -> np.ndarray:
 
 def test_the_page_holds_every_hull_every_number_and_the_input(result: Decomposition) -> None:
     data = payload(report_page(result, up="z", picture=False))
-    assert data["report"] == json.loads(json.dumps(result.report))
+    assert data["report"] == json.loads(to_json(result.report))
     assert len(data["parts"]) == len(result)
-    for part, hull, concavity in zip(data["parts"], result, result.report["concavity"]["per_part"], strict=True):
+    for part, hull, concavity in zip(data["parts"], result, result.report.concavity.per_part, strict=True):
         drawn = trimesh.Trimesh(points(part["vertices"]), triangles(part["faces"]), process=False)
         assert drawn.volume == pytest.approx(part["volume"], rel=1e-4)
-        assert part["volume"] == pytest.approx(hull.volume * result.report["scale"] ** 3, rel=1e-9)
+        assert part["volume"] == pytest.approx(hull.volume * result.report.scale**3, rel=1e-9)
         assert part["error"] == concavity
         assert re.fullmatch("#[0-9a-f]{6}", part["color"])
     assert len(triangles(data["input"][0]["faces"])) == len(elbow(1.0).faces)
@@ -94,7 +96,7 @@ def test_every_script_is_inside(result: Decomposition) -> None:
 def test_a_name_stays_a_name(name: str) -> None:
     cube = trimesh.creation.box()
     hulls = [hull_of(cube.vertices)]
-    pages = [report_page(Decomposition(hulls, {"name": n, "scale": 2.0}, cube), picture=False) for n in (name, "cube")]
+    pages = [report_page(Decomposition.of(hulls, cube, name=n), picture=False) for n in (name, "cube")]
     named, usual = map(html.fromstring, pages)
     assert [element.tag for element in named.iter()] == [element.tag for element in usual.iter()]
     assert payload(pages[0])["name"] == name
@@ -108,8 +110,8 @@ def test_the_same_result_gives_the_same_bytes(result: Decomposition, tmp_path: P
 
 def test_numbers_that_json_does_not_know_become_null() -> None:
     cube = trimesh.creation.box()
-    report = {"scale": 2.0, "hausdorff": {"over": float("inf"), "under": float("nan")}}
-    data = payload(report_page(Decomposition([hull_of(cube.vertices)], report, cube), picture=False))
+    distances = Hausdorff(float("inf"), float("nan"))
+    data = payload(report_page(Decomposition.of([hull_of(cube.vertices)], cube, hausdorff=distances), picture=False))
     assert data["report"]["hausdorff"] == {"over": None, "under": None}
 
 

@@ -176,7 +176,7 @@ def test_the_report_of_a_robot_shows_the_worst_positions(robots: Path, browser: 
         assert "61 positions were looked at" in page.locator("#contacts").inner_text()
         assert watched.complaints == []
         assert watched.outside(report.as_uri()) == []
-    assert '"links"' in to_json(done.report())
+    assert '"links"' in to_json(done.as_dict())
 
 
 def test_a_robot_without_collision_meshes_is_refused(robots: Path) -> None:

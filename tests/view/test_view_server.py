@@ -249,7 +249,7 @@ def test_another_mesh_is_opened(viewer: ViewServer) -> None:
     content = trimesh.creation.icosphere(1).export(file_type="glb")
     assert post_file(viewer, "../../a ball.glb", content).status == 202, "a refused option is in no file's way"
     settled(viewer, run=2)
-    assert viewer.session.result[1].report["options"]["threshold"] == 0.05
+    assert viewer.session.result[1].report.options["threshold"] == 0.05
     scene = ask(viewer, "GET", "/scene").json
     assert (scene["name"], scene["up"], scene["unit"], len(scene["parts"])) == ("a ball", "y", "m", 1)
     folder = viewer.subject.path.parent

@@ -41,7 +41,7 @@ class Work:
         if self.error is not None:
             raise self.error
         cube = trimesh.creation.box()
-        return Decomposition([hull_of(cube.vertices)], {"options": options, "complete": complete}, cube)
+        return Decomposition.of([hull_of(cube.vertices)], cube, options=options, complete=complete)
 
     def wait_until_it_began(self) -> None:
         assert self.began.acquire(timeout=PATIENCE)
@@ -73,7 +73,7 @@ def until(session: Session, state: str, **wanted: Any) -> SessionState:
 
 
 def options_of(session: Session) -> dict[str, Any]:
-    return session.result[1].report["options"]
+    return session.result[1].report.options
 
 
 def test_other_options_replace_the_work_under_way(session: Session, work: Work) -> None:
@@ -91,7 +91,7 @@ def test_stopping_does_not_reach_into_the_next_run(session: Session, work: Work)
     session.decompose({})
     work.go_on()
     until(session, "idle", run=1)
-    assert session.result[1].report["complete"] is True
+    assert session.result[1].report.complete is True
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ class ConvexHulls(bpy.types.Operator, Options):
                 window.progress_update(index)
                 result = hulls.decompose(thing, context, self.modifiers, self.wishes())
                 made += len(hulls.replace(thing, result))
-                for warning in result.report["warnings"]:
+                for warning in result.report.warnings:
                     self.report({"WARNING"}, f"{thing.name}: {warning}")
         except RlacdError as error:
             self.report({"ERROR"}, f"{thing.name}: {error}")

@@ -15,12 +15,12 @@ from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from rlacd.errors import MeshFileError
+from rlacd.io.read import READERS
 from rlacd.io.read.beside import mesh_files
-from rlacd.io.read.load import FORMATS
 from rlacd.io.write.encode import GENERATOR
 from rlacd.io.write.folder import listed_hulls
 
-ENDINGS = tuple(f".{ending}" for ending in FORMATS)
+ENDINGS = tuple(f".{ending}" for ending in READERS)
 """File endings that count as meshes, in upper or lower case."""
 
 ROBOTS = (".urdf", ".xml")
@@ -42,21 +42,14 @@ _MARK_BYTES = 128
 
 @dataclass(frozen=True)
 class Asset:
-    """A mesh file.
-
-    Attributes
-    ----------
-    name
-        Path relative to the folder of assets, with slashes.
-    path
-        The file.
-    place
-        Name of its result, relative to the folder of results, without an ending.
-    """
+    """A mesh file."""
 
     name: str
+    """Path relative to the folder of assets, with slashes."""
     path: Path
+    """The file."""
     place: str
+    """Name of its result, relative to the folder of results, without an ending."""
 
     def files(self) -> dict[str, bytes]:
         """Read every file the mesh depends on, by name relative to its folder; the mesh file comes first.

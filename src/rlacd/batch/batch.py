@@ -47,39 +47,26 @@ class Watcher(Protocol):
 
 @dataclass
 class Summary:
-    """Outcome of a run.
-
-    Attributes
-    ----------
-    meshes
-        Number of meshes found.
-    seen
-        Names of the meshes that have a result now.
-    passed_over
-        Number of meshes whose result already existed, whatever its status; `status` counts them too.
-    status
-        Number of meshes of each status at the end of the run.
-    stopped
-        Whether the run was stopped before the last mesh.
-    seconds
-        Wall time.
-    failures
-        Rows of the meshes found that failed or fell back to their convex hull.
-    slowest
-        Names and seconds of the slowest meshes of this run.
-    others
-        Number of files that are not meshes, by ending.
-    """
+    """Outcome of a run."""
 
     meshes: int
+    """Number of meshes found."""
     seen: list[str] = field(default_factory=list)
+    """Names of the meshes that have a result now."""
     passed_over: int = 0
+    """Number of meshes whose result already existed, whatever its status; `status` counts them too."""
     status: Counter[str] = field(default_factory=Counter)
+    """Number of meshes of each status at the end of the run."""
     stopped: bool = False
+    """Whether the run was stopped before the last mesh."""
     seconds: float = 0.0
+    """Wall time."""
     failures: list[Row] = field(default_factory=list)
+    """Rows of the meshes found that failed or fell back to their convex hull."""
     slowest: list[tuple[str, float]] = field(default_factory=list)
+    """Names and seconds of the slowest meshes of this run."""
     others: Counter[str] = field(default_factory=Counter)
+    """Number of files that are not meshes, by ending."""
 
 
 def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcome], None, None]:
@@ -121,33 +108,22 @@ def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcom
 
 @dataclass(frozen=True)
 class Batch:
-    """A folder of meshes and the place of their results.
-
-    Attributes
-    ----------
-    assets
-        Folder of the meshes.
-    out
-        Folder or address of the results.
-    spec
-        What is done to each mesh.
-    limits
-        Limits for each mesh.
-    fallback
-        Whether a mesh that fails gets its convex hull instead.
-    glob
-        Pattern that selects meshes; see `find_assets`.
-    redo
-        Which existing results are recomputed: none, those that failed, or all.
-    """
+    """A folder of meshes and the place of their results."""
 
     assets: Path
+    """Folder of the meshes."""
     out: str
+    """Folder or address of the results."""
     spec: JobSpec
+    """What is done to each mesh."""
     limits: ProcessLimits = field(default_factory=ProcessLimits)
+    """Limits for each mesh."""
     fallback: bool = True
+    """Whether a mesh that fails gets its convex hull instead."""
     glob: str = EVERYTHING
+    """Pattern that selects meshes; see `find_assets`."""
     redo: Redo = "none"
+    """Which existing results are recomputed: none, those that failed, or all."""
 
     def plan(self) -> list[tuple[Asset, bool]]:
         """List all meshes, and whether the result of each exists; writes nothing.

@@ -28,24 +28,16 @@ POLICY = "policy"
 
 @dataclass(frozen=True)
 class JobSpec:
-    """Options of the decomposition and of its output file.
-
-    Attributes
-    ----------
-    options
-        Keyword arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields.
-    ending
-        Ending of the output file, with its dot; empty for a folder with one file per hull.
-    written
-        Arguments of `rlacd.Decomposition.save` beside the path.
-    weights
-        Hash of the network, if the policy is a file.
-    """
+    """Options of the decomposition and of its output file."""
 
     options: dict[str, Any] = field(default_factory=dict)
+    """Keyword arguments of `rlacd.decompose` as plain values: a `NavigableSpace` is the dict of its fields."""
     ending: str = ".glb"
+    """Ending of the output file, with its dot; empty for a folder with one file per hull."""
     written: dict[str, Any] = field(default_factory=dict)
+    """Arguments of `rlacd.Decomposition.save` beside the path."""
     weights: str = ""
+    """Hash of the network, if the policy is a file."""
 
     @classmethod
     def of(cls, options: dict[str, Any], *, folders: bool = False, **written: Any) -> JobSpec:

@@ -24,39 +24,26 @@ HULL_SECONDS = 60.0
 
 @dataclass(frozen=True)
 class Work:
-    """What all meshes of a batch share.
-
-    Attributes
-    ----------
-    spec
-        What is done to a mesh.
-    limits
-        Limits for each mesh.
-    fallback
-        Whether a mesh that fails gets its convex hull instead.
-    out
-        Folder or address of the results.
-    store
-        The store opened for `out`.
-    pool
-        Where meshes are processed.
-    owns
-        Tells of a file among the results whether an earlier run wrote it.
-    stop
-        Once set, no further mesh is started.
-    shared
-        What all processes need: the network, if the policy is a file.
-    """
+    """What all meshes of a batch share."""
 
     spec: JobSpec
+    """What is done to a mesh."""
     limits: ProcessLimits
+    """Limits for each mesh."""
     fallback: bool
+    """Whether a mesh that fails gets its convex hull instead."""
     out: str
+    """Folder or address of the results."""
     store: ResultStore
+    """The store opened for `out`."""
     pool: Pool
+    """Where meshes are processed."""
     owns: Callable[[str], bool]
+    """Tells of a file among the results whether an earlier run wrote it."""
     stop: threading.Event
+    """Once set, no further mesh is started."""
     shared: dict[str, Shared]
+    """What all processes need: the network, if the policy is a file."""
 
 
 @dataclass(frozen=True)
@@ -69,37 +56,25 @@ class Task:
 
 @dataclass
 class Outcome:
-    """Outcome of a mesh.
-
-    Attributes
-    ----------
-    status
-        ``fallback``: its convex hull replaces the decomposition.
-    report
-        Facts about the hulls.
-    error
-        Why the decomposition failed.
-    unusable
-        Whether the mesh itself is at fault; then there is no fallback either.
-    name_taken
-        Whether its result could not be written for its name; it is tried again by every run.
-    files
-        Files still to be written, by name relative to the results.
-    outputs
-        Length of each file written.
-    timing
-        What differs between runs: ``seconds`` and ``cpu`` of the mesh, ``peak_mb`` and the name of its ``worker``;
-        if its process died, also the number of ``attempts``, why it ``died``, and its ``last_words``.
-    """
+    """Outcome of a mesh."""
 
     status: Status
+    """``fallback``: its convex hull replaces the decomposition."""
     report: dict[str, Any] = field(default_factory=dict)
+    """Facts about the hulls."""
     error: str | None = None
+    """Why the decomposition failed."""
     unusable: bool = False
+    """Whether the mesh itself is at fault; then there is no fallback either."""
     name_taken: bool = False
+    """Whether its result could not be written for its name; it is tried again by every run."""
     files: dict[str, bytes] = field(default_factory=dict)
+    """Files still to be written, by name relative to the results."""
     outputs: dict[str, int] = field(default_factory=dict)
+    """Length of each file written."""
     timing: dict[str, Any] = field(default_factory=dict)
+    """What differs between runs: ``seconds`` and ``cpu`` of the mesh, ``peak_mb`` and the name of its ``worker``; if
+    its process died, also the number of ``attempts``, why it ``died``, and its ``last_words``."""
 
     def put(self, work: Work) -> Outcome:
         """Write the files; a name that cannot be used fails this mesh only."""

@@ -18,7 +18,6 @@ from rlacd.batch.job_spec import POLICY, JobSpec
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
-from rlacd.fit import Fit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import is_robot, rewrite_robot
@@ -26,8 +25,10 @@ from rlacd.io.robots.read import STAGES, robot_or_none
 from rlacd.io.robots.rewrite import rewrite
 from rlacd.io.robots.robot import Robot
 from rlacd.options.robots import RobotOptions
+from rlacd.plain_json import as_plain
 from rlacd.pool import Blobs, Shared
 from rlacd.pool.process import peak_memory
+from rlacd.report import Report
 
 SERVER = "rlacd.batch.server:MeshServer"
 
@@ -100,8 +101,8 @@ def _robot(spec: JobSpec, robot: Path | Robot, place: Path, hull_only: bool) -> 
             warning = warning.replace(path, name)
         warnings.append(warning)
     reports = [result.report for link in done.links for result in link.results]
-    facts = {what: sum(report[what] for report in reports) for what in ("parts", "faces", "vertices")}
-    fits = [fit for report in reports if (fit := Fit.of(report)) is not None and fit.is_length]
+    facts = {what: sum(getattr(report, what) for report in reports) for what in ("parts", "faces", "vertices")}
+    fits = [fit for report in reports if (fit := report.fit) is not None and fit.is_length]
     if fits and all(fit.worst is not None for fit in fits):
         facts[fits[0].name] = max(fit.worst for fit in fits if fit.worst is not None)
     return {**facts, "complete": done.complete and not hull_only, "warnings": warnings}
@@ -117,18 +118,17 @@ def _hull(spec: JobSpec, mesh: Path) -> Decomposition:
     source = load_mesh(mesh)
     used = source.vertices[np.unique(source.faces)] if len(source.faces) else source.vertices
     around = decompose((used, np.empty((0, 3), dtype=np.int64)), max_hulls=1, quality="fast", **_limits(spec))
-    report = {what: around.report[what] for what in ("parts", "faces", "vertices")}
-    report |= {"name": mesh.stem, "complete": False, "warnings": [STAND_IN]}
-    return Decomposition(around.hulls, report, trimesh.Trimesh(source.vertices, source.faces, process=False))
+    surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
+    return Decomposition.of(around.hulls, surface, name=mesh.stem, complete=False, warnings=(STAND_IN,))
 
 
-def _summary(report: dict[str, Any]) -> dict[str, Any]:
+def _summary(report: Report) -> dict[str, Any]:
     """Collect the facts that do not depend on when and where the mesh is decomposed."""
     same = ("parts", "faces", "vertices", "complete", "hausdorff")
-    kept: dict[str, Any] = {what: report[what] for what in same if what in report}
-    if (fit := Fit.of(report)) is not None:
-        kept[fit.name] = fit.worst
-    return {**kept, "warnings": report["warnings"]}
+    kept = {what: as_plain(getattr(report, what)) for what in same}
+    if report.fit is not None:
+        kept[report.fit.name] = report.fit.worst
+    return {**kept, "warnings": [*report.warnings]}
 
 
 class MeshServer:

@@ -35,34 +35,23 @@ Limits = tuple[float, float]
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint that turns or slides; vectors are in the frame that all links share, with all joints at rest.
-
-    Attributes
-    ----------
-    name : str
-    slides : bool
-    lower, upper, rest : float
-        In radians or the unit of length.
-    anchor, axis : float64 [3]
-        A point on its axis, and the axis' direction.
-    parent : int
-        The joint that carries it; -1 if none does.
-    leader : int
-        The joint that drives it; -1 if none does.
-    curve : tuple of float
-        How far it is then from rest: a polynomial in how far its leader is, from the linear term up.
-    """
+    """A joint that turns or slides; vectors are in the frame that all links share, with all joints at rest."""
 
     name: str
     slides: bool
     lower: float
     upper: float
     rest: float
+    """In radians or the unit of length."""
     anchor: FloatArray
     axis: FloatArray
+    """``[3]``, a point on its axis, and the axis' direction."""
     parent: int = -1
+    """The joint that carries it; -1 if none does."""
     leader: int = -1
+    """The joint that drives it; -1 if none does."""
     curve: tuple[float, ...] = ()
+    """How far it is then from rest: a polynomial in how far its leader is, from the linear term up."""
 
 
 @dataclass(frozen=True)

@@ -16,37 +16,25 @@ Contact = Literal["adjacent", "always", "sometimes", "never"]
 
 @dataclass(frozen=True)
 class LinkPair:
-    """Two links.
-
-    Attributes
-    ----------
-    first, second : str
-        Their names.
-    adjacent : bool
-        Whether one joint connects them, or several without a link with collision meshes between.
-    contact : "always", "sometimes" or "never"
-        When their hulls touch.
-    share : float
-        Share of the joint positions at which they do.
-    meshes : float
-        Share at which their meshes do.
-    new_depth : float
-        How deep hulls overlap where the meshes do not touch, at most; 0 if they nowhere do.
-    kept_clear : bool
-        Whether their hulls were made finer so that they do not.
-    loose : bool
-        Whether a joint that was looked at only at rest lies between them: at other places they may do otherwise.
-    """
+    """Two links."""
 
     first: str
     second: str
+    """Their names."""
     adjacent: bool
+    """Whether one joint connects them, or several without a link with collision meshes between."""
     contact: Literal["always", "sometimes", "never"]
+    """When their hulls touch."""
     share: float
+    """Share of the joint positions at which they do."""
     meshes: float
+    """Share at which their meshes do."""
     new_depth: float
+    """How deep hulls overlap where the meshes do not touch, at most; 0 if they nowhere do."""
     kept_clear: bool
+    """Whether their hulls were made finer so that they do not."""
     loose: bool
+    """Whether a joint that was looked at only at rest lies between them: at other places they may do otherwise."""
 
     @property
     def kind(self) -> Contact:

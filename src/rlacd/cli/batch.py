@@ -29,36 +29,24 @@ WRITTEN = ("density", "mass", "up", "one_mesh", "keep_input")
 @stated(panel="Batch")
 @dataclass(frozen=True)
 class BatchOptions:
-    """What is done to which meshes.
-
-    Attributes
-    ----------
-    output
-        Where the results go: a folder, or an address that fsspec knows (s3://bucket/path). Required.
-    glob
-        Only meshes that match: 'chair_*.obj' in any folder, 'furniture/*' by the whole path.
-    fallback
-        Give a mesh that fails its convex hull.
-    folders
-        Write a folder for each mesh, with a file for each hull.
-    redo
-        Which meshes to do again: none, those that failed (failed), or all.
-    file_format
-        The format of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot.
-    threads
-        Threads for each mesh.
-    dry_run
-        List the meshes that would be decomposed, and write nothing.
-    """
+    """What is done to which meshes."""
 
     output: str = option("", flags=("--output", "-o"), metavar="OUT", usual="")
+    """Where the results go: a folder, or an address that fsspec knows (s3://bucket/path). Required."""
     glob: str = option("**", usual="")
+    """Only meshes that match: 'chair_*.obj' in any folder, 'furniture/*' by the whole path."""
     fallback: bool = option(True, usual="fallback")
+    """Give a mesh that fails its convex hull."""
     folders: bool = option(False)
+    """Write a folder for each mesh, with a file for each hull."""
     redo: Redo = option("none", one_of=Redo)
+    """Which meshes to do again: none, those that failed (failed), or all."""
     file_format: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
+    """The format of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot."""
     threads: int = option(1, least=1)
+    """Threads for each mesh."""
     dry_run: bool = option(False)
+    """List the meshes that would be decomposed, and write nothing."""
 
     def __post_init__(self) -> None:
         if self.output in ("", "-"):

@@ -19,6 +19,7 @@ from rlacd.cli.lean import import_trimesh
 from rlacd.cli.options import decompose_options, how, link_lengths, unit_given
 from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
+from rlacd.io.read import READERS
 from rlacd.options.output import PAGES, OutputOptions
 from rlacd.options.robots import RobotOptions
 
@@ -27,8 +28,8 @@ IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
 """File formats that define the metre as their unit, or are read in metres whatever theirs is."""
 
 MESH = (
-    "The mesh: obj, stl, ply, off, xyz, msh, glb, gltf, vrm, dae, zae, 3mf, usd, fbx, step, iges. It need not be "
-    "closed or clean. Or a robot, .urdf or .xml (MJCF), whose collision meshes are to be replaced. - reads stdin."
+    f"The mesh: {', '.join(READERS)}. It need not be closed or clean. Or a robot, .urdf or .xml (MJCF), whose "
+    "collision meshes are to be replaced. - reads stdin."
 )
 
 REPORTS = (".json", *PAGES)
@@ -126,7 +127,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
         if path is not None:
             with writing(what, path, quiet=quiet):
                 write(path)
-    return bool(result.report.get("complete", True))
+    return result.report.complete
 
 
 def _write_report(wanted: OutputOptions, text: str) -> None:
@@ -167,7 +168,7 @@ def _rewrite(
         with writing("report", wanted.report, quiet=bool(wanted.quiet)):
             done.save_report(wanted.report)
     else:
-        _write_report(wanted, to_json(done.report()))
+        _write_report(wanted, to_json(done.as_dict()))
     return done.complete
 
 
@@ -189,7 +190,8 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
         ending = mesh.suffix
     beside = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
     output = beside if asked.output is None else asked.output
-    if asked.file_format is None and Path(output).suffix.lower().lstrip(".") not in MODELS.get(str(file_format), ()):
+    model, ending = MODELS.get(str(file_format)), Path(output).suffix.lower().lstrip(".")
+    if asked.file_format is None and (model is None or ending not in model.endings):
         file_format = None
     return dataclasses.replace(asked, output=output, file_format=file_format)
 

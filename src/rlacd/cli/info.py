@@ -11,7 +11,7 @@ from rlacd.cli.commands import Argument, Command, Option
 from rlacd.cli.exit_codes import give
 from rlacd.cli.lean import import_trimesh
 from rlacd.cli.pipes import refuse_stdin
-from rlacd.plain_json import printable, to_json
+from rlacd.plain_json import as_plain, printable, to_json
 
 
 def _info(mesh: Path, as_json: bool) -> None:
@@ -75,7 +75,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
         "bounds": [used.min(axis=0).tolist(), used.max(axis=0).tolist()],
         "scale": float(solid.frame.scale),
         "deviation": mesh.deviation,
-        "repair": [vars(body) for body in solid.bodies],
+        "repair": [as_plain(body) for body in solid.bodies],
         "solid": {
             "faces": len(solid.faces),
             "volume": mesh_volume(solid.vertices, solid.faces) / float(solid.frame.scale) ** 3,

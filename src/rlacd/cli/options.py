@@ -31,24 +31,16 @@ _LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
 @stated(panel="Processes")
 @dataclass(frozen=True)
 class PoolOptions:
-    """Where `rlacd batch` and `rlacd train` work, and what each process may take.
-
-    Attributes
-    ----------
-    jobs
-        Processes at a time.
-    ray
-        Use a Ray cluster: its address, auto, or local.
-    limit
-        The longest that one mesh may take; after it the process is killed.
-    memory
-        Memory limit of a process; 0 means no limit.
-    """
+    """Where `rlacd batch` and `rlacd train` work, and what each process may take."""
 
     jobs: int | None = option(None, least=0, usual="all cores")
+    """Processes at a time."""
     ray: str | None = option(None, metavar="ADDRESS")
+    """Use a Ray cluster: its address, auto, or local."""
     limit: float = option(600.0, kind=number(0.1), metavar="SECONDS", usual="600")
+    """The longest that one mesh may take; after it the process is killed."""
     memory: float = option(4.0, kind=number(0.0), metavar="GB", usual="4")
+    """Memory limit of a process; 0 means no limit."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
-from rlacd.fit import fit_words, length_unit
+from rlacd.fit import length_unit
 from rlacd.options.names import UNITS
 from rlacd.run import Progress, ProgressCallback
 
@@ -105,26 +105,25 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
     """Summarise the result in a few lines: its size, its quality, and any warnings."""
     report = result.report
     triangles = sum(len(hull.faces) for hull in result)
-    total = report.get("seconds", {}).get("total")
-    time = ("" if total is None else f", {total:.2f} s") + STOPPED[report.get("stopped_by")]
+    total = report.seconds.get("total")
+    time = ("" if total is None else f", {total:.2f} s") + STOPPED[report.stopped_by]
     lines = [f"{written}: {counted(len(result), 'hull', 'hulls')}, {triangles} triangles{time}"]
-    lines += [f"  {fit}" for fit in [fit_words(report, unit)] if fit]
-    if report.get("deviation_abs") is not None:
-        scale, in_words = length_unit(report, unit)
-        moved = report["deviation_abs"] * report["scale"] / scale
+    lines += [f"  {fit}" for fit in [report.fit_words(unit)] if fit]
+    if report.deviation_abs is not None:
+        scale, in_words = length_unit(report.options, report.scale, unit)
+        moved = report.deviation_abs * report.scale / scale
         lines.append(f"  measured to triangles, up to {moved:.4g} from the surface in the file ({in_words})")
-    least, parts = report.get("at_least") or 1, report["parts"]
+    least, parts = report.at_least or 1, report.parts
     if 1 < least <= parts:
         fewer = "fewer hulls" if least == parts else f"fewer than {least} hulls"
         lines.append(f"  no decomposition to this tolerance has {fewer}")
-    search = report.get("search") or {}
-    if search.get("level") == "best" and least < parts:
-        searched, idle = search["seconds"], search["seconds"] - search["last_gain"]
+    if report.search is not None and report.search.level == "best" and least < parts:
+        searched, idle = report.search.seconds, report.search.seconds - report.search.last_gain
         lines.append(f"  the search saved no hull in the last {idle:.1f} of {searched:.1f} s")
     kinds = Counter(shape.kind for shape in result.primitives if shape is not None)
     words = [counted(kinds[kind], kind, "boxes" if kind == "box" else f"{kind}s") for kind in sorted(kinds)]
     lines += [f"  of them {', '.join(words)}"] if words else []
-    lines += [f"  warning: {warning}" for warning in report.get("warnings", [])]
+    lines += [f"  warning: {warning}" for warning in report.warnings]
     return "\n".join(lines)
 
 

@@ -78,7 +78,7 @@ convexhullApproximation, physicsClientId
         max_vertices=read(integer(4), "maxNumVerticesPerCH", maxNumVerticesPerCH),
     )
     result.save(fileNameOut)
-    lines = [f"{fileNameIn} -> {fileNameOut}", *result.facts(), *result.report["warnings"]]
+    lines = [f"{fileNameIn} -> {fileNameOut}", *result.facts(), *result.report.warnings]
     write_file(Path(fileNameLogging), "".join(f"{line}\n" for line in lines).encode())
 
 
@@ -88,4 +88,4 @@ def _hull_share(path: str) -> float:
         warnings.simplefilter("ignore")  # the decomposition proper says them
         rough = decompose(path, criterion="volume", volume_tolerance=10.0, volume_of="whole", quality="fast")
     whole = trimesh.convex.convex_hull(np.concatenate([hull.vertices for hull in rough]))
-    return round(float(whole.volume / rough.report["mass"]["volume_abs"]), 6)
+    return round(float(whole.volume / rough.report.mass.volume_abs), 6)

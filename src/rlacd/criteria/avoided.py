@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rlacd import _native
+from rlacd.report import Avoids, Entered
 from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING, Frame
@@ -88,31 +89,25 @@ class Avoided:
         """Whether a hull enters any of them."""
         return any(kept.is_entered(hull) for kept in self.kept)
 
-    def found(self, parts: Sequence[Part], scale: float) -> dict[str, Any] | None:
+    def found(self, parts: Sequence[Part], scale: float) -> Avoids | None:
         """The report's entry: what finished hulls enter, how many and how deep, and what the input crosses."""
         told = [kept for kept in self.kept if kept.is_told]
         if not told:
             return None
         depths = np.array([[kept.depth(part.hull) for part in parts] for kept in told])
-        return {
-            "crossed": [kept.name for kept in told if kept.is_crossed],
-            "entered": [
-                {"name": kept.name, "hulls": int(np.count_nonzero(own)), "depth_abs": float(own.max()) / scale}
-                for kept, own in zip(told, depths, strict=True)
-                if own.any()
-            ],
-        }
+        each = [(kept.name, own) for kept, own in zip(told, depths, strict=True) if own.any()]
+        entered = (Entered(name, int(np.count_nonzero(own)), float(own.max()) / scale) for name, own in each)
+        return Avoids(tuple(kept.name for kept in told if kept.is_crossed), tuple(entered))
 
 
-def warnings_of(found: dict[str, Any], reason: str) -> list[str]:
+def warnings_of(found: Avoids, reason: str) -> list[str]:
     """A sentence for each obstacle that is entered all the same; `reason` ends it."""
-    crossed = [f"The input itself crosses {name}, so hulls are not kept out of it there." for name in found["crossed"]]
     return [
-        *crossed,
+        *(f"The input itself crosses {name}, so hulls are not kept out of it there." for name in found.crossed),
         *(
-            f"{one['hulls']} hull{'s enter' if one['hulls'] > 1 else ' enters'} {one['name']}, up to "
-            f"{one['depth_abs']:.4g} deep: {reason}."
-            for one in found["entered"]
+            f"{one.hulls} hull{'s enter' if one.hulls > 1 else ' enters'} {one.name}, up to "
+            f"{one.depth_abs:.4g} deep: {reason}."
+            for one in found.entered
         ),
     ]
 
@@ -148,6 +143,6 @@ def _halved(triangles: FloatArray, lengths: FloatArray) -> FloatArray:
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
 
 
-def _mesh(triangles: FloatArray) -> tuple[FloatArray, Any]:
+def _mesh(triangles: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
     corners = np.ascontiguousarray(triangles.reshape(-1, 3))
     return corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3)

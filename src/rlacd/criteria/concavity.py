@@ -12,14 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut, Feasibility
 from rlacd.errors import OptionError
-from rlacd.fit import told_apart
+from rlacd.fit import LengthFit, told_apart
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
@@ -165,15 +165,13 @@ class Distance(Criterion):
         """The error of each part, and how many exceed the threshold."""
         if errors is None:
             sentence = f"There was no time to measure the {self.name} of the parts."
-            return CriterionSummary({self.name: self._entry(None, None)}, (sentence,))
+            return CriterionSummary({self.name: LengthFit(None, None, self.threshold)}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
         worst, threshold = told_apart(max(errors) / self.unit, self.threshold / self.unit)
         exceed = f"{len(exceeding)} of {len(errors)} parts exceed the {self.name} {threshold}"
         warning = f"{exceed}; the worst has at most {worst}."
-        return CriterionSummary({self.name: self._entry(list(errors), max(errors))}, (warning,) if exceeding else ())
-
-    def _entry(self, errors: list[float] | None, worst: float | None) -> dict[str, Any]:
-        return {"threshold": self.threshold, "per_part": errors, "max": worst}
+        found = LengthFit(tuple(errors), max(errors), self.threshold)
+        return CriterionSummary({self.name: found}, (warning,) if exceeding else ())
 
     def error(self, part: Part) -> float:
         """Upper bound of the error; at most the threshold if the part certainly meets it."""

@@ -28,7 +28,7 @@ class CriterionSummary:
     Attributes
     ----------
     entries
-        Keys and plain values for the report.
+        Fields of the report.
     warnings
         One sentence for everything that falls short.
     """

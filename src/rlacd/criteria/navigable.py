@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 from weakref import WeakKeyDictionary
@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
 from rlacd.errors import OptionError
+from rlacd.fit import Measured, SpaceFit
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
@@ -195,14 +196,9 @@ class Navigable(Criterion):
                 f"{len(exceeding)} of {len(errors)} hulls reach into balls of the navigable space, "
                 f"up to {max(exceeding):.4g} deep."
             )
-        entries = {
-            "radius": self.radius,
-            "tolerance": self.tolerance,
-            "balls": len(self.balls),
-            **asdict(self.conflicts),
-            "intrusion": {"per_part": errors and list(errors), "max": errors and max(errors)},
-        }
-        return CriterionSummary({"navigable": entries}, tuple(sentences))
+        found = Measured(None, None) if errors is None else Measured(tuple(errors), max(errors))
+        space = SpaceFit(self.radius, self.tolerance, len(self.balls), **vars(self.conflicts), intrusion=found)
+        return CriterionSummary({"navigable": space}, tuple(sentences))
 
     def is_met(self, part: Part) -> bool:
         """Whether the hull reaches no deeper than the allowance into balls larger than that, or the part is small.

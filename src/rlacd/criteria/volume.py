@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from rlacd._native import mesh_volume
 from rlacd.criteria.concavity import Distance
 from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
-from rlacd.fit import told_apart
+from rlacd.fit import VolumeFit, told_apart
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray
@@ -112,17 +113,14 @@ class AddedVolume(Criterion):
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """The share of each part, and how many exceed the tolerance."""
-        entries = {
-            "tolerance": self.tolerance,
-            "relative_to": "part" if self.whole is None else "whole",
-            "per_part": None if errors is None else list(errors),
-            "max": None if errors is None else max(errors),
-        }
+        measured = partial(VolumeFit, tolerance=self.tolerance, relative_to="part" if self.whole is None else "whole")
         if errors is None:
-            return CriterionSummary({"volume": entries}, ("There was no time to measure what the hulls add.",))
+            said = "There was no time to measure what the hulls add."
+            return CriterionSummary({"volume": measured(None, None)}, (said,))
         exceeding = [error for error in errors if error > self.tolerance]
         worst, tolerance = told_apart(100 * max(errors), 100 * self.tolerance)
         warning = (
             f"{len(exceeding)} of {len(errors)} hulls add more than {tolerance} % of volume; the worst adds {worst} %."
         )
-        return CriterionSummary({"volume": entries}, (warning,) if exceeding else ())
+        found = measured(tuple(errors), max(errors))
+        return CriterionSummary({"volume": found}, (warning,) if exceeding else ())

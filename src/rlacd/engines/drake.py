@@ -18,7 +18,7 @@ def add_hulls(plant: Any, body: Any, mesh: Any, *, settings: Any = None, **optio
     plant : pydrake.multibody.plant.MultibodyPlant
         Registered with a SceneGraph, not yet finalized.
     body : pydrake.multibody.tree.RigidBody
-        One of its bodies. Its mass is not changed, since hulls weigh nothing: ``report["mass"]`` of the result has what
+        One of its bodies. Its mass is not changed, since hulls weigh nothing: ``report.mass`` of the result has what
         the mesh weighs at density one.
     mesh : Decomposition, or what `rlacd.decompose` takes
         In the frame of the body, in metres.

@@ -20,7 +20,7 @@ def add_hulls(
     ----------
     spec : mujoco.MjSpec
     body : mujoco.MjsBody
-        One of its bodies. Its mass is not changed, since hulls weigh nothing: ``report["mass"]`` of the result has what
+        One of its bodies. Its mass is not changed, since hulls weigh nothing: ``report.mass`` of the result has what
         the mesh weighs at density one.
     mesh : Decomposition, or what `rlacd.decompose` takes
         In the frame of the body, in metres.

@@ -19,7 +19,7 @@ def add_hulls(builder: Any, body: int, mesh: Any, *, settings: Any = None, **opt
     builder : newton.ModelBuilder
         Not yet finalized.
     body : int
-        One of its bodies, or -1 for the world. Its mass is not changed, since hulls weigh nothing: ``report["mass"]``
+        One of its bodies, or -1 for the world. Its mass is not changed, since hulls weigh nothing: ``report.mass``
         of the result has what the mesh weighs at density one.
     mesh : Decomposition, or what `rlacd.decompose` takes
         In the frame of the body, in metres.

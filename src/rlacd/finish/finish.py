@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -25,6 +25,7 @@ from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
+from rlacd.report import Report
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import DENSE, Part
@@ -44,7 +45,7 @@ class Finished(NamedTuple):
     """Hulls in the input's unit, with what was measured."""
 
     hulls: list[trimesh.Trimesh]
-    report: dict[str, Any]
+    report: Report
     balls: Balls | None = None
 
 
@@ -63,7 +64,7 @@ def misses_some(reached: Reached, run: Run) -> bool:
 def finish(reached: Reached, run: Run) -> Finished:
     """Clean the parts, carry them to the input's unit, and measure them; repeat if hulls have to grow."""
     done, parts = _finished(reached, run)
-    under = done.report["hausdorff"]["under"]
+    under = done.report.hausdorff.under
     if under is None or not NEARLY < under <= COVERAGE_TOLERANCE or run.stopped_by is not None:
         return done
     with run.stage("finish"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd.criteria.limited import LimitedCriterion, least_kept
 from rlacd.find_parts import Reached
+from rlacd.report import Passage
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, dots
 from rlacd.solid.distance import hull_union
@@ -46,28 +47,21 @@ _NEIGHBOURS = 8
 
 
 class Narrowed(NamedTuple):
-    """The passages that hulls narrow by more than a tenth, the most narrowed first.
+    """The passages that hulls narrow by more than a tenth, the most narrowed first."""
 
-    Attributes
-    ----------
-    passages
-        One entry each: at ``at_abs``, a ball of ``radius_abs`` fits in the input, of ``left_abs`` between hulls.
-    is_every
-        Whether all are listed: no triangle or ball was left out, and no passage widens, as several in a row do.
-    by_limits
-        Whether a limit on hulls undid what cutting had kept open.
-    """
-
-    passages: list[dict[str, Any]]
+    passages: tuple[Passage, ...] = ()
+    """Their places, and how wide they were and are."""
     is_every: bool = True
+    """Whether all are listed: no triangle or ball was left out, and no passage widens, as several in a row do."""
     by_limits: bool = False
+    """Whether a limit on hulls undid what cutting had kept open."""
 
 
 def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> Narrowed:
     """Find the passages that hulls narrow; no hull reaches out, so no passage loses, more than `over` in the frame."""
     most = min(over / LEAST_LOSS, 2.0)
     if reached.root is None or most <= NARROWEST:
-        return Narrowed([])
+        return Narrowed()
     threads, frame, solid = run.threads, reached.solid.frame, reached.solid.mesh
     surface, union = reached.root.filling.surface, hull_union(hulls, threads)
 
@@ -88,11 +82,8 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> 
     worst = worst[left[worst] < (1 - LEAST_LOSS) * balls.radii[worst]]
     worst = worst[np.argsort(left[worst] / balls.radii[worst], kind="stable")]
     places, lengths = frame.to_input(balls.centres[worst]), np.stack([balls.radii[worst], left[worst]]) / frame.scale
-    entries = [
-        {"at_abs": at, "radius_abs": radius, "left_abs": rest}
-        for at, radius, rest in zip(places.tolist(), *lengths.tolist(), strict=True)
-    ]
-    return Narrowed(entries, is_every, _by_limits(reached, union, threads))
+    found = (Passage((x, y, z), *of) for (x, y, z), *of in zip(places.tolist(), *lengths.tolist(), strict=True))
+    return Narrowed(tuple(found), is_every, _by_limits(reached, union, threads))
 
 
 def _by_limits(reached: Reached, union: _native.HullUnion, threads: int) -> bool:
@@ -148,9 +139,9 @@ def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface,
 def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]:
     """Warn of passages that keep less than asked for, and of others wider than the tolerance that lose over half."""
     options, scale = reached.options, reached.solid.frame.scale
-    lost = [(at, radius, left) for at, radius, left in (one.values() for one in found.passages)]
-    told = _told(reached, *(scale * np.array([one[i] for one in lost]) for i in (1, 2)))
-    asked, others = ([one for one, why in zip(lost, told, strict=True) if why == kind] for kind in (2, 1))
+    radii = scale * np.array([[one.radius_abs, one.left_abs] for one in found.passages]).reshape(-1, 2)
+    told = _told(reached, *radii.T)
+    asked, others = ([one for one, why in zip(found.passages, told, strict=True) if why == kind] for kind in (2, 1))
     by_limits = "limits on the hulls leave no other way" if found.by_limits else ""
     reason = "the work was stopped before" if is_stopped else by_limits
     cure = (
@@ -163,13 +154,11 @@ def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]
     ]
 
 
-def _narrows(lost: list[tuple[list[float], float, float]], at_least: str, share: str, then: str) -> str:
-    closed = sum(left == 0 for _, _, left in lost)
-    lost = sorted(lost, key=lambda one: (one[2] / one[1], -one[1]))
-    named = [
-        f"near ({', '.join(f'{x:.4g}' for x in at)}) from a radius of {radius:.4g} to {left:.4g}"
-        for at, radius, left in lost[:MOST_NAMED]
-    ]
+def _narrows(lost: list[Passage], at_least: str, share: str, then: str) -> str:
+    closed = sum(one.left_abs == 0 for one in lost)
+    lost = sorted(lost, key=lambda one: (one.left_abs / one.radius_abs, -one.radius_abs))
+    each = ((", ".join(f"{x:.4g}" for x in one.at_abs), one) for one in lost[:MOST_NAMED])
+    named = [f"near ({at}) from a radius of {one.radius_abs:.4g} to {one.left_abs:.4g}" for at, one in each]
     more = "" if len(lost) <= MOST_NAMED else " and others (see `passages`)"
     return (
         f"{at_least}{len(lost)} passage{'s narrow' if len(lost) > 1 else ' narrows'} by {share}"

@@ -27,36 +27,23 @@ that is less. On either side of a seam in a bent solid, neither hull is quite as
 
 @dataclass(frozen=True)
 class ShortSeam:
-    """A seam that the criterion keeps from overlapping enough.
-
-    Attributes
-    ----------
-    parts : tuple of int
-        The two.
-    place : float64 [3]
-        Where the seam lacks the most depth.
-    depth : float
-        How deep that place lies in the hull that it lies deepest in.
-    """
+    """A seam that the criterion keeps from overlapping enough."""
 
     parts: tuple[int, int]
+    """The two."""
     place: FloatArray
+    """``[3]``, where the seam lacks the most depth."""
     depth: float
+    """How deep that place lies in the hull that it lies deepest in."""
 
 
 @dataclass(frozen=True)
 class Seams:
-    """The seams, where two hulls touched with less overlap than asked for.
-
-    Attributes
-    ----------
-    count : int
-    short : tuple of ShortSeam
-        The seams that still overlap by less.
-    """
+    """The seams, where two hulls touched with less overlap than asked for."""
 
     count: int
     short: tuple[ShortSeam, ...]
+    """The seams that still overlap by less."""
 
 
 class _Seam(NamedTuple):

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd._version import __version__
 from rlacd.criteria.avoided import FINEST_SHARE, warnings_of
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
-from rlacd.fit import RESOLVED, Fit, length_unit, told_apart
+from rlacd.fit import RESOLVED, length_unit, told_apart
 from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
+from rlacd.report import Avoids, Hausdorff, Hole, NodeParts, Overlap, Point, Report, ShortSeam
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import Place, hull_distances, hull_union
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.mass import Mass, joint_mass, mass_of
+from rlacd.solid.mass import joint_mass, mass_of
 from rlacd.solid.solid import Solid
 
 COVERAGE_TOLERANCE = 5 * HALF_THICKNESS
@@ -60,8 +62,8 @@ class _Distances(NamedTuple):
 
 def make_report(
     reached: Reached, parts: Sequence[Part], hulls: Sequence[trimesh.Trimesh], seams: Seams | None, run: Run
-) -> dict[str, Any]:
-    """Measure a finished decomposition; the keys are those of `rlacd.Decomposition` without name and seconds.
+) -> Report:
+    """Measure a finished decomposition; of the input as a whole, such as its name, it says nothing.
 
     Values that there was no time to measure are None.
 
@@ -83,7 +85,7 @@ def make_report(
     distances = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
         weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
-        entered = criterion.avoided and criterion.avoided.found(parts, solid.frame.scale)
+        entered = None if criterion.avoided is None else criterion.avoided.found(parts, solid.frame.scale)
         missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
@@ -93,32 +95,33 @@ def make_report(
         warnings += warnings_of(entered, _why_entered(run)) if entered else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
-        return {
-            "version": __version__,
-            "options": options.as_plain(),
-            "complete": run.stopped_by is None,
-            "stopped_by": run.stopped_by,
-            "parts": len(hulls),
-            **{name: sum(len(getattr(hull, name)) for hull in hulls) for name in ("faces", "vertices")},
-            **({"primitives": _primitives(parts)} if options.primitives else {}),
-            **({"overlap": _seams(seams, solid.frame)} if options.overlap > 0 else {}),
+        return Report(
+            options=options.as_plain(),
+            complete=run.stopped_by is None,
+            stopped_by=run.stopped_by,
+            parts=len(hulls),
+            faces=sum(len(hull.faces) for hull in hulls),
+            vertices=sum(len(hull.vertices) for hull in hulls),
+            primitives=_primitives(parts) if options.primitives else None,
+            overlap=_overlap(seams, solid.frame) if options.overlap > 0 else None,
             **summary.entries,
-            **({"avoid": entered} if entered else {}),
-            "hausdorff": _hausdorff(distances),
-            "passages": distances and distances.narrowed.passages,
-            "scale": solid.frame.scale,
-            "mass": mass_of(*concatenated(weighed), solid.frame).as_plain(),
-            "repair": [{**vars(body)} for body in solid.bodies],
-            "holes": _holes(solid),
-            "search": reached.found and reached.found.as_plain(),
-            "at_least": reached.found and min(reached.found.at_least, len(hulls)),
-            "warnings": warnings,
-        }
+            avoid=entered,
+            hausdorff=_hausdorff(distances),
+            passages=distances and distances.narrowed.passages,
+            scale=solid.frame.scale,
+            mass=mass_of(*concatenated(weighed), solid.frame),
+            repair=solid.bodies,
+            holes=_holes(solid),
+            search=reached.found,
+            at_least=None if reached.found is None else min(reached.found.at_least, len(hulls)),
+            warnings=tuple(warnings),
+        )
 
 
-def _hausdorff(distances: _Distances | None) -> dict[str, float | None]:
-    under = distances and max(distances.under, distances.left_out.distance)
-    return {"over": distances and distances.over, "under": under}
+def _hausdorff(distances: _Distances | None) -> Hausdorff:
+    if distances is None:
+        return Hausdorff()
+    return Hausdorff(distances.over, max(distances.under, distances.left_out.distance))
 
 
 def _why_entered(run: Run) -> str:
@@ -128,16 +131,14 @@ def _why_entered(run: Run) -> str:
     return f"parts within {FINEST_SHARE:.0%} of the threshold, and those that limits leave no way, are cut no further"
 
 
-def _holes(solid: Solid) -> list[dict[str, Any]]:
-    return [
-        {
-            "body": hole.body,
-            "at_abs": solid.frame.to_input(hole.at).tolist(),
-            "width_abs": hole.width / solid.frame.scale,
-            "closed": hole.is_closed,
-        }
-        for hole in solid.holes[:MOST_HOLES]
-    ]
+def _holes(solid: Solid) -> tuple[Hole, ...]:
+    frame, most = solid.frame, solid.holes[:MOST_HOLES]
+    return tuple(Hole(one.body, _point(frame, one.at), one.width / frame.scale, one.is_closed) for one in most)
+
+
+def _point(frame: Frame, place: ArrayLike) -> Point:
+    x, y, z = frame.to_input(np.asarray(place)).tolist()
+    return x, y, z
 
 
 def _primitives(parts: Sequence[Part]) -> dict[str, int]:
@@ -146,19 +147,11 @@ def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
 
 
-def _seams(seams: Seams | None, frame: Frame) -> dict[str, Any]:
-    """How many seams were found, how many of them are short of the overlap, and where; None if there was no time."""
+def _overlap(seams: Seams | None, frame: Frame) -> Overlap:
     if seams is None:
-        return {"seams": None, "short": None, "short_seams": None}
-    places = [
-        {
-            "parts": list(seam.parts),
-            "at_abs": frame.to_input(seam.place[None])[0].tolist(),
-            "depth_abs": seam.depth / frame.scale,
-        }
-        for seam in seams.short
-    ]
-    return {"seams": seams.count, "short": len(places), "short_seams": places}
+        return Overlap()
+    short = [ShortSeam(one.parts, _point(frame, one.place), one.depth / frame.scale) for one in seams.short]
+    return Overlap(seams.count, len(short), tuple(short))
 
 
 def _shallow(seams: Seams | None, overlap_abs: float) -> list[str]:
@@ -172,49 +165,52 @@ def _shallow(seams: Seams | None, overlap_abs: float) -> list[str]:
     ]
 
 
-def joint_report(reports: Sequence[tuple[str, dict[str, Any]]], scale: float) -> dict[str, Any]:
+def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
     """Join the reports of a scene's nodes, which were decomposed separately.
 
     Parameters
     ----------
-    reports : sequence of (str, dict)
+    reports : sequence of (str, Report)
         Each node's name and report.
     scale : float
         Frame units of the scene per unit of the input; joint lengths are in that frame.
     """
-    each = [(name, report, scale / report["scale"]) for name, report in reports]
-    first, counted = reports[0][1], ("parts", "faces", "vertices")
-    bodies = accumulate((len(report["repair"]) for _, report in reports), initial=0)
-    begins = list(zip(each, bodies, strict=False))
-    stopped = next((report for _, report in reports if not report["complete"]), first)
-    return {
-        "version": first["version"],
-        "options": dict(first["options"]),
-        **{what: stopped[what] for what in ("complete", "stopped_by")},
-        **({"primitives": _added([r["primitives"] for _, r in reports])} if "primitives" in first else {}),
-        **({"overlap": _joint_seams([r for _, r in reports])} if "overlap" in first else {}),
-        **{what: sum(report[what] for _, report in reports) for what in counted},
-        **_joint_fit(each),
-        **({"avoid": _joint_avoid([r["avoid"] for _, r in reports])} if "avoid" in first else {}),
-        "hausdorff": {side: _farthest([(r["hausdorff"][side], f) for _, r, f in each]) for side in ("over", "under")},
-        "scale": scale,
-        "mass": joint_mass([Mass.of_plain(report["mass"]) for _, report in reports]).as_plain(),
-        "repair": [
-            {**body, "body": begin + i, "deviation": body["deviation"] * factor, "node": name}
-            for (name, report, factor), begin in begins
-            for i, body in enumerate(report["repair"])
-        ],
-        "holes": [
-            {**hole, "body": begin + hole["body"], "node": name}
-            for (name, report, _), begin in begins
-            for hole in report["holes"]
-        ],
-        "passages": [{**passage, "node": name} for name, report in reports for passage in report["passages"] or ()],
-        "nodes": [{"node": name, "parts": report["parts"], "scale": report["scale"]} for name, report in reports],
-        "search": None,
-        "at_least": _sum_known([report["at_least"] for _, report in reports]),
-        "warnings": [f"{name}: {warning}" for name, report in reports for warning in report["warnings"]],
-    }
+    each, factors = [report for _, report in reports], [scale / report.scale for _, report in reports]
+    first, stopped = each[0], next((report for report in each if not report.complete), each[0])
+    begins = [*accumulate((len(report.repair) for report in each), initial=0)]
+    bodies = [*zip(reports, factors, begins, strict=False)]
+    return Report(
+        options=first.options,
+        complete=stopped.complete,
+        stopped_by=stopped.stopped_by,
+        parts=sum(report.parts for report in each),
+        faces=sum(report.faces for report in each),
+        vertices=sum(report.vertices for report in each),
+        primitives=_added([report.primitives for report in each]),
+        overlap=_joint_overlap(each),
+        **_joint_fit(each, factors),
+        avoid=_joint_avoid([report.avoid for report in each if report.avoid is not None]),
+        hausdorff=Hausdorff(
+            _farthest([report.hausdorff.over for report in each], factors),
+            _farthest([report.hausdorff.under for report in each], factors),
+        ),
+        passages=tuple(replace(one, node=name) for name, report in reports for one in report.passages or ()),
+        nodes=tuple(NodeParts(name, report.parts, report.scale) for name, report in reports),
+        scale=scale,
+        mass=joint_mass([report.mass for report in each]),
+        repair=tuple(
+            replace(body, body=begin + i, deviation=body.deviation * factor, node=name)
+            for (name, report), factor, begin in bodies
+            for i, body in enumerate(report.repair)
+        ),
+        holes=tuple(
+            replace(hole, body=begin + hole.body, node=name)
+            for (name, report), _, begin in bodies
+            for hole in report.holes
+        ),
+        at_least=_sum_known([report.at_least for report in each]),
+        warnings=tuple(f"{name}: {warning}" for name, report in reports for warning in report.warnings),
+    )
 
 
 def _sum_known(counts: Sequence[int | None]) -> int | None:
@@ -222,52 +218,50 @@ def _sum_known(counts: Sequence[int | None]) -> int | None:
     return sum(known) if len(known) == len(counts) else None
 
 
-def _joint_fit(each: Sequence[tuple[str, dict[str, Any], float]]) -> dict[str, Any]:
-    """The criterion's entry for the parts of all nodes; lengths grow by each node's factor."""
-    fits = [(Fit.of(report), factor) for _, report, factor in each]
-    errors: list[float] | None = []
-    for fit, factor in fits:
-        assert fit is not None
-        known = None if errors is None or fit.per_part is None else fit.per_part
-        errors = None if known is None or errors is None else [*errors, *(e * fit.unit(factor) for e in known)]
-    first = fits[0][0]
-    assert first is not None
-    found = {"per_part": errors, "max": None if errors is None else max(errors)}
-    if first.is_length:
-        found["threshold"] = max(
-            fit.limit * factor for fit, factor in fits if fit is not None and fit.limit is not None
-        )
-    return {first.key: each[0][1][first.key] | found}
+def _joint_fit(each: Sequence[Report], factors: Sequence[float]) -> dict[str, Any]:
+    """The criterion's measurement of the parts of all nodes; lengths grow by each node's factor."""
+    fits = [fit for report in each if (fit := report.fit) is not None]
+    known, scaled = [fit.per_part for fit in fits if fit.per_part is not None], [*zip(fits, factors, strict=True)]
+    errors = [e * fit.unit(factor) for fit, factor in scaled for e in fit.per_part or ()]
+    found: dict[str, Any] = {"per_part": tuple(errors), "max": max(errors, default=None)}
+    if len(known) < len(fits):
+        found = {"per_part": None, "max": None}
+    if fits[0].is_length:
+        found["threshold"] = max(fit.limit * factor for fit, factor in scaled if fit.limit is not None)
+    return {fits[0].key: replace(getattr(each[0], fits[0].key), **found)}
 
 
-def _farthest(lengths: Sequence[tuple[float | None, float]]) -> float | None:
+def _farthest(lengths: Sequence[float | None], factors: Sequence[float]) -> float | None:
     """The greatest of lengths, each times its factor; None if one is unknown."""
-    known = [length * factor for length, factor in lengths if length is not None]
+    known = [length * factor for length, factor in zip(lengths, factors, strict=True) if length is not None]
     return max(known) if len(known) == len(lengths) else None
 
 
-def _joint_seams(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _joint_overlap(each: Sequence[Report]) -> Overlap | None:
     """Join the seams of all nodes, with parts numbered through."""
-    seams = [report["overlap"] for report in reports]
-    if any(one["seams"] is None for one in seams):
-        return dict.fromkeys(seams[0])
-    firsts = accumulate((report["parts"] for report in reports), initial=0)
-    places = [
-        {**place, "parts": [first + part for part in place["parts"]]}
-        for first, one in zip(firsts, seams, strict=False)
-        for place in one["short_seams"]
+    overlaps = [report.overlap for report in each if report.overlap is not None]
+    if not overlaps:
+        return None
+    if any(one.seams is None for one in overlaps):
+        return Overlap()
+    firsts = accumulate((report.parts for report in each), initial=0)
+    short = [
+        replace(seam, parts=(first + seam.parts[0], first + seam.parts[1]))
+        for first, one in zip(firsts, overlaps, strict=False)
+        for seam in one.short_seams or ()
     ]
-    return {"seams": sum(one["seams"] for one in seams), "short": len(places), "short_seams": places}
+    return Overlap(sum(one.seams or 0 for one in overlaps), len(short), tuple(short))
 
 
-def _joint_avoid(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _joint_avoid(each: Sequence[Avoids]) -> Avoids | None:
     """Join what hulls of all nodes enter: a mesh entered by several nodes is listed for each."""
-    crossed = dict.fromkeys(name for one in each for name in one["crossed"])
-    return {"crossed": [*crossed], "entered": [entry for one in each for entry in one["entered"]]}
+    crossed = dict.fromkeys(name for one in each for name in one.crossed)
+    return Avoids(tuple(crossed), tuple(entry for one in each for entry in one.entered)) if each else None
 
 
-def _added(counts: Sequence[dict[str, int]]) -> dict[str, int]:
-    return {kind: sum(count[kind] for count in counts) for kind in counts[0]}
+def _added(counts: Sequence[Mapping[str, int] | None]) -> dict[str, int] | None:
+    known = [count for count in counts if count is not None]
+    return {kind: sum(count[kind] for count in known) for kind in known[0]} if known else None
 
 
 def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
@@ -375,7 +369,7 @@ def _early_end(run: Run) -> list[str]:
 def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
     """Say what hulls miss, and how far they reach out unless the criterion has reported that (`exceeds`)."""
     options, scale = reached.options, reached.solid.frame.scale
-    unit, in_words = length_unit({"options": vars(options), "scale": scale})
+    unit, in_words = length_unit(vars(options), scale)
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")

@@ -10,21 +10,14 @@ from rlacd.solid.component import Component
 
 
 class Encoder(Protocol):
-    """Describes components; nothing of it is learned, and it can be pickled.
-
-    Attributes
-    ----------
-    dim : int
-        Number of features, of a component or of each of its planes.
-    outputs : int
-        Values that the network finds from them: one of each plane's own features, or those of all 150 at once.
-    digest : str
-        Identifies the encoder's weights; empty if it has none.
-    """
+    """Describes components; nothing of it is learned, and it can be pickled."""
 
     dim: int
+    """Number of features, of a component or of each of its planes."""
     outputs: int
+    """Values that the network finds from them: one of each plane's own features, or those of all 150 at once."""
     digest: str
+    """Identifies the encoder's weights; empty if it has none."""
 
     def describe(self, component: Component) -> Float32Array:
         """Features of a component, [dim] or [150, dim]; the same component always has the same."""

@@ -20,38 +20,28 @@ from rlacd.solid.component import Component
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """T cuts of N components, with C unfinished children.
-
-    Attributes
-    ----------
-    features : float16 [N, D] or [N, A, D]
-    masks : bool [N, A]
-        Their valid planes.
-    excess : float64 [N]
-        See `CutEnv.excess`.
-    state, planes : int64 [T]
-        The component that each cut divided, by its number, and the plane.
-    rewards : float64 [T]
-    child, owner : int64 [C]
-        Components that cuts left unfinished, and the cut of each.
-    discounts : float64 [C]
-    parts : int
-        Number of components at the end.
-    ended : str
-        terminal: all parts finished; stuck: some cannot be cut; cap: truncated; nothing: to cut; lost: never played.
-    """
+    """T cuts of N components, with C unfinished children."""
 
     features: NDArray[np.float16]
+    """``[N, D]``."""
     masks: BoolArray
+    """``[N, A]``, their valid planes."""
     excess: FloatArray
+    """``[N]``, see `CutEnv.excess`."""
     state: Int64Array
     planes: Int64Array
+    """``[T]``, the component that each cut divided, by its number, and the plane."""
     rewards: FloatArray
+    """``[T]``."""
     child: Int64Array
     owner: Int64Array
+    """``[C]``, components that cuts left unfinished, and the cut of each."""
     discounts: FloatArray
+    """``[C]``."""
     parts: int
+    """Number of components at the end."""
     ended: str
+    """terminal: all parts finished; stuck: some cannot be cut; cap: truncated; nothing: to cut; lost: never played."""
 
     @classmethod
     def empty(cls, ended: str) -> Episode:

@@ -12,6 +12,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 
 from rlacd.errors import RlacdError, TrainingError
+from rlacd.io.read import READERS
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write.atomic import write_file
 from rlacd.learn.checkpoint import packed, unpacked
@@ -19,7 +20,7 @@ from rlacd.repair.repair import repair
 from rlacd.solid.component import Component
 from rlacd.solid.frame import Frame
 
-ENDINGS = frozenset({".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".dae", ".3mf"})
+ENDINGS = frozenset(f".{ending}" for ending in READERS)
 
 TURNS = (0.0, 45.0, 90.0, 180.0)
 """Degrees about one axis: the paper's augmentation."""

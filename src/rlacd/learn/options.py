@@ -15,60 +15,6 @@ from rlacd.options.fields import check_fields, option, stated
 class TrainOptions:
     """All options that affect the outcome of a training run; defaults are the paper's where it states a value.
 
-    Attributes
-    ----------
-    threshold
-        Concavity at which a component is finished (paper, 4.1: 4 %).
-    volume_reward
-        Weight of the reward for hull volume saved, lambda 1 (4.1).
-    finish_reward
-        Weight of the reward for finishing, lambda 2 (4.1).
-    max_parts
-        Components at which an episode ends.
-    rotate
-        Rotate each solid about x, y or z by 0, 45, 90 or 180 degrees (4.3).
-    max_faces
-        Skip meshes with more triangles than this.
-    target
-        What a plane is worth: one-step, its reward plus the values of the two sides (eq. 8); or return, the discounted
-        rewards of the whole episode below it, in units of the component's excess volume, learned by a network whose
-        average plays.
-    env_steps
-        Cuts made, each followed by learning (4.1).
-    learning_starts
-        Random cuts at the start, without learning (4.1).
-    epsilon
-        Share of random cuts after those (4.1).
-    epsilon_decay
-        Factor applied to epsilon every 1000 cuts (4.1).
-    buffer_size
-        Transitions kept for learning (4.1).
-    batch_size
-        Transitions for each gradient step.
-    train_frequency
-        Cuts between gradient steps.
-    learning_rate
-        Learning rate of Adam.
-    target_frequency
-        one-step: gradient steps between copies to the target network.
-    seed
-        The same seed, meshes and options give the same weights on CPU.
-    environments
-        Episodes played at the same time: episode n begins once episode n - E has been learned from.
-    threads
-        Threads of the training process.
-    device
-        cpu, cuda, or auto: a GPU, if there is one and the network values all planes at once; a small network that
-        values them one by one learns as fast on the CPU.
-    log_every
-        Cuts between points of the curves.
-    validate_every
-        Cuts between validations.
-    validation
-        Meshes held out for validation; 0 validates on the first 16 training meshes.
-    checkpoint_seconds
-        Seconds between checkpoints.
-
     Raises
     ------
     OptionError
@@ -77,33 +23,60 @@ class TrainOptions:
 
     # The decision process (3.1)
     threshold: float = option(0.04, least=0.001, most=1)
+    """Concavity at which a component is finished (paper, 4.1: 4 %)."""
     volume_reward: float = option(1000.0, least=0)
+    """Weight of the reward for hull volume saved, lambda 1 (4.1)."""
     finish_reward: float = option(1000.0, least=0)
+    """Weight of the reward for finishing, lambda 2 (4.1)."""
     max_parts: int = option(512, least=2)
+    """Components at which an episode ends."""
     rotate: bool = option(True)
+    """Rotate each solid about x, y or z by 0, 45, 90 or 180 degrees (4.3)."""
     max_faces: int = option(2000, least=4)
+    """Skip meshes with more triangles than this."""
 
     # Q-learning (3.5, 4.1)
     target: str = option("one-step", one_of=("one-step", "return"))
+    """What a plane is worth: one-step, its reward plus the values of the two sides (eq. 8); or return, the discounted
+    rewards of the whole episode below it, in units of the component's excess volume, learned by a network whose average
+    plays."""
     env_steps: int = option(1_000_000, least=1)
+    """Cuts made, each followed by learning (4.1)."""
     learning_starts: int = option(10_000, least=0)
+    """Random cuts at the start, without learning (4.1)."""
     epsilon: float = option(0.2, least=0, most=1)
+    """Share of random cuts after those (4.1)."""
     epsilon_decay: float = option(0.99, least=0, most=1)
+    """Factor applied to epsilon every 1000 cuts (4.1)."""
     buffer_size: int = option(100_000, least=1)
+    """Transitions kept for learning (4.1)."""
     batch_size: int = option(256, least=1)
+    """Transitions for each gradient step."""
     train_frequency: int = option(1, least=1)
+    """Cuts between gradient steps."""
     learning_rate: float = option(1e-4, least=0)
+    """Learning rate of Adam."""
     target_frequency: int = option(1000, least=1)
+    """one-step: gradient steps between copies to the target network."""
 
     # The run
     seed: int = option(0, least=0, most=2**63 - 1)
+    """The same seed, meshes and options give the same weights on CPU."""
     environments: int = option(4, least=1, most=4096)
+    """Episodes played at the same time: episode n begins once episode n - E has been learned from."""
     threads: int = option(1, least=1, most=1024)
+    """Threads of the training process."""
     device: str = option("auto", one_of=("auto", "cpu", "cuda"))
+    """cpu, cuda, or auto: a GPU, if there is one and the network values all planes at once; a small network that values
+    them one by one learns as fast on the CPU."""
     log_every: int = option(500, least=1)
+    """Cuts between points of the curves."""
     validate_every: int = option(10_000, least=1)
+    """Cuts between validations."""
     validation: int = option(16, least=0)
+    """Meshes held out for validation; 0 validates on the first 16 training meshes."""
     checkpoint_seconds: float = option(300.0, least=0)
+    """Seconds between checkpoints."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -147,87 +147,6 @@ def with_criterion(given: Mapping[str, Any]) -> dict[str, Any]:
 class Options:
     """Everything that decides the outcome of a decomposition, as the command line explains it; see `rlacd.decompose`.
 
-    Attributes
-    ----------
-    criterion
-        When a hull is tight enough: distance: its surface and the mesh's lie at most --threshold apart; concavity: also
-        the volume it adds is small (CoACD's measure); volume: it adds at most --tolerance of volume, such as 1%; or
-        navigable: it stays out of the space that a ball of --radius can reach, and what no ball can reach may be
-        filled.
-    threshold
-        The concavity a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with more hulls:
-        0.02 is fine, 0.2 coarse. Also as a share of the longest side (2.5%) or, where the file says its unit, as a
-        length (0.05m), which is a distance. For a robot by default 1.5% of its longest side, as a distance.
-    threshold_abs
-        The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance.
-    volume_tolerance
-        With --criterion volume: the share of volume that a hull may add, such as 1%.
-    volume_of
-        With --criterion volume: whether --tolerance is a share of each part's own volume or of the whole's.
-    max_hulls
-        At most this many hulls, even if the threshold must be exceeded; the report says by how much.
-    max_vertices
-        At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls, or
-        exceeds the threshold and says so.
-    max_faces
-        At most this many triangles per hull; a low limit acts as a low limit on vertices.
-    detail
-        simple leaves out corners of hulls that add little, within the threshold; full keeps the exact hulls.
-    primitives
-        Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF,
-        SDF, USD and Unreal, else as meshes.
-    overlap
-        Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them; also
-        a length (2mm).
-    overlap_abs
-        The same as a length in the mesh's own unit.
-    keep_open
-        Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in radius, one of this
-        share of its radius (0.9) still fits between the hulls; also the radius of a ball that has to pass (2mm).
-    keep_open_abs
-        The radius of that ball as a length in the mesh's own unit.
-    avoid
-        Meshes in the same frame and unit that no hull enters: files, here. Parts are cut finer there, down to a
-        hundredth of the threshold. May be repeated.
-    merge
-        Join hulls where one is tight enough, also across what lies between them.
-    policy
-        What chooses the next cut: navacd is the quickest, learned and rl-acd ask networks; FILE.npz is your own.
-    resolution
-        Grid cells along the longest side, used to repair bodies that are not closed.
-    open
-        Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
-        others thin shells; solid fills all that enclose a space; thin fills none.
-    keep_cavities
-        Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are filled, as
-        nothing can get in, and only the mass leaves them out.
-    gap
-        Openings that a ball of this radius, a share of the longest side, cannot pass count as closed.
-    seed
-        The same seed, input and options give the same bytes; another seed finds other hulls.
-    threads
-        Threads to use; the result does not depend on it.
-    timeout
-        Stop after this time and keep the result so far.
-    quality
-        How long to search for fewer hulls: fast does not search, balanced takes two to three times as long, best
-        searches until --budget ends.
-    budget
-        How long the search may take.
-    search_steps
-        How many steps the search may take; unlike --budget, this gives the same bytes however busy the machine is.
-    preset
-        The limits and the file format of an engine. Other options override it.
-    per_node
-        Decompose each node of a scene separately, such as doors and drawers, which move.
-    relative_to
-        What --threshold is relative to: with --per-node the whole scene or each node; of a robot all of it (scene) or
-        each mesh, whose criterion is then concavity.
-    unit
-        The unit of the mesh, which is converted to metres; file takes what the file says.
-    scale
-        Multiply the mesh's coordinates by this.
-
     Raises
     ------
     OptionError
@@ -237,6 +156,12 @@ class Options:
     criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = option(
         None, TIGHT, _CRITERION, metavar="|".join(CRITERIA), usual="concavity; distance with a length as the threshold"
     )
+    """When a hull is tight enough: distance: its surface and the mesh's lie at most --threshold apart; concavity:
+    also the volume it adds is small (CoACD's measure); volume: it adds at most --tolerance of volume, such as 1%; or
+    navigable: it stays out of the space that a ball of --radius can reach, and what no ball can reach may be filled.
+
+    Navigable space is given as an `rlacd.NavigableSpace`.
+    """
     threshold: float = option(
         0.05,
         TIGHT,
@@ -244,38 +169,158 @@ class Options:
         flags=("--threshold", "-t"),
         metavar="NUMBER",
     )
+    """The concavity or distance a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with
+    more hulls: 0.02 is fine, 0.2 coarse.
+
+    On the command line: also as a share of the longest side (2.5%) or, where the file says its unit, as a length
+    (0.05m), which is a distance. For a robot by default 1.5% of its longest side, as a distance.
+
+    This is CoACD's frame; all other lengths are shares of the longest side, or in the mesh's own unit.
+    """
     threshold_abs: float | None = option(None, TIGHT, LENGTH)
+    """The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance."""
     volume_tolerance: float = option(0.01, TIGHT, least=1e-4, most=10.0, flags=("--tolerance",))
+    """With --criterion volume: the share of volume that a hull may add, such as 1%.
+
+    The default is that of V-HACD. Parts smaller than a thousandth of the whole's convex hull count as this large.
+    """
     volume_of: VolumeOf = option("part", TIGHT, one_of=VolumeOf)
+    """With --criterion volume: whether --tolerance is a share of each part's own volume or of the whole's."""
     max_hulls: int | None = option(None, LIMITS, least=1)
+    """At most this many hulls, even if the threshold must be exceeded; the report says by how much.
+
+    It has no effect if there are no more anyway; otherwise the decomposition with the least concavity among those
+    found under coarser thresholds is returned. A larger limit never leads to a larger concavity.
+    """
     max_vertices: int | None = option(None, LIMITS, _CORNERS)
+    """At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls,
+    or exceeds the threshold and says so.
+
+    A limited hull contains its part and sticks out by at most the threshold (by 0.05 with the criterion ``volume``);
+    concavity does not count the volume that a limit adds. A part without such a hull is cut on as `max_hulls`
+    allows, but never beyond twice the hulls it takes without limits, and a convex body stays one hull. Where that
+    does not do, a warning says how far hulls stick out.
+    """
     max_faces: int | None = option(None, LIMITS, _CORNERS)
+    """At most this many triangles per hull; a low limit acts as a low limit on vertices."""
     detail: DetailName = option(SIMPLE, LIMITS, one_of=DetailName)
+    """simple leaves out corners of hulls that add little, within the threshold; full keeps the exact hulls."""
     primitives: bool | Sequence[PrimitiveKind] = option(
         (), LIMITS, _PRIMITIVES, metavar="all|box,sphere,…", usual="none"
     )
+    """Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF,
+    SDF, USD and Unreal, else as meshes.
+
+    True allows all. A primitive contains the hull of its part, and is the simplest whose volume is within a quarter
+    of the least; its own hull is a convex polyhedron around it, and ``Decomposition.primitives`` describes it.
+    """
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
+    """Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them.
+
+    On the command line: also a length (2mm).
+
+    One takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and
+    a warning says at how many seams. With `per_node`, hulls of different nodes do not overlap.
+    """
     overlap_abs: float | None = option(None, LIMITS, LENGTH)
+    """The same as a length in the mesh's own unit."""
     keep_open: float | None = option(None, LIMITS, _OPENNESS, metavar="NUMBER", usual="passages may close")
+    """Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in radius, one of this
+    share of its radius (0.9) still fits between the hulls.
+
+    On the command line: also the radius of a ball that has to pass (2mm).
+
+    It fits at the same place. A warning counts the passages not kept and says what is left; ``report.passages``
+    lists them.
+    """
     keep_open_abs: float | None = option(None, LIMITS, LENGTH)
+    """The radius of that ball as a length in the mesh's own unit.
+
+    It still passes wherever one 1 % larger does.
+    """
     avoid: Sequence[MeshLike] = option((), LIMITS, _AVOIDED, metavar="FILE", usual="nothing", repeated=True)
+    """Meshes in the same frame and unit that no hull enters. Parts are cut finer there, down to a hundredth of the
+    threshold.
+
+    On the command line: a file; may be repeated.
+
+    Where the input itself crosses them, or limits on the hulls leave no way, a warning says so.
+    """
     merge: bool = option(True, METHOD, usual="merge")
+    """Join hulls where one is tight enough, also across what lies between them."""
     policy: str | Policy | None = option(None, METHOD, _POLICY, metavar="NAME", usual="greedy; learned with --no-merge")
+    """What chooses the next cut: navacd is the quickest, learned and rl-acd ask networks; FILE.npz is your own.
+
+    This holds for the first pass. So does any object with a method ``choose``: see `rlacd.Policy`.
+    """
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
+    """Grid cells along the longest side, used to repair bodies that are not closed."""
     open: OpenName = option("auto", METHOD, one_of=OpenName)
+    """Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
+    others thin shells; solid fills all that enclose a space; thin fills none."""
     keep_cavities: bool = option(False, METHOD)
+    """Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are filled, as
+    nothing can get in, and only the mass leaves them out.
+
+    Closed cavities are those that an inner shell or closed bodies bound, and spaces that only narrow gaps lead to.
+    """
     gap: float = option(0.015, METHOD, number(*GAPS, typed=str), metavar="NUMBER")
+    """Openings that a ball of this radius, a share of the longest side, cannot pass count as closed."""
     seed: int = option(0, RUN, least=0, most=2**63 - 1)
+    """The same seed, input and options give the same bytes; another seed finds other hulls.
+
+    Another seed starts from cuts by other planes: the best of several is often better than any one.
+    """
     threads: int | None = option(None, RUN, least=1, most=1024, usual="all cores")
+    """Threads to use; the result does not depend on it."""
     timeout: float | None = option(None, RUN, _SECONDS, metavar="SECONDS")
+    """Stop after this time and keep the result so far.
+
+    It is at most 1 s and 10 % late for inputs of up to a million triangles. The result always covers the input, at
+    worst with one hull for each body.
+    """
     quality: QualityName | None = option(None, METHOD, one_of=QualityName, usual="balanced; fast with --no-merge")
+    """How long to search for fewer hulls: fast does not search, balanced takes two to three times as long, best
+    searches until --budget ends.
+
+    ``fast`` is one pass of cuts; by distance and on navigable space, parts that can be divided among others are then
+    eliminated, unless the policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced`` limits
+    the work of the search to a multiple of that of the pass. No level is worse than the one before it: it finds
+    fewer hulls, or equally many with no more volume before `detail` simplifies them.
+    """
     budget: float | None = option(None, METHOD, _SECONDS, usual="5 with --quality best", metavar="SECONDS")
+    """How long the search may take.
+
+    It replaces the limits of the level; the result then depends on the speed of the machine. ``best`` takes more
+    than its 5 s if the search of ``balanced`` does.
+    """
     search_steps: int | None = option(None, METHOD, least=0)
+    """How many steps the search may take; unlike --budget, this gives the same bytes however busy the machine is.
+
+    It replaces the limits of the level: about 100 a second on one core.
+    """
     preset: PresetName | None = option(None, LIMITS, one_of=tuple(PRESETS), metavar="ENGINE")
+    """The limits and the file format of an engine. Other options override it.
+
+    Each limit applies unless `max_vertices` or `max_faces`, respectively, is given, and warnings say what the engine
+    will not accept; see `rlacd.PRESETS`.
+    """
     per_node: bool = option(False, METHOD)
+    """Decompose each node of a scene separately, such as doors and drawers, which move.
+
+    The limits on hulls hold for each. Nodes that do not touch do not touch as hulls either, or a warning names them
+    (extra ``clear``). Every hull's ``metadata`` names its node, with or without this.
+    """
     relative_to: RelativeTo = option("scene", METHOD, one_of=RelativeTo)
+    """What --threshold is relative to: with --per-node the whole scene or each node; of a robot all of it (scene) or
+    each mesh, whose criterion is then concavity."""
     unit: UnitName | None = option(None, METHOD, one_of=UnitName, usual="coordinates stay as they are")
+    """The unit of the mesh, which is converted to metres; file takes what the file says."""
     scale: float | None = option(None, METHOD, _FACTOR, usual="1")
+    """Multiply the mesh's coordinates by this.
+
+    A conversion by `unit` comes first.
+    """
 
     def __post_init__(self) -> None:
         check_fields(self)

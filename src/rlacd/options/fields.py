@@ -1,6 +1,6 @@
 """Options stated once: a dataclass whose fields carry their type, range and place on the command line.
 
-Its docstring says what each means: ``stated`` reads the help from the section ``Attributes``.
+The docstring below a field says what it means: its first paragraph everywhere, others where `TYPED` says.
 
 Lengths are shares of the longest side of the mesh, or in its own unit under the option's name and ``_abs``. The one
 exception is a bare threshold, which is CoACD's: given in the frame where the longest side is 2.
@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import linecache
 import math
 import numbers
 import os
+import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -22,6 +25,9 @@ from rlacd.errors import OptionError
 LARGEST_INTEGER = 2**63 - 1
 """Bound of integers without another: what kernels and files can hold."""
 
+TYPED = "On the command line: "
+"""Begins the paragraph of a field's docstring that is for the command line only; those after it are for Python."""
+
 LONGEST_SHOWN = 80
 """Characters of a value that a message shows."""
 
@@ -30,27 +36,18 @@ Stated = TypeVar("Stated")
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """What values an option takes.
-
-    Attributes
-    ----------
-    rule
-        What a value has to be, as the end of a sentence.
-    values
-        The same in a few characters, for tables; empty where the help says it.
-    read
-        Turns a value into a plain one; raises any exception for a value of another kind.
-    typed
-        What the command line turns a word into.
-    textual
-        Whether values are strings.
-    """
+    """What values an option takes."""
 
     rule: str
+    """What a value has to be, as the end of a sentence."""
     values: str
+    """The same in a few characters, for tables; empty where the help says it."""
     read: Callable[[Any], Any]
+    """Turns a value into a plain one; raises any exception for a value of another kind."""
     typed: type
+    """What the command line turns a word into."""
     textual: bool = False
+    """Whether values are strings."""
 
 
 def number(
@@ -134,39 +131,27 @@ def _text(value: Any) -> str:
 
 @dataclasses.dataclass
 class About:
-    """What is known of an option beside its name, type and default.
-
-    Attributes
-    ----------
-    kind
-        The values it takes.
-    optional
-        Whether None, its default, is one of them.
-    flags
-        Its names on the command line.
-    help
-        One or two sentences, for the command line and the table.
-    usual
-        The default in words.
-    panel
-        The heading it stands under in the command's help.
-    metavar
-        The word for its value in the help.
-    python
-        How Python gives it, where that is not its name as an argument; empty where Python has no such option.
-    repeated
-        Whether the command line takes it several times.
-    """
+    """What is known of an option beside its name, type and default."""
 
     kind: Kind
+    """The values it takes."""
     optional: bool
+    """Whether None, its default, is one of them."""
     flags: tuple[str, ...] = ()
+    """Its names on the command line."""
     help: str = ""
+    python_help: str = ""
+    """What it means, for the command line and the table, and for Python."""
     usual: str = ""
+    """The default in words."""
     panel: str | None = None
+    """The heading it stands under in the command's help."""
     metavar: str | None = None
+    """The word for its value in the help."""
     python: str | None = None
+    """How Python gives it, where that is not its name as an argument; empty where Python has no such option."""
     repeated: bool = False
+    """Whether the command line takes it several times."""
 
 
 def option(
@@ -207,7 +192,7 @@ def _kind_of(default: Any, **bounds: Any) -> Kind:
 
 
 def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[Stated]], type[Stated]]:
-    """Complete the fields of a dataclass by their names and by the section ``Attributes`` of its docstring.
+    """Complete the fields of a dataclass by their names and the docstrings below them.
 
     Parameters
     ----------
@@ -218,11 +203,14 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
     """
 
     def completed(options: type[Stated]) -> type[Stated]:
-        meanings = _meanings(options.__doc__)
+        said = meanings(options)
         for field in dataclasses.fields(options):  # type: ignore[arg-type]
             known: About = field.metadata["option"]
             word = field.name.replace("_", "-")
-            known.help = meanings.get(field.name, "")
+            first, *others = (" ".join(each.split()) for each in said.get(field.name, "").split("\n\n"))
+            typed = [each.removeprefix(TYPED) for each in others if each.startswith(TYPED)]
+            known.help = " ".join([first, *(each[0].upper() + each[1:] for each in typed)])
+            known.python_help = " ".join([first, *(each for each in others if not each.startswith(TYPED))])
             known.flags = known.flags or (f"--{word}/--no-{word}" if field.default is True else f"--{word}",)
             known.panel = known.panel or panel
             known.python = python.format(field.name) if known.python is None else known.python
@@ -231,16 +219,18 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
     return completed
 
 
-def _meanings(docstring: str | None) -> dict[str, str]:
-    """Read the section ``Attributes``; nothing where Python leaves docstrings out (``-OO``)."""
-    section = inspect.cleandoc(docstring or "").partition("Attributes\n----------\n")[2].partition("\n\n")[0]
-    lines: dict[str, list[str]] = {}
-    for line in section.splitlines():
-        if not line.startswith(" "):
-            lines[name := line] = []
-        else:
-            lines[name].append(line.strip())
-    return {name: " ".join(words) for name, words in lines.items()}
+_EXPLAINED = re.compile(r'^    (\w+): (?:.*\n)+?    """((?:.|\n)+?)"""$', re.MULTILINE)
+"""A field and the docstring below it, as the formatter leaves them; a parser takes a tenth of a small mesh's time."""
+
+
+def meanings(options: type) -> dict[str, str]:
+    """What fields of a class and its bases mean: the docstring below each; nothing without the source."""
+    found: dict[str, str] = {}
+    for kind in reversed(options.__mro__[:-1]):
+        text = "".join(linecache.getlines(getattr(sys.modules[kind.__module__], "__file__", None) or ""))
+        body = re.split(r"\n\S", text.partition(f"\nclass {kind.__name__}")[2], maxsplit=1)[0]
+        found |= {name: inspect.cleandoc(said) for name, said in _EXPLAINED.findall(body)}
+    return found
 
 
 def about(options: Any, name: str) -> About:

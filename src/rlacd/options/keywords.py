@@ -1,14 +1,17 @@
-"""Names of options that a function does not have: which one was meant."""
+"""Options as arguments of a function: in its signature and docstring, and which one a wrong name meant."""
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import functools
 import inspect
+import re
+import textwrap
 from collections.abc import Callable, Collection, Sequence
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
-from rlacd.options.fields import stated_in
+from rlacd.options.fields import About, stated_in
 
 Given = ParamSpec("Given")
 Returned = TypeVar("Returned")
@@ -43,5 +46,32 @@ def suggesting(
             return function(*args, **given)
 
         return call
+
+    return completed
+
+
+def taking(options: type[Any], *others: type[Any]) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:
+    """State the options of dataclasses in the signature of a function that ends with ``**options``.
+
+    Its docstring explains those of the first, before what it says of ``**options``. Defaults of the others are its own.
+    """
+    fields, more = dataclasses.fields(options), [field for one in others for field in dataclasses.fields(one)]
+    known: dict[str, About] = {field.name: field.metadata["option"] for field in fields}
+    names = {flag: name for name, each in known.items() for flag in each.flags[0].split("/")}
+
+    def explained(name: str, kind: str) -> str:
+        said = re.sub(r"--[a-z-]+", lambda flag: f"`{names.get(flag[0], flag[0][2:])}`", known[name].python_help)
+        said += f" Default: {known[name].usual}." if known[name].usual else ""
+        return f"    {name} : {kind}\n{textwrap.indent(textwrap.fill(said, 112), ' ' * 8)}\n"
+
+    def completed(function: Callable[Given, Returned]) -> Callable[Given, Returned]:
+        signature, keyword = inspect.signature(function), inspect.Parameter.KEYWORD_ONLY
+        own = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
+        own += [inspect.Parameter(f.name, keyword, default=f.default, annotation=f.type) for f in fields]
+        own += [inspect.Parameter(f.name, keyword, default=None, annotation=f.type) for f in more]
+        function.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
+        said = "".join(explained(field.name, str(field.type)) for field in fields)
+        function.__doc__ = (function.__doc__ or "").replace("    **options\n", f"{said}    **options\n")
+        return function
 
     return completed

@@ -66,25 +66,6 @@ _PLANES = custom("a list of (normal, offset) pairs, every normal a finite vector
 class NavigableSpace:
     """The criterion "no hull intrudes into the space that a ball can reach".
 
-    Attributes
-    ----------
-    radius
-        Radius of the ball, as a share of the longest side of the mesh.
-    tolerance
-        Space nearer to the surface than this may be filled; also a share of the longest side. With --criterion volume:
-        the share of volume that a hull may add, such as 1%.
-    reachable_only
-        Count only what a ball can reach from outside, or every room.
-    seeds
-        A point from which balls start, instead of from outside, in the mesh's own unit; may be repeated.
-    closed_planes
-        A plane that balls do not cross, such as the ground 0,0,1,0: they stay on the side to which the normal X,Y,Z
-        points; D is the plane's distance from the origin; may be repeated.
-    radius_abs
-        The same as --radius, as a length in the mesh's own unit.
-    tolerance_abs
-        The same as --tolerance, as a length in the mesh's own unit.
-
     Raises
     ------
     OptionError
@@ -92,16 +73,25 @@ class NavigableSpace:
     """
 
     radius: float | None = option(None, kind=_SHARE, metavar="NUMBER", usual=f"{USUAL['radius']:g}")
+    """Radius of the ball, as a share of the longest side of the mesh."""
     tolerance: float | None = option(None, kind=_SHARE, metavar="NUMBER", usual=f"{USUAL['tolerance']:g}")
+    """Space nearer to the surface than this may be filled; also a share of the longest side. With --criterion volume:
+    the share of volume that a hull may add, such as 1%."""
     reachable_only: bool = option(True, keyword=True, flags=("--reachable-only/--everywhere",), usual="reachable-only")
+    """Count only what a ball can reach from outside, or every room."""
     seeds: tuple[Point, ...] | None = option(
         None, kind=_SEEDS, keyword=True, flags=("--seed-point",), metavar="X,Y,Z", repeated=True, usual="outside"
     )
+    """A point from which balls start, instead of from outside, in the mesh's own unit; may be repeated."""
     closed_planes: tuple[tuple[Point, float], ...] = option(
         (), kind=_PLANES, keyword=True, flags=("--closed-plane",), metavar="X,Y,Z,D", repeated=True, usual="–"
     )
+    """A plane that balls do not cross, such as the ground 0,0,1,0: they stay on the side to which the normal X,Y,Z
+    points; D is the plane's distance from the origin; may be repeated."""
     radius_abs: float | None = option(None, kind=LENGTH, keyword=True)
+    """The same as --radius, as a length in the mesh's own unit."""
     tolerance_abs: float | None = option(None, kind=LENGTH, keyword=True)
+    """The same as --tolerance, as a length in the mesh's own unit."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -35,39 +35,6 @@ _AXIS = one_of(Axis, rule="x, y or z")
 class OutputOptions:
     """Where the hulls go and what is written beside them.
 
-    Attributes
-    ----------
-    output
-        Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid per hull; .xml (MJCF),
-        .urdf, .sdf, .usd, .usda or .usdc for a body with mass, visual mesh and hulls; an existing folder, or a name
-        ending in /, for one file per hull. An existing file is replaced. - writes to stdout what --format says.
-    file_format
-        The format of the files in a folder: obj, glb, ply or stl; or unreal or godot, for a .glb with the mesh and
-        hulls named for that engine.
-    density
-        Mass per cubic unit, for formats that hold masses.
-    mass
-        Mass of the whole body, instead of --density.
-    keep_input
-        In a .glb, the input's own scene with the hulls added under the nodes they belong to; always so with --format
-        unreal and godot. Of a USD stage with colliding meshes, one file that holds all of it, not a layer over it.
-    scene
-        In .xml (MJCF), add a floor and a light and place the body just above the floor, ready for MuJoCo's viewer.
-    one_mesh
-        In a .urdf, one collision with all hulls as objects of its mesh, for Bullet.
-    package_dirs
-        Where a robot's package://NAME/ is; a FOLDER alone may be read and holds packages. May be repeated.
-    report
-        Write all measurements: .json, or .html for a page; - writes JSON to stdout, and nothing else there.
-    picture
-        Draw the input beside its hulls, together and pulled apart. Needs the extra rlacd[view].
-    balls
-        Write the balls that no hull touches: .csv (x, y, z, radius) or .glb. Needs --criterion navigable.
-    up
-        The axis of the mesh that points up, for the picture and for MJCF, SDF and USD.
-    quiet
-        Print only warnings and errors.
-
     Raises
     ------
     OptionError
@@ -81,12 +48,23 @@ class OutputOptions:
         usual="IN_hulls beside IN, .glb or what --preset says",
         python=".save(path)",
     )
+    """Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid per hull; .xml (MJCF),
+    .urdf, .sdf, .usd, .usda or .usdc for a body with mass, visual mesh and hulls; an existing folder, or a name ending
+    in /, for one file per hull. An existing file is replaced. - writes to stdout what --format says."""
     file_format: str | None = option(None, kind=_FORMAT, flags=("--format",), metavar="EXT", usual="obj")
+    """The format of the files in a folder: obj, glb, ply or stl; or unreal or godot, for a .glb with the mesh and hulls
+    named for that engine."""
     density: float | None = option(None, kind=_DENSITY, usual=f"{DENSITY:g}")
+    """Mass per cubic unit, for formats that hold masses."""
     mass: float | None = option(None, kind=_MASS)
+    """Mass of the whole body, instead of --density."""
     keep_input: bool | None = option(None, kind=flag())
+    """In a .glb, the input's own scene with the hulls added under the nodes they belong to; always so with --format
+    unreal and godot. Of a USD stage with colliding meshes, one file that holds all of it, not a layer over it."""
     scene: bool | None = option(None, kind=flag())
+    """In .xml (MJCF), add a floor and a light and place the body just above the floor, ready for MuJoCo's viewer."""
     one_mesh: bool | None = option(None, kind=flag())
+    """In a .urdf, one collision with all hulls as objects of its mesh, for Bullet."""
     package_dirs: list[str] | None = option(
         None,
         kind=_PACKAGES,
@@ -95,13 +73,19 @@ class OutputOptions:
         repeated=True,
         python="rewrite_robot(package_dirs=)",
     )
+    """Where a robot's package://NAME/ is; a FOLDER alone may be read and holds packages. May be repeated."""
     report: str | None = option(None, kind=path_like(), metavar="FILE", python=".report, .save_report(path)")
+    """Write all measurements: .json, or .html for a page; - writes JSON to stdout, and nothing else there."""
     picture: str | None = option(None, kind=path_like(), metavar="FILE.png", python=".picture(path)")
+    """Draw the input beside its hulls, together and pulled apart. Needs the extra rlacd[view]."""
     balls: str | None = option(None, kind=path_like(), metavar="FILE", python=".save_balls(path)")
+    """Write the balls that no hull touches: .csv (x, y, z, radius) or .glb. Needs --criterion navigable."""
     up: Axis | None = option(
         None, kind=_AXIS, metavar="AXIS", usual="what the format or file says (y for glb and gltf), else z", python="up"
     )
+    """The axis of the mesh that points up, for the picture and for MJCF, SDF and USD."""
     quiet: bool | None = option(None, kind=flag(), flags=("--quiet", "-q"), python="")
+    """Print only warnings and errors."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -40,28 +40,19 @@ class HullLimits(NamedTuple):
 
 @dataclass(frozen=True)
 class Preset:
-    """One engine.
-
-    Attributes
-    ----------
-    engine
-        The engine's name in sentences.
-    max_vertices, max_faces
-        Limits on each hull; None is no limit.
-    ending
-        Ending of its files.
-    file_format
-        The format, where the ending does not tell it.
-    slivers
-        Whether it takes hulls that are thinner than 1/100 of their largest extent.
-    """
+    """One engine."""
 
     engine: str
+    """The engine's name in sentences."""
     max_vertices: int | None
     max_faces: int | None
+    """Limits on each hull; None is no limit."""
     ending: str
+    """Ending of its files."""
     file_format: str | None = None
+    """The format, where the ending does not tell it."""
     slivers: bool = True
+    """Whether it takes hulls that are thinner than 1/100 of their largest extent."""
 
 
 PRESETS: dict[str, Preset] = {

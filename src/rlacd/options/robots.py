@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -39,22 +40,6 @@ _LINKS = custom("positive lengths by regular expressions of link names, such as 
 class RobotOptions:
     """How the links of a robot are decomposed.
 
-    Attributes
-    ----------
-    per
-        What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
-    links
-        Another distance for the links whose whole name matches a regular expression, such as 'finger.*=1mm', or in the
-        robot's own unit. May be repeated; the last that matches counts.
-    samples
-        Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
-        extra rlacd[clear].
-    exclude
-        Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD: adjacent,
-        always or never in contact at these positions.
-    srdf
-        Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.
-
     Raises
     ------
     OptionError
@@ -62,12 +47,34 @@ class RobotOptions:
     """
 
     per: Per = option("link", one_of=Per)
+    """What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
+
+    Links that fixed joints connect stay apart; so do MJCF geoms with a name, and meshes that belong to no body.
+    """
     links: Mapping[str, float] | None = option(
         None, kind=_LINKS, flags=("--link",), metavar="REGEX=LENGTH", repeated=True
     )
+    """Another distance for the links whose whole name matches a regular expression; the last that matches counts.
+
+    On the command line: give 'finger.*=1mm', or a length in the robot's own unit; may be repeated.
+
+    It stands for `threshold_abs`: ``{"finger.*": 0.001}``.
+    """
     samples: int = option(500, least=0, most=100_000)
+    """Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
+    extra rlacd[clear].
+
+    Where hulls of such links would touch, they are cut finer, or a warning names both. USD stages are looked at as they
+    stand.
+    """
     exclude: str | Sequence[PairKind] = option((), kind=_KINDS, metavar="adjacent,always,…", usual="none")
-    srdf: str | None = option(None, kind=path_like(), metavar="FILE")
+    """Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD: adjacent, always
+    or never in contact at these positions.
+
+    Of bodies of a stage, only those that a joint connects are known.
+    """
+    srdf: str | os.PathLike[str] | None = option(None, kind=path_like(), metavar="FILE")
+    """Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -28,82 +28,54 @@ Blobs: TypeAlias = Mapping[str, bytes]
 
 @dataclass(frozen=True)
 class ProcessLimits:
-    """Limits of one request.
-
-    Attributes
-    ----------
-    seconds : float
-        Wall time.
-    memory : int
-        Bytes of main memory that the process may hold; 0 for no limit.
-    """
+    """Limits of one request."""
 
     seconds: float = 600.0
+    """Wall time."""
     memory: int = 4 * 2**30
+    """Bytes of main memory that the process may hold; 0 for no limit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """Bytes that many requests need: each process receives them once.
-
-    Attributes
-    ----------
-    blobs
-        The bytes by name.
-    key
-        Identifies the content.
-    """
+    """Bytes that many requests need: each process receives them once."""
 
     blobs: Blobs
+    """The bytes by name."""
     key: str = field(default_factory=lambda: uuid.uuid4().hex)
+    """Identifies the content."""
 
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """A job for a pool. It must be a pure function of its fields, since it may run twice.
-
-    Attributes
-    ----------
-    server
-        ``module:name`` of a factory that makes the `Server`.
-    values, blobs, shared
-        Inputs of the server; a process keeps shared data as long as requests name it.
-    limits
-        Limits; the process is ended when it exceeds them.
-    threads
-        Number of processors it uses.
-    fresh
-        Whether it needs a new process.
-    tries
-        How often it is tried, in a new process each, if its process dies before its time is up: that may be the fault
-        of an earlier request or of other processes.
-    """
+    """A job for a pool. It must be a pure function of its fields, since it may run twice."""
 
     server: str
+    """``module:name`` of a factory that makes the `Server`."""
     values: Values
     blobs: Blobs = field(default_factory=dict)
     shared: Mapping[str, Shared] = field(default_factory=dict)
+    """Inputs of the server; a process keeps shared data as long as requests name it."""
     limits: ProcessLimits = field(default_factory=ProcessLimits)
+    """Limits; the process is ended when it exceeds them."""
     threads: int = 1
+    """Number of processors it uses."""
     fresh: bool = False
+    """Whether it needs a new process."""
     tries: int = 1
+    """How often it is tried, in a new process each, if its process dies before its time is up: that may be the fault of
+    an earlier request or of other processes."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of a server.
-
-    Attributes
-    ----------
-    values, blobs
-        Results of the server.
-    worker
-        Process and machine.
-    """
+    """The answer of a server."""
 
     values: Values
     blobs: dict[str, bytes]
+    """Results of the server."""
     worker: str
+    """Process and machine."""
 
 
 Server: TypeAlias = Callable[[Values, Blobs, Mapping[str, Shared]], tuple[Values, dict[str, bytes]]]

@@ -38,11 +38,12 @@ from rlacd.repair.wraps import (
     wrap_all,
     wrap_sheets,
 )
+from rlacd.report import BodyRepair
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.solid import BodyRepair, Solid
+from rlacd.solid.solid import Solid
 from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, marked
 
 CELLS_ACROSS = 1.5

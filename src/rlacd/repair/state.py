@@ -17,10 +17,11 @@ from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, sha
 from rlacd.repair.soup import Soup, no_faces
 from rlacd.repair.union import Cavities, emptied, hollowed, size_of, to_arrays, unite, unite_and_fill, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
+from rlacd.report import BodyRepair
 from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.mass import mass_of
-from rlacd.solid.solid import BodyRepair, Hole, Shape, Solid
+from rlacd.solid.solid import Hole, Shape, Solid
 from rlacd.solid.topology import Edges, bodies_of, marked
 
 OUTCOMES = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import drop_slivers, grow_cover
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import Greedy
+from rlacd.report import SearchSummary
 from rlacd.run import Run
 from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
 from rlacd.solid.component import Part
@@ -44,50 +44,6 @@ HOPELESS = 5
 
 IN_VAIN = 8
 """A search ends after so many starts in a row without a gain."""
-
-
-@dataclass
-class SearchSummary:
-    """Summary of a search.
-
-    Attributes
-    ----------
-    level : str
-    seconds : float
-        Wall time of the search.
-    last_gain : float
-        Seconds until it last saved a part; 0 if it never did.
-    first_pass, parts : int
-        Number of parts before the search and at the end.
-    starts : int
-        Passes over the whole solid that it searched from.
-    steps : int
-        Trials, without the first for each part of a start.
-    accepted : int
-        Trials that were accepted.
-    work : int
-        Units of work done (see `rlacd.run.work`).
-    allowed : int or None
-        Limit on the work, if the level has one.
-    at_least : int
-        No decomposition to this tolerance has fewer parts.
-    """
-
-    level: str
-    seconds: float
-    last_gain: float
-    first_pass: int
-    parts: int
-    starts: int
-    steps: int
-    accepted: int
-    work: int
-    allowed: int | None
-    at_least: int
-
-    def as_plain(self) -> dict[str, Any]:
-        """All fields as plain values."""
-        return asdict(self)
 
 
 def search(

@@ -2,50 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rlacd import _native
+from rlacd.report import Mass
 from rlacd.solid.arrays import FloatArray, IntArray, dots
 from rlacd.solid.frame import Frame
 
 _GREATEST = np.finfo(np.float64).max
-
-
-@dataclass(frozen=True)
-class Mass:
-    """A body's mass, in the input's unit of length.
-
-    Attributes
-    ----------
-    volume_abs
-        Its mass at density one.
-    centre_abs
-        ``[3]``, the centre of mass.
-    inertia_abs
-        ``[3, 3]`` at density one, about the centre, along the input's axes.
-    """
-
-    volume_abs: float
-    centre_abs: FloatArray
-    inertia_abs: FloatArray
-
-    def scaled(self, density: float) -> Mass:
-        """Return the same body at another density."""
-        return Mass(self.volume_abs * density, self.centre_abs, self.inertia_abs * density)
-
-    def as_plain(self) -> dict[str, Any]:
-        """Plain values that ``json`` can write."""
-        centre, inertia = self.centre_abs.tolist(), self.inertia_abs.tolist()
-        return {"volume_abs": self.volume_abs, "centre_abs": centre, "inertia_abs": inertia}
-
-    @classmethod
-    def of_plain(cls, plain: Mapping[str, Any]) -> Mass:
-        """The mass that `as_plain` describes."""
-        return cls(float(plain["volume_abs"]), np.array(plain["centre_abs"]), np.array(plain["inertia_abs"]))
 
 
 def mass_of(vertices: FloatArray, faces: IntArray, frame: Frame) -> Mass:

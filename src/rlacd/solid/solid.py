@@ -11,6 +11,7 @@ from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from rlacd._native import Surface
+from rlacd.report import BodyRepair
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import no_points
@@ -20,37 +21,13 @@ Shape: TypeAlias = Manifold | tuple[FloatArray, NDArray[np.int32]]
 
 
 @dataclass(frozen=True)
-class BodyRepair:
-    """What was done to one body, a set of faces connected by edges.
-
-    Attributes
-    ----------
-    body
-        Number of the body, by its first face in the input.
-    step
-        The step that changed it most, one of `rlacd.repair.state.OUTCOMES`.
-    faces_in, faces_out
-        Triangles before and after; a body joined to others counts its share before the union.
-    deviation
-        Greatest distance, in frame units, from the repaired surface to the input's, or from a point of the input that
-        the repaired solid misses to that solid.
-    """
-
-    body: int
-    step: str
-    faces_in: int
-    faces_out: int
-    deviation: float
-
-
-@dataclass(frozen=True)
 class Hole:
     """A hole of a body that has an inside: what was there is a guess.
 
     Attributes
     ----------
     body
-        Number of the body, as in `BodyRepair`.
+        Number of the body, as in `rlacd.report.BodyRepair`.
     at
         The mean of the corners of its rim, in the frame.
     width

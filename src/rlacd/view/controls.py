@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,11 @@ import numpy as np
 from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write import file_stem
+from rlacd.io.write.target import MODEL_OF
 from rlacd.options import CRITERIA, FAST, Options, with_criterion
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
+from rlacd.options.presets import PRESETS
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.topology import used_points
 
@@ -61,33 +64,22 @@ def passes_of(controls: dict[str, Any]) -> list[dict[str, Any]]:
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """An input shown in the viewer.
-
-    Attributes
-    ----------
-    path : pathlib.Path
-        Read again for every decomposition.
-    name : str
-        Shown on the page.
-    up : {"x", "y", "z"}
-        The axis that points up.
-    unit : str
-        The unit of length if the format defines one; else empty.
-    mesh : InputMesh
-        The mesh as first read.
-    up_is_guess : bool
-        Whether the file does not say which axis points up.
-    is_robot : bool
-        Whether it is a robot, which becomes a robot.
-    """
+    """An input shown in the viewer."""
 
     path: Path
+    """Read again for every decomposition."""
     name: str
+    """Shown on the page."""
     up: str
+    """The axis that points up."""
     unit: str
+    """The unit of length if the format defines one; else empty."""
     mesh: InputMesh
+    """The mesh as first read."""
     up_is_guess: bool = False
+    """Whether the file does not say which axis points up."""
     is_robot: bool = False
+    """Whether it is a robot, which becomes a robot."""
 
 
 def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject:
@@ -137,3 +129,19 @@ def _word(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return ",".join(map(str, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def file_name(name: str) -> str:
+    """Clean the name of an uploaded file: no folders, and no characters that a file system may refuse."""
+    last = re.split(r"[/\\]", name)[-1]
+    plain = re.sub(r'[\x00-\x1f\x7f<>:"|?*]', "_", last).strip(". ")[-120:]
+    return plain.encode(errors="replace").decode() or "mesh"
+
+
+def preset_words(name: str) -> dict[str, Any]:
+    """Describe a preset for the page: its engine, limits and format."""
+    preset = PRESETS[name]
+    ending = preset.ending.lstrip(".")
+    stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
+    limits = " and ".join(f"{limit} {what}" for what, limit in stated.items() if limit)
+    return {"engine": preset.engine, "format": preset.file_format or MODEL_OF.get(ending, ending), "limits": limits}

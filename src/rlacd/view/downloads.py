@@ -26,37 +26,18 @@ FOLDERS = ("obj", "stl")
 
 @dataclass(frozen=True)
 class Offer:
-    """An entry of the download menu.
-
-    Attributes
-    ----------
-    name
-        The name that `download` takes.
-    label
-        Its text in the menu.
-    hint
-        A sentence about its content.
-    group
-        The heading it is listed under.
-    missing
-        Why it is unavailable here; None if it is available.
-    """
+    """An entry of the download menu."""
 
     name: str
+    """The name that `download` takes."""
     label: str
+    """Its text in the menu."""
     hint: str
+    """A sentence about its content."""
     group: str
+    """The heading it is listed under."""
     missing: str | None = None
-
-
-_MODEL_NAMES = {
-    "mjcf": ("MJCF", "MuJoCo"),
-    "urdf": ("URDF", "ROS, Bullet and most robot simulators"),
-    "sdf": ("SDF", "Gazebo"),
-    "usd": ("USD", "Isaac Sim and PhysX"),
-    "unreal": ("Unreal", "Unreal Engine"),
-    "godot": ("Godot", "Godot"),
-}
+    """Why it is unavailable here; None if it is available."""
 
 
 def offered() -> list[Offer]:
@@ -69,14 +50,14 @@ def offered() -> list[Offer]:
         ),
         *(
             Offer(
-                model,
-                _MODEL_NAMES[model][0],
-                f"The mesh with its hulls as collision shapes, for {_MODEL_NAMES[model][1]}"
-                f" (.{MODELS[model][0]}{' and its meshes, zipped' if model in WITH_MESHES else ''}).",
+                name,
+                model.label,
+                f"The mesh with its hulls as collision shapes, for {model.reader}"
+                f" (.{model.endings[0]}{' and its meshes, zipped' if model.with_meshes else ''}).",
                 "Models",
-                extra_needed("USD", "usd") if model == "usd" and find_spec("pxr") is None else None,
+                extra_needed("USD", "usd") if name == "usd" and find_spec("pxr") is None else None,
             )
-            for model in MODELS
+            for name, model in MODELS.items()
         ),
         Offer("report.html", "Report", "This view as one HTML file that opens anywhere, offline.", "More"),
         Offer("report.json", "Numbers", "Everything that was measured, as JSON.", "More"),
@@ -121,7 +102,7 @@ def download(decomposition: Result, wanted: str, *, up: str = "z") -> tuple[str,
                 raise OptionError("there are no balls to write; decompose with a NavigableSpace.")
             save_balls(decomposition.balls, folder / f"{stem}_balls.csv")
         elif wanted in MODELS:
-            place = folder / f"{stem if wanted in WITH_MESHES else f'{stem}_{wanted}'}.{MODELS[wanted][0]}"
+            place = folder / f"{stem if wanted in WITH_MESHES else f'{stem}_{wanted}'}.{MODELS[wanted].endings[0]}"
             save(decomposition, place, file_format=wanted, up=cast(Axis, up))
         elif wanted.endswith(".zip"):
             save(decomposition, folder, file_format=wanted.removesuffix(".zip"))

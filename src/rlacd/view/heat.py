@@ -28,19 +28,14 @@ ON_HULL = 1e-5
 
 
 class HeatMesh(NamedTuple):
-    """A hull's surface, subdivided, with its distances to the input's surface.
-
-    Attributes
-    ----------
-    vertices : float64 [N, 3]
-    faces : int32 [F, 3]
-    distance : float64 [N]
-        `INNER` on inner walls. All in the frame of `frame_of`.
-    """
+    """A hull's surface, subdivided, with its distances to the input's surface."""
 
     vertices: FloatArray
+    """``[N, 3]``."""
     faces: IntArray
+    """``[F, 3]``."""
     distance: FloatArray
+    """``[N]``, `INNER` on inner walls. All in the frame of `frame_of`."""
 
 
 def heat_map(decomposition: Result, *, triangles: int = 60_000, threads: int | None = None) -> list[HeatMesh]:
@@ -83,8 +78,7 @@ def frame_of(decomposition: Result) -> Frame:
     corners = [np.asarray(hull.bounds, dtype=np.float64) for hull in decomposition]
     if len(decomposition.source.faces):
         corners.append(np.asarray(decomposition.source.bounds, dtype=np.float64))
-    around = Frame.of(np.concatenate(corners))
-    return Frame(around.center, float(decomposition.report.get("scale", around.scale)))
+    return Frame(Frame.of(np.concatenate(corners)).center, decomposition.report.scale)
 
 
 def _divided(vertices: FloatArray, faces: IntArray, edge: float) -> tuple[FloatArray, IntArray]:

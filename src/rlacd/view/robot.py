@@ -32,36 +32,24 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotResult(Result):
-    """A robot at rest as hulls.
-
-    Attributes
-    ----------
-    links : sequence of str
-    meshes : sequence of trimesh.Trimesh
-        Theirs, at rest.
-    link_of : sequence of int
-        The link of each hull.
-    joints : sequence of Joint
-        First those that can be set, `free` of them.
-    carried : sequence of int
-        For each link, the joint that carries it; -1 if none does.
-    places : sequence of Place
-        The first is at rest; empty if links were not looked at.
-    samples : int
-        Joint positions that were looked at, of which these are the worst for each pair of links.
-    touching : callable, optional
-        Takes positions of the free joints and returns the links that touch there.
-    """
+    """A robot at rest as hulls."""
 
     links: Sequence[str] = ()
     meshes: Sequence[trimesh.Trimesh] = ()
+    """Theirs, at rest."""
     link_of: Sequence[int] = ()
+    """The link of each hull."""
     joints: Sequence[Joint] = ()
+    """First those that can be set, `free` of them."""
     free: int = 0
     carried: Sequence[int] = ()
+    """For each link, the joint that carries it; -1 if none does."""
     places: Sequence[Place] = ()
+    """The first is at rest; empty if links were not looked at."""
     samples: int = 0
+    """Joint positions that were looked at, of which these are the worst for each pair of links."""
     touching: Callable[[list[float]], list[Contact]] | None = None
+    """Takes positions of the free joints and returns the links that touch there."""
 
 
 def robot_scene(robot: RobotResult, frame: Frame) -> dict[str, Any]:

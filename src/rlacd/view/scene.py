@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rlacd.fit import Fit
 from rlacd.result import Result
 from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
@@ -44,7 +43,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     """
     frame = frame_of(decomposition)
     source, report = decomposition.source, decomposition.report
-    fit = Fit.of(report)
+    fit = report.fit
     errors: list[float | None] = list((fit and fit.per_part) or [])
     errors = errors if len(errors) == len(decomposition) else [None] * len(decomposition)
     rgb, ranks = color_hulls(decomposition.hulls)

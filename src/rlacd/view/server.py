@@ -12,9 +12,9 @@
 ====================================  ===========================================================================
 
 It listens on the loopback address alone. Pages of other sites are kept out: a request's Host header must name this
-server, which defeats DNS rebinding, and the request must not come from a page of another origin. Resources are bounded:
-connections and their time in `rlacd.view.connections`, `UPLOADS` of at most `LARGEST_MESH` bytes at a time, one
-decomposition with its scene and heat map, and `HEAVY` costly answers at a time.
+server, which defeats DNS rebinding, and the request must not come from a page of another origin. Memory is bounded:
+`UPLOADS` of at most `LARGEST_MESH` bytes at a time, one decomposition with its scene and heat map, and `HEAVY` costly
+answers at a time.
 """
 
 from __future__ import annotations
@@ -31,18 +31,17 @@ import urllib.parse
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 from rlacd._version import __version__
 from rlacd.errors import OptionError, RlacdError, sentence_of
-from rlacd.io.read.load import FORMATS as READ
-from rlacd.io.write.target import MODEL_OF
+from rlacd.io.read import READERS
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.connections import ANSWER_SECONDS, FULL, REQUEST_SECONDS, BoundedHandler, BoundedServer
-from rlacd.view.controls import Subject, as_command, passes_of, read_controls
+from rlacd.view.controls import Subject, as_command, file_name, passes_of, preset_words, read_controls
 from rlacd.view.downloads import download, offered
 from rlacd.view.heat import heat_map
 from rlacd.view.page import live_page, module
@@ -73,26 +72,24 @@ Read = Callable[[Path, str | None], Subject]
 """Reads a file to be shown, with the axis that points up if that is given."""
 
 
-class ViewServer(BoundedServer):
+class ViewServer(ThreadingHTTPServer):
     """Serves one session: a subject, with the first values of the page's controls, and what reads another.
 
-    It listens on `port`; by default on the usual one, or any that is free.
-
-    Raises
-    ------
-    OptionError
-        The port is in use, forbidden, or out of range.
+    It listens on `port` (OptionError if it cannot); by default on the usual one, or any that is free.
     """
+
+    daemon_threads = True
 
     def __init__(self, session: Session, subject: Subject, read: Read, *, port: int | None, options: Any) -> None:
         self.session, self.subject, self.read = session, subject, read
+        self.answers, self._changed = 0, threading.Condition()
         self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
         self.uploads = threading.BoundedSemaphore(UPLOADS)
         self.controls = options
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making, self._opening = threading.Lock(), threading.Lock()
         self.uploaded: tempfile.TemporaryDirectory[str] | None = None
-        config: dict[str, Any] = {"options": options, "formats": list(READ), "version": __version__}
+        config: dict[str, Any] = {"options": options, "formats": list(READERS), "version": __version__}
         config["downloads"] = [asdict(offer) for offer in offered()]
         config["presets"] = [{"name": name, **preset_words(name)} for name in PRESETS]
         page, policy = live_page(subject.name, config)
@@ -109,13 +106,35 @@ class ViewServer(BoundedServer):
     @property
     def at_work(self) -> bool:
         """Whether work is still running, even after the viewer is closed: a kernel cannot be interrupted."""
-        return not self.session.ended or self.connections > 0
+        return not self.session.ended or self.answers > 0
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""
         with contextlib.suppress(KeyboardInterrupt):
             while self._thread.is_alive():  # a wait without timeout would not notice Ctrl-C on Windows
                 self._thread.join(0.5)
+
+    @contextlib.contextmanager
+    def answering(self) -> Iterator[None]:
+        """Count an answer that is being made."""
+        with self._changed:
+            self.answers += 1
+        try:
+            yield
+        finally:
+            with self._changed:
+                self.answers -= 1
+                self._changed.notify_all()
+
+    def end(self, seconds: float) -> bool:
+        """Accept nothing more; returns whether all answers have been made within `seconds`."""
+        self.shutdown()
+        self.server_close()
+        with self._changed:
+            return self._changed.wait_for(lambda: not self.answers, timeout=max(0.0, seconds))
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Ignore errors: closing a page breaks its connections."""
 
     def decompose(self, controls: dict[str, Any], *, other_input: bool = False) -> None:
         """Decompose the subject next: first a draft, then with the requested options."""
@@ -124,13 +143,7 @@ class ViewServer(BoundedServer):
         self.session.decompose(*passes, other_input=other_input)
 
     def open_mesh(self, name: str, content: bytes) -> None:
-        """Replace the subject by an uploaded file, decomposed with the options accepted last.
-
-        Raises
-        ------
-        MeshError
-            It cannot be read or holds nothing usable; the subject stays.
-        """
+        """Replace the subject by an uploaded file, decomposed with the options accepted last, unless it is unusable."""
         with self._opening:
             folder = tempfile.TemporaryDirectory(prefix="rlacd-view-", ignore_cleanup_errors=True)
             try:
@@ -188,8 +201,21 @@ class ViewServer(BoundedServer):
             raise OptionError(f"port {port} {why}; choose another with --port, or leave it out.") from error
 
 
-class _Handler(BoundedHandler):
+class _Handler(BaseHTTPRequestHandler):
     server: ViewServer
+    protocol_version = "HTTP/1.1"
+    error_content_type, error_message_format = "application/json", '{"error": "%(explain)s."}'
+    timeout = 20.0  # seconds for a single send or receive
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        self.request_version = self.protocol_version  # a request that is no HTTP gets a head too
+        super().send_error(code, message, explain)
+
+    def version_string(self) -> str:
+        return "rlacd"
+
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
 
     def do_GET(self) -> None:
         with self._answered():
@@ -199,8 +225,7 @@ class _Handler(BoundedHandler):
             if place.path == "/":
                 self._send(self.server.page, "text/html", {"Content-Security-Policy": self.server.policy})
             elif place.path == "/events":
-                with _one_of(self.server.streams):
-                    self._send_events()
+                self._send_events()
             elif place.path == "/scene":
                 with self.server.heavy:
                     content = self.server.scene()
@@ -242,17 +267,21 @@ class _Handler(BoundedHandler):
     def _open(self, query: dict[str, list[str]]) -> None:
         if self.headers.get_content_type() != "application/octet-stream":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
-        with _one_of(self.server.uploads):
-            content = self._read(LARGEST_MESH, ANSWER_SECONDS)
+        if not self.server.uploads.acquire(blocking=False):
+            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, "too many meshes are being opened; try again.")
+        try:
+            content = self._read(LARGEST_MESH)
+        finally:
+            self.server.uploads.release()
         with self.server.heavy:
             self.server.open_mesh(query.get("name", [""])[0], content)
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
         """Turn errors into answers that the page shows."""
-        self.server.expect(self.connection, math.inf)
         try:
-            yield
+            with self.server.answering():
+                yield
         except (TimeoutError, ConnectionError):
             self.close_connection = True
         except _Refused as error:
@@ -278,17 +307,21 @@ class _Handler(BoundedHandler):
     def _body(self) -> dict[str, Any]:
         if self.headers.get_content_type() != "application/json":  # forms of other sites cannot send this type
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "this viewer takes JSON only.")
-        return _object(self._read(LONGEST_REQUEST, REQUEST_SECONDS))
+        try:
+            given = json.loads(self._read(LONGEST_REQUEST))
+        except (ValueError, RecursionError):
+            given = None
+        if not isinstance(given, dict):
+            raise OptionError("the request is not a JSON object; send {} at least.")
+        return given
 
-    def _read(self, longest: int, seconds: float) -> bytes:
+    def _read(self, longest: int) -> bytes:
         length = self.headers.get("Content-Length", "0")
         if "Transfer-Encoding" in self.headers or not (length.isascii() and length.isdigit()):
             raise _Refused(HTTPStatus.LENGTH_REQUIRED, "the request does not say how long it is (Content-Length).")
         if len(length) > len(str(longest)) or int(length) > longest:
             raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is longer than {longest:,} bytes.")
-        self.server.expect(self.connection, seconds)
         content = self.rfile.read(int(length))
-        self.server.expect(self.connection, math.inf)
         if len(content) != int(length):
             raise ConnectionError("the request ended early")
         return content
@@ -338,7 +371,6 @@ class _Handler(BoundedHandler):
     def _send(
         self, content: bytes, kind: str, headers: dict[str, str] | None = None, status: HTTPStatus = HTTPStatus.OK
     ) -> None:
-        self.server.expect(self.connection, ANSWER_SECONDS)
         self._send_head(status, kind, {"Content-Length": str(len(content)), **(headers or {})})
         self.wfile.write(content)
 
@@ -361,45 +393,8 @@ class _Refused(Exception):
         self.status = status
 
 
-@contextlib.contextmanager
-def _one_of(places: threading.BoundedSemaphore) -> Iterator[None]:
-    """Hold one of a limited number of places; refuse the request if none is free."""
-    if not places.acquire(blocking=False):
-        raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, FULL)
-    try:
-        yield
-    finally:
-        places.release()
-
-
 def _split(address: str) -> urllib.parse.SplitResult:
     try:
         return urllib.parse.urlsplit(address)
     except ValueError as error:  # a bracket without its partner
         raise _Refused(HTTPStatus.BAD_REQUEST, f"{address!r} is not an address.") from error
-
-
-def _object(text: str | bytes) -> dict[str, Any]:
-    try:
-        given = json.loads(text)
-    except (ValueError, RecursionError):
-        given = None
-    if not isinstance(given, dict):
-        raise OptionError("the request is not a JSON object; send {} at least.")
-    return given
-
-
-def file_name(name: str) -> str:
-    """Clean the name of an uploaded file: no folders, and no characters that a file system may refuse."""
-    last = re.split(r"[/\\]", name)[-1]
-    plain = re.sub(r'[\x00-\x1f\x7f<>:"|?*]', "_", last).strip(". ")[-120:]
-    return plain.encode(errors="replace").decode() or "mesh"
-
-
-def preset_words(name: str) -> dict[str, Any]:
-    """Describe a preset for the page: its engine, limits and format."""
-    preset = PRESETS[name]
-    ending = preset.ending.lstrip(".")
-    stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
-    limits = " and ".join(f"{limit} {what}" for what, limit in stated.items() if limit)
-    return {"engine": preset.engine, "format": preset.file_format or MODEL_OF.get(ending, ending), "limits": limits}

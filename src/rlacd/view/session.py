@@ -21,33 +21,23 @@ Decompose = Callable[..., Result]
 
 @dataclass(frozen=True)
 class SessionState:
-    """State of a session.
-
-    Attributes
-    ----------
-    state : "idle", "working" or "closed"
-    run : int or None
-        Number of the last finished decomposition; None before the first.
-    version : int
-        Grows whenever there is something new to draw: another input, a draft, a decomposition.
-    draft : bool
-        Whether the current hulls come from a quick first pass and may still be replaced.
-    stage, done, total, parts, seconds
-        Progress of the current work; see `rlacd.run.Progress`.
-    error : str or None
-        Why the last requested work failed.
-    """
+    """State of a session."""
 
     state: str = "idle"
     run: int | None = None
+    """Number of the last finished decomposition; None before the first."""
     version: int = 0
+    """Grows whenever there is something new to draw: another input, a draft, a decomposition."""
     draft: bool = False
+    """Whether the current hulls come from a quick first pass and may still be replaced."""
     stage: str = "load"
     done: int = 0
     total: int | None = None
     parts: int = 0
     seconds: float = 0.0
+    """Progress of the current work; see `rlacd.run.Progress`."""
     error: str | None = None
+    """Why the last requested work failed."""
 
 
 class Session:
@@ -150,8 +140,7 @@ class Session:
                     return
                 is_last = number == len(passes) or self._stopped or error is not None
                 # A pass that was stopped before its search is worth less than the finished draft.
-                report = {} if result is None else result.report
-                if number > 1 and report.get("complete") is False and report.get("search") is None:
+                if number > 1 and result and not result.report.complete and result.report.search is None:
                     result = None
                 state = self._state
                 if result is not None:

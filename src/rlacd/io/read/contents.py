@@ -44,21 +44,14 @@ class Triangles(NamedTuple):
 
 
 class Fineness(NamedTuple):
-    """How near to curved surfaces their triangles have to be; no file takes more than the usual distance.
-
-    Attributes
-    ----------
-    share
-        Of the longest side of everything, or with `of_nodes` of the smallest node's.
-    metres
-        Instead of a share, a length.
-    of_nodes
-        Whether nodes count by themselves.
-    """
+    """How near to curved surfaces their triangles have to be; no file takes more than the usual distance."""
 
     share: float = 1e-3
+    """Of the longest side of everything, or with `of_nodes` of the smallest node's."""
     metres: float | None = None
+    """Instead of a share, a length."""
     of_nodes: bool = False
+    """Whether nodes count by themselves."""
 
 
 USUAL = Fineness()
@@ -66,28 +59,19 @@ USUAL = Fineness()
 
 
 class Contents(NamedTuple):
-    """All that is read of a file.
-
-    Attributes
-    ----------
-    geometry
-        Nodes with what they place.
-    warnings
-        A sentence for each kind of content that is not read.
-    up, metres
-        The axis that points up, and the unit of length in metres if the file or its format states it.
-    asset
-        The file, if it says more than where its triangles are: colours, materials, texture coordinates, nodes.
-    deviation
-        How far its triangles may be from the surfaces that it describes, if these are curved.
-    """
+    """All that is read of a file."""
 
     geometry: Sequence[tuple[SourceNode, Triangles]]
+    """Nodes with what they place."""
     warnings: Sequence[str] = ()
+    """A sentence for each kind of content that is not read."""
     up: Axis = "z"
     metres: float | None = None
+    """The axis that points up, and the unit of length in metres if the file or its format states it."""
     asset: Asset | None = None
+    """The file, if it says more than where its triangles are: colours, materials, texture coordinates, nodes."""
     deviation: float | None = None
+    """How far its triangles may be from the surfaces that it describes, if these are curved."""
 
 
 def one_shape(name: str, vertices: FloatArray, faces: Int64Array | None = None) -> list[tuple[SourceNode, Triangles]]:

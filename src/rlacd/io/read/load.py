@@ -17,7 +17,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshError, MeshFileError, MissingExtraError, OptionError
-from rlacd.io.read import function_of
+from rlacd.io.read import CURVED, READERS, function_of
 from rlacd.io.read.contents import USUAL, Contents, Fineness, damaged, one_shape, require_few, without_engine_hulls
 from rlacd.io.read.in_memory import is_in_memory, opened
 from rlacd.io.read.open_file import CONVERTERS, NO_MESHES, format_of, read_named
@@ -31,28 +31,6 @@ Source: TypeAlias = (
     " | ArrayLike | IO[bytes]"
 )
 
-CURVED = ("step", "stp", "iges", "igs")
-"""The formats that hold surfaces instead of triangles."""
-
-READERS = {
-    "obj": "read.obj:read_obj",
-    "msh": "read.simple_formats:read_msh",
-    "stl": "read.simple_formats:read_stl",
-    "ply": "read.ply:read_ply",
-    "off": "read.simple_formats:read_off",
-    **dict.fromkeys(("glb", "gltf", "vrm"), "read.gltf:read_gltf"),
-    **dict.fromkeys(("dae", "zae"), "read.collada:read_collada"),
-    "3mf": "read.threemf:read_3mf",
-    "fbx": "read.fbx:read_fbx",
-    **dict.fromkeys(CURVED, "read.cad:read_cad"),
-    "xyz": "read.simple_formats:read_xyz",
-    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "read.usd:read_usd"),
-}
-"""By extension, the function that reads it."""
-
-FORMATS = tuple(READERS)
-"""The formats that are read."""
-
 
 def load_mesh(
     source: Source, faces: ArrayLike | None = None, file_type: str | None = None, fineness: Fineness = USUAL
@@ -62,11 +40,10 @@ def load_mesh(
     Parameters
     ----------
     source
-        A path (obj, msh, stl, ply, off, glb, gltf, vrm, dae, zae, 3mf, xyz, fbx, step, iges, usd), a mesh or scene of
-        trimesh, a list of meshes, a file that is open in binary mode or its bytes, or vertices ``[V, 3]`` with faces
-        ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry is placed by its transform.
-        Paths and curves are ignored; point clouds give vertices without faces. Nodes of a scene that are hulls for an
-        engine, by their names, are left out with a warning if there are others.
+        A path, a mesh or scene of trimesh, a list of meshes, a file that is open in binary mode or its bytes, or
+        vertices ``[V, 3]`` with faces ``[F, 3]`` (or quads ``[F, 4]``). Scenes are baked: every instance of a geometry
+        is placed by its transform. Paths and curves are ignored; point clouds give vertices without faces. Nodes of a
+        scene that are hulls for an engine, by their names, are left out with a warning if there are others.
     faces
         Of vertices that are the source.
     file_type

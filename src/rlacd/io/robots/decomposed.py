@@ -105,7 +105,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
             results[collider] = done[key]
     if len(bodies) < 2:
         return Checked(results)
-    if not all(result.report["complete"] for result in results.values()):
+    if not all(result.report.complete for result in results.values()):
         return Checked(results, ["Links were not checked against each other: the work was stopped before."])
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -14,22 +15,22 @@ from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
 from rlacd.io.robots.rewritten import Rewritten, rewritten
 from rlacd.io.robots.robot import Robot
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
+from rlacd.options import Options
 from rlacd.options.fields import checked, path_like, read, shown
+from rlacd.options.keywords import taking
 from rlacd.options.output import OutputOptions
-from rlacd.options.robots import PairKind, Per, RobotOptions
+from rlacd.options.robots import RobotOptions
+from rlacd.run import ProgressCallback
 
 
+@taking(RobotOptions, Options)
 def rewrite_robot(
     robot: str | os.PathLike[str],
     output: str | os.PathLike[str],
     *,
     package_dirs: Sequence[str] = (),
     keep_input: bool = False,
-    per: Per = "link",
-    links: Mapping[str, float] | None = None,
-    samples: int = 500,
-    exclude: str | Sequence[PairKind] = (),
-    srdf: str | os.PathLike[str] | None = None,
+    progress: ProgressCallback | None = None,
     **options: Any,
 ) -> Rewritten:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
@@ -47,22 +48,8 @@ def rewrite_robot(
         ``NAME=FOLDER`` says where a package is; ``FOLDER`` alone may be read and is searched for packages.
     keep_input : bool
         Of a USD stage, write one file that holds all of it, instead of a layer over the original.
-    per : "link" or "mesh"
-        What is decomposed as one solid: all collision meshes of a link (URDF), body (MJCF) or rigid body (USD) that
-        share their contact properties, or each mesh. Links that fixed joints connect stay apart; so do MJCF geoms with
-        a name, and meshes that belong to no body.
-    links : dict, optional
-        For the links whose whole name matches a regular expression, another `threshold_abs`: ``{"finger.*": 0.001}``.
-        The last that matches counts.
-    samples : int
-        Joint positions within their limits, beside that at rest, at which links are looked at: those whose meshes do
-        not touch there do not touch as hulls either, and are cut finer where they would, or a warning names both. Needs
-        the extra ``clear``. USD stages are looked at as they stand.
-    exclude : sequence of "adjacent", "always" and "never"
-        Pairs of bodies whose contacts are not to be found, by when their hulls touch at these positions: as
-        ``<exclude>`` in MJCF, filtered pairs in USD. Of bodies of a stage, only those that a joint connects are known.
-    srdf : path-like, optional
-        For a URDF, where to write them as ``<disable_collisions>`` for MoveIt.
+    progress : callable, optional
+        As for `rlacd.decompose`.
     **options
         Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
         the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
@@ -83,7 +70,9 @@ def rewrite_robot(
         The place cannot be written to.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
-    asked = RobotOptions(per, links, samples, exclude, None if srdf is None else os.fspath(srdf))
+    own = {field.name for field in fields(RobotOptions)}
+    asked = RobotOptions(**{name: value for name, value in options.items() if name in own and value is not None})
+    options = {name: value for name, value in options.items() if name not in own} | {"progress": progress}
     check_options(options)
     check_places(source, place, asked, keep_input=keep_input)
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()

@@ -15,34 +15,24 @@ import trimesh
 from rlacd.clear import LinkPair
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError
-from rlacd.fit import Fit
 from rlacd.io.robots.decomposed import Checked
 from rlacd.io.robots.robot import Body, Collider, Results, Robot, Written
 
 
 @dataclass(frozen=True, eq=False)
 class RewrittenLink:
-    """A link (URDF), body (MJCF) or rigid body (USD) whose collision meshes were replaced.
-
-    Attributes
-    ----------
-    name
-        As in the file; of a USD stage its path.
-    meshes
-        The files of its collision meshes, or the paths of their prims.
-    hulls
-        In the frame of the link, in the robot's unit.
-    files
-        The names of the hulls' files.
-    results
-        The decomposition of each of its solids, in the frame of the solid's first mesh.
-    """
+    """A link (URDF), body (MJCF) or rigid body (USD) whose collision meshes were replaced."""
 
     name: str
+    """As in the file; of a USD stage its path."""
     meshes: Sequence[Path]
+    """The files of its collision meshes, or the paths of their prims."""
     hulls: Sequence[trimesh.Trimesh]
+    """In the frame of the link, in the robot's unit."""
     files: Sequence[str]
+    """The names of the hulls' files."""
     results: Sequence[Decomposition]
+    """The decomposition of each of its solids, in the frame of the solid's first mesh."""
 
     @classmethod
     def of(cls, body: Body, results: Results, names: Mapping[Collider, Sequence[str]]) -> RewrittenLink:
@@ -59,45 +49,32 @@ class RewrittenLink:
 
 @dataclass(frozen=True, eq=False)
 class Rewritten:
-    """The result of rewriting a robot.
-
-    Attributes
-    ----------
-    path
-        The new description.
-    folder
-        Where its hulls are, as OBJ files.
-    links
-        The links with collision meshes, which hulls replaced.
-    warnings
-        What the user should know: one sentence each.
-    seconds
-        Wall time.
-    size
-        The longest side of the box around all meshes that were replaced, with all joints at zero.
-    metres
-        The robot's unit of length.
-    pairs
-        What each two of the links do at the joint positions that were looked at; empty if none were.
-    samples
-        How many those are.
-    """
+    """The result of rewriting a robot."""
 
     path: Path
+    """The new description."""
     folder: Path
+    """Where its hulls are, as OBJ files."""
     links: list[RewrittenLink]
+    """The links with collision meshes, which hulls replaced."""
     warnings: list[str]
+    """What the user should know: one sentence each."""
     seconds: float
+    """Wall time."""
     size: float
+    """The longest side of the box around all meshes that were replaced, with all joints at zero."""
     metres: float = 1.0
+    """The robot's unit of length."""
     pairs: Sequence[LinkPair] = ()
+    """What each two of the links do at the joint positions that were looked at; empty if none were."""
     samples: int = 0
+    """How many those are."""
     _source: tuple[Robot, Checked] | None = None
 
     @property
     def complete(self) -> bool:
         """False when a decomposition was stopped early."""
-        return all(result.report.get("complete", True) for link in self.links for result in link.results)
+        return all(result.report.complete for link in self.links for result in link.results)
 
     @property
     def farthest(self) -> float | None:
@@ -119,7 +96,7 @@ class Rewritten:
 
         return save_report_page(shown(*self._source, self.warnings, self.seconds), path)
 
-    def report(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """All measurements as plain values; lengths named ``_abs`` are in the robot's unit."""
         return {
             "robot": str(self.path),
@@ -137,7 +114,7 @@ class Rewritten:
                     "hulls": len(link.files),
                     "files": [*link.files],
                     "farthest_abs": link.farthest,
-                    "solids": [result.report for result in link.results],
+                    "solids": [result.report.as_dict() for result in link.results],
                 }
                 for link in self.links
             ],
@@ -159,7 +136,7 @@ def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began:
 def warnings_of(robot: Robot, results: Results) -> list[str]:
     """What the reports of all solids warn of; the worst lost the widest passage, or has hulls that reach farthest."""
     solids = {id(result): (collider.name, result) for collider, result in results.items()}
-    each = [(name, result, said) for name, result in solids.values() for said in result.report["warnings"]]
+    each = [(name, result, said) for name, result in solids.values() for said in result.report.warnings]
     others = [one for one in each if " parts exceed the " not in one[2] or not _too_far(one[1])]
     said = grouped([(name, said, _widest(r) if "passage" in said else _reach(r) or 0.0) for name, r, said in others])
     far = [(*found, name) for name, result in solids.values() if (found := _too_far(result))]
@@ -176,10 +153,10 @@ def warnings_of(robot: Robot, results: Results) -> list[str]:
 
 def _too_far(result: Decomposition) -> tuple[float, float, int] | None:
     """The farthest of the hulls that exceed the threshold, the threshold, and how many do; None if it is no length."""
-    fit = Fit.of(result.report)
+    fit = result.report.fit
     if fit is None or not fit.is_length or fit.worst is None or fit.limit is None or fit.worst <= fit.limit:
         return None
-    scale = float(result.report["scale"])
+    scale = result.report.scale
     return fit.worst / scale, fit.limit / scale, sum(error > fit.limit for error in fit.per_part or ())
 
 
@@ -203,12 +180,12 @@ def _kind(warning: str) -> str:
 
 
 def _widest(result: Decomposition) -> float:
-    return max((one["radius_abs"] - one["left_abs"] for one in result.report["passages"] or ()), default=0.0)
+    return max((one.radius_abs - one.left_abs for one in result.report.passages or ()), default=0.0)
 
 
 def _reach(result: Decomposition) -> float | None:
-    over: float | None = result.report.get("hausdorff", {}).get("over")
-    return None if over is None else over / float(result.report["scale"])
+    over = result.report.hausdorff.over
+    return None if over is None else over / result.report.scale
 
 
 def _most(lengths: Sequence[float | None]) -> float | None:

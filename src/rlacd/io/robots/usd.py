@@ -21,6 +21,7 @@ from rlacd.io.write.encode import hull_name
 from rlacd.io.write.single_precision import required_hull
 from rlacd.io.write.usd import require_usd
 from rlacd.options.robots import RobotOptions
+from rlacd.plain_json import as_plain
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.poses import inverse, product, rounded
 
@@ -61,7 +62,7 @@ class Stage(Robot):
                 hulls[f"{first}.{number}.faces"] = np.asarray(mesh.faces, dtype="<i4").tobytes()
             for index, placed in zip(places, collider.meshes, strict=True):
                 leads[index] = first
-                masses[self.nodes[index]["path"]] = result.report["mass"] if len(places) == 1 else _mass(placed)
+                masses[self.nodes[index]["path"]] = as_plain(result.report.mass if len(places) == 1 else _mass(placed))
         sublayer = None if whole else Path(os.path.relpath(self.source, place.absolute().parent)).as_posix()
         given = {"path": str(self.source), "sublayer": sublayer, "ending": place.suffix.lower().lstrip(".")}
         filtered = [(pair.first, pair.second) for pair in pairs or () if pair.kind in asked.exclude]
@@ -123,4 +124,4 @@ def _mass(mesh: PlacedMesh) -> Any:
     """The mass of one mesh of several that became a solid; None if it is closed, and needs no repair."""
     if trimesh.Trimesh(mesh.points, mesh.faces, process=False).is_volume:
         return None
-    return decompose((mesh.points, mesh.faces), max_hulls=1, quality="fast").report["mass"]
+    return decompose((mesh.points, mesh.faces), max_hulls=1, quality="fast").report.mass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -73,10 +74,11 @@ def shown(robot: Robot, done: Checked, warnings: Sequence[str], seconds: float) 
         link_of += [number] * len(own)
     each = [(body.name, done.results[collider].report) for body in robot.bodies for collider in body.colliders]
     report = joint_report(each, 2.0 / robot.size if robot.size > 0 else 1.0)
-    if (length := report["options"].get("threshold_abs")) is not None:
-        report["options"]["threshold"] = length * report["scale"]
-    report |= {"name": robot.source.stem, "up": robot.up, "metres": robot.metres, "seconds": {"total": seconds}}
-    report |= {"warnings": [*warnings], "samples": done.samples, "pairs": [pair.as_plain() for pair in done.pairs]}
+    options = dict(report.options)
+    if (length := options.get("threshold_abs")) is not None:
+        options["threshold"] = length * report.scale
+    named = replace(report, name=robot.source.stem, up=robot.up, metres=robot.metres, warnings=tuple(warnings))
+    report = replace(named, options=options, seconds={"total": seconds})
     touching = None if done.cleared is None else partial(_contacts, robot, done.cleared, motion)
     moves = motion.joints, len(motion.sampled), motion.carried, _places(robot, done, motion), done.samples, touching
     whole = _whole(robot, meshes, warnings)

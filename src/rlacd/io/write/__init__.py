@@ -28,7 +28,6 @@ from rlacd.io.write.model import (
     visuals_of,
 )
 from rlacd.io.write.target import FORMATS, MODELS, WITH_MESHES, Target, hull_target, mesh_folder
-from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 
@@ -36,12 +35,6 @@ __all__ = ["FORMATS", "MODELS", "file_stem", "hull_target", "save", "write_file"
 
 SIMULATED = (*WITH_MESHES, "usd")
 """Formats whose readers take lengths to be in metres."""
-
-_PRIMITIVES: dict[str, tuple[PrimitiveKind, ...]] = {
-    "mjcf": PRIMITIVE_KINDS,
-    "urdf": ("sphere", "box", "cylinder"),  # many of its readers refuse a file with a capsule
-    "sdf": PRIMITIVE_KINDS,
-}
 
 
 def save(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
@@ -105,7 +98,7 @@ def _for_engine(model: RigidBody, engine: str, ending: str) -> bytes:
 
 def _save_with_meshes(result: Result, model: RigidBody, target: Target, one_mesh: bool) -> None:
     folder, stem = mesh_folder(target.path, target.file_format), file_stem(model.name)
-    shapes = shapes_of(model, stem, _PRIMITIVES[target.file_format], one_mesh=one_mesh)
+    shapes = shapes_of(model, stem, MODELS[target.file_format].primitives, one_mesh=one_mesh)
     mjcf = target.file_format == "mjcf"
     visuals = visuals_of(model, stem, function_of("write.converted:painted_parts")(result.input) if mjcf else ())
     meshes = [shape for shape in (*visuals, *shapes) if isinstance(shape, MeshFile)]

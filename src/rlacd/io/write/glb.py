@@ -20,24 +20,16 @@ ROUGHNESS = 0.8
 
 
 class Placed(NamedTuple):
-    """A solid and where it stands.
-
-    Attributes
-    ----------
-    name
-        Of the node, the mesh and the material.
-    mesh
-        Its vertices are rounded to float32.
-    shift
-        ``[3]``, the translation of the node.
-    color
-        ``[3]``, linear light in [0, 1].
-    """
+    """A solid and where it stands."""
 
     name: str
+    """Of the node, the mesh and the material."""
     mesh: Triangles
+    """Its vertices are rounded to float32."""
     shift: npt.NDArray[np.float64]
+    """``[3]``, the translation of the node."""
     color: npt.NDArray[np.float64]
+    """``[3]``, linear light in [0, 1]."""
 
 
 class GltfFile:

@@ -17,10 +17,10 @@ from rlacd.io.write.encode import encode_obj, encode_plain_obj, hull_name
 from rlacd.io.write.single_precision import placed_mesh, required_hull
 from rlacd.options.names import UNITS, PrimitiveKind
 from rlacd.options.output import DENSITY, OutputOptions
+from rlacd.report import Mass
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.frame import HALF_THICKNESS, Frame
-from rlacd.solid.mass import Mass, mass_of
+from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.primitive import Primitive
 
 TO_Z_UP = {
@@ -33,33 +33,22 @@ TO_Z_UP = {
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A body to write; all lengths in the input's own unit and frame.
-
-    Attributes
-    ----------
-    name
-        Printable, without line breaks; from the name of the user's file.
-    hulls
-        At least one.
-    primitives
-        For each hull what it stands for, or None.
-    visual
-        The input as it was read; None for a point cloud.
-    mass
-        Of the repaired solid without its closed cavities, at the requested density.
-    up
-        The axis of the input that points up.
-    is_scene
-        Whether to add a floor and a light, where the format has them.
-    """
+    """A body to write; all lengths in the input's own unit and frame."""
 
     name: str
+    """Printable, without line breaks; from the name of the user's file."""
     hulls: Sequence[trimesh.Trimesh]
+    """At least one."""
     primitives: Sequence[Primitive | None]
+    """For each hull what it stands for, or None."""
     visual: trimesh.Trimesh | None
+    """The input as it was read; None for a point cloud."""
     mass: Mass
+    """Of the repaired solid without its closed cavities, at the requested density."""
     up: str
+    """The axis of the input that points up."""
     is_scene: bool = False
+    """Whether to add a floor and a light, where the format has them."""
 
 
 class Look(NamedTuple):
@@ -80,24 +69,16 @@ class Painted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """A mesh file beside the model: its name, content, and position in the body's frame.
-
-    Attributes
-    ----------
-    name
-        File name.
-    data
-        Its bytes.
-    shift
-        ``[3]``; zero unless the body lies too far from its origin for float32.
-    look
-        What it looks like, if that is known.
-    """
+    """A mesh file beside the model: its name, content, and position in the body's frame."""
 
     name: str
+    """File name."""
     data: bytes
+    """Its bytes."""
     shift: FloatArray
+    """``[3]``; zero unless the body lies too far from its origin for float32."""
     look: Look | None = None
+    """What it looks like, if that is known."""
 
     @property
     def picture_name(self) -> str:
@@ -120,7 +101,7 @@ def model_of(result: Result, asked: OutputOptions) -> RigidBody:
     density = DENSITY if asked.density is None else asked.density
     if not result.hulls:
         raise OutputError("there are no hulls to write; decompose a mesh first.")
-    of_volume = _mass(result)
+    of_volume = result.report.mass
     if asked.mass is not None and of_volume.volume_abs > 0:
         density = asked.mass / of_volume.volume_abs
     weighed = of_volume.scaled(density)
@@ -151,11 +132,11 @@ def implausible(model: RigidBody) -> str | None:
 
 def hollow(result: Result) -> str | None:
     """Say in a sentence if most of the input is open sheets, whose mass is that of the thickness repair gave them."""
-    bodies = result.report.get("repair", [])
-    sheets = sum(body["faces_in"] for body in bodies if body["step"] == SHEET)
-    if 2 * sheets <= sum(body["faces_in"] for body in bodies):
+    bodies = result.report.repair
+    sheets = sum(body.faces_in for body in bodies if body.step == SHEET)
+    if 2 * sheets <= sum(body.faces_in for body in bodies):
         return None
-    walls = f"walls {2 * HALF_THICKNESS / result.report['scale']:.3g} thick"
+    walls = f"walls {2 * HALF_THICKNESS / result.report.scale:.3g} thick"
     return f"{result.name} is a hollow shell of open sheets, weighed as {walls}: mass= (--mass) sets its mass."
 
 
@@ -225,11 +206,3 @@ def visuals_of(model: RigidBody, stem: str, painted: Sequence[Painted] = ()) -> 
 def numbers(values: Sequence[float] | FloatArray) -> str:
     """Write numbers with every digit, separated by spaces."""
     return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0: no negative zero
-
-
-def _mass(result: Result) -> Mass:
-    mass = result.report.get("mass")
-    if mass is None:  # a result from elsewhere: its hulls stand for the solid
-        hulls = trimesh.util.concatenate(result.hulls)
-        return mass_of(hulls.vertices, hulls.faces, Frame(np.zeros(3), 1.0))
-    return Mass.of_plain(mass)

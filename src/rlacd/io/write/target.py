@@ -7,33 +7,48 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from rlacd.errors import OptionError, OutputError
 from rlacd.io.read import function_of
 from rlacd.io.write.atomic import output_errors
 from rlacd.options.fields import path_like, read, shown
+from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.output import OutputOptions
 from rlacd.options.presets import find_preset
 
 FORMATS = ("glb", "obj", "ply", "stl")
-"""Formats of hulls only; also those of the files in a folder."""
+"""Formats of hulls only; also those of the files in a folder. Each has an encoder in `rlacd.io.write.encode`."""
 
-MODELS: dict[str, tuple[str, ...]] = {
-    "mjcf": ("xml",),
-    "urdf": ("urdf",),
-    "sdf": ("sdf",),
-    "usd": ("usd", "usda", "usdc"),
-    "unreal": ("glb", "obj"),
-    "godot": ("glb",),
+
+class Model(NamedTuple):
+    """A format of hulls with their mesh, for a simulator or an engine."""
+
+    label: str
+    reader: str
+    """The programs that read it."""
+    endings: tuple[str, ...]
+    with_meshes: bool = False
+    """Whether it refers to mesh files beside it."""
+    primitives: tuple[PrimitiveKind, ...] = ()
+    """Those that it holds in place of hulls."""
+
+
+MODELS = {
+    "mjcf": Model("MJCF", "MuJoCo", ("xml",), True, PRIMITIVE_KINDS),
+    # Many readers of URDF refuse a file with a capsule.
+    "urdf": Model("URDF", "ROS, Bullet and most robot simulators", ("urdf",), True, ("sphere", "box", "cylinder")),
+    "sdf": Model("SDF", "Gazebo", ("sdf",), True, PRIMITIVE_KINDS),
+    "usd": Model("USD", "Isaac Sim and PhysX", ("usd", "usda", "usdc")),
+    "unreal": Model("Unreal", "Unreal Engine", ("glb", "obj")),
+    "godot": Model("Godot", "Godot", ("glb",)),
 }
-"""Formats of hulls with their mesh, for a simulator or an engine, and the endings of each."""
 
-MODEL_OF = {ending: name for name, endings in MODELS.items() for ending in endings if ending not in FORMATS}
+MODEL_OF = {ending: name for name, model in MODELS.items() for ending in model.endings if ending not in FORMATS}
 
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 
-WITH_MESHES = ("mjcf", "urdf", "sdf")
-"""Models that refer to mesh files beside them."""
+WITH_MESHES = tuple(name for name, model in MODELS.items() if model.with_meshes)
 
 FOLDER_FORMAT = "obj"
 SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
@@ -41,21 +56,14 @@ SEPARATORS = tuple(mark for mark in (os.sep, os.altsep) if mark)
 
 @dataclass(frozen=True)
 class Target:
-    """A checked output: one file, or a folder with one file per hull.
-
-    Attributes
-    ----------
-    path
-        The file or folder.
-    file_format
-        One of `FORMATS` or of `MODELS`.
-    is_folder
-        Whether `path` is a folder.
-    """
+    """A checked output: one file, or a folder with one file per hull."""
 
     path: Path
+    """The file or folder."""
     file_format: str
+    """One of `FORMATS` or of `MODELS`."""
     is_folder: bool
+    """Whether `path` is a folder."""
 
 
 def hull_target(path: str | os.PathLike[str], asked: OutputOptions | None = None) -> Target:
@@ -93,7 +101,7 @@ def file_kind(file_format: str | None, preset: str | None) -> tuple[str, str | N
 
 def ending_of(file_format: str) -> str:
     """The ending of a file of some format."""
-    return MODELS[file_format][0] if file_format in MODELS else file_format
+    return MODELS[file_format].endings[0] if file_format in MODELS else file_format
 
 
 def _target(text: str, wanted: str | None) -> Target:
@@ -140,7 +148,7 @@ def check_name(path: Path) -> None:
 
 def _model_target(text: str, file_format: str) -> Target:
     place = Path(text)
-    endings = [f".{ending}" for ending in MODELS[file_format]]
+    endings = [f".{ending}" for ending in MODELS[file_format].endings]
     if text.endswith(SEPARATORS) or place.suffix.lower() not in endings:
         raise OptionError(f"{file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}.")
     check_file(place)
