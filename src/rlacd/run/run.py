@@ -29,7 +29,7 @@ class Progress:
     Attributes
     ----------
     stage : str
-        What is being done: an attribute of ``Decomposition.report.seconds``.
+        What is being done: a key of ``Decomposition.report.seconds``.
     done : int
         Steps of this stage finished so far.
     total : int or None
