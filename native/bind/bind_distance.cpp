@@ -11,7 +11,6 @@
 #include "surface/crossings.hpp"
 #include "surface/pushed.hpp"
 #include "surface/surface.hpp"
-#include "surface/surface_field.hpp"
 
 namespace rlacd {
 
@@ -97,14 +96,6 @@ void bind_surface(nb::module_& m) {
            "Groups of triangles farther than `accuracy` times their radius are expanded to second order: with the "
            "default 2 errors up to 0.03 were seen close to real surfaces, with 4 up to 0.01; infinity is exact. Around "
            "a closed surface they are whole numbers, and quicker to find.");
-  m.def("directed_hausdorff",
-        released([](const Mesh& mesh, const Surface& surface, double tolerance, int threads) -> Interval {
-          require_positive(tolerance);
-          return maximize_in_waves(SurfaceField(surface.bvh()), mesh, {tolerance}, threads);
-        }),
-        "vertices"_a, "faces"_a, "surface"_a, "tolerance"_a, "threads"_a = 0,
-        "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface; upper - lower <= "
-        "tolerance.");
   m.def("apart_points",
         released([](const Surface& surface, const std::vector<Vec3>& points, double reach, std::size_t enough) {
           require(reach > 0, "the reach must be positive");
