@@ -1,8 +1,6 @@
-"""Slivers: thin hulls that cuts leave, dropped if the other hulls cover them."""
+"""Slivers: thin hulls that growing leaves beside grown ones, dropped if the other hulls cover them."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,28 +16,20 @@ SLIVER_LOSS = 2 * HALF_THICKNESS
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
 
 
-def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | None = None) -> list[Part]:
+def drop_slivers(parts: list[Part], run: Run) -> list[Part]:
     """Drop slivers that the other hulls cover; all others stay, such as those of thin solids.
 
     Parameters
     ----------
-    parts : sequence of Part
+    parts : list of Part
         Parts; they may overlap where the solid was clipped.
-    suspects : sequence of Part, optional
-        The parts that may be dropped; all by default.
 
     Returns
     -------
     list of Part
         The remaining parts in the same order.
     """
-    parts = list(parts)
-    suspects = parts if suspects is None else suspects
-    thin = run.map(lambda part: is_thin(part) or is_sliver(part.hull), suspects)
-    place = {id(part): i for i, part in enumerate(parts)}
-    slivers = [place[id(part)] for part, is_thin in zip(suspects, thin, strict=True) if is_thin]
-    if not slivers:
-        return parts
+    thin = run.map(lambda part: is_thin(part) or is_sliver(part.hull), parts)
     boxes = np.array([part.box for part in parts])
     kept = np.ones(len(parts), dtype=bool)
     stood_in: dict[int, BoolArray] = {}  # the hulls near each sliver when it was dropped
@@ -49,7 +39,7 @@ def drop_slivers(parts: Sequence[Part], run: Run, suspects: Sequence[Part] | Non
         near = [parts[i].hull for i in np.flatnonzero(others)]
         return not near or _misses(hull_union(near, run.threads), parts[own], run.threads)
 
-    smallest_first = sorted(slivers, key=lambda i: parts[i].hull.volume)
+    smallest_first = sorted(np.flatnonzero(thin).tolist(), key=lambda i: parts[i].hull.volume)
     for own in smallest_first:
         kept[own] = False
         kept[own] = is_missed(own)
