@@ -76,7 +76,7 @@ class _Uniting:
         if (lows.max(axis=0) > highs.min(axis=0) + self._goal.threshold).any():
             return
         hull = Hull.around(*hulls)
-        if self._goal.early_out.forbids(self._root.filling, hull):
+        if not self._goal.early_out.is_feasible(self._root.filling, hull):
             return
         if any(self._enters(hull, number) for number in self._hulls if number not in pair):
             return
