@@ -28,7 +28,7 @@ from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.environment import CutEnv, Memory, terminal_reward
-from rlacd.merge import drop_slivers, merge_parts
+from rlacd.merge import merge_parts
 from rlacd.planes.candidates import reflex_edge_planes
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.policies import make_policy
@@ -332,8 +332,8 @@ def measure(solid: Solid, threshold: float, budget: int) -> Row | None:
             row |= {f"{name}.bound": node.high[LAST], f"{name}.proved": found.proved}
             trees[name] = found.parts
         for name, parts in trees.items():
-            merged = merge_parts(drop_slivers(parts, run), criterion.settled(parts), run, solid=root)
-            row |= {f"{name}.raw": len(parts), f"{name}.merged": len(drop_slivers(merged, run))}
+            merged = merge_parts(parts, criterion.settled(parts), run, solid=root)
+            row |= {f"{name}.raw": len(parts), f"{name}.merged": len(merged)}
         return row | {"expanded": oracle.expanded}
 
 

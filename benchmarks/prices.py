@@ -29,10 +29,10 @@ KERNELS: dict[str, tuple[Any, str, Callable[..., Sizes], Callable[..., float]]] 
     "cutting": (Component, "cut", lambda part, plane: (part.size,), work.cutting),
     "judging": (Concavity, "is_met", lambda goal, part: (len(part.faces), len(part.hull.faces)), work.judging),
     "joining": (Hull, "around", lambda *hulls: (sum(len(hull.vertices) for hull in hulls),), work.joining),
-    "testing": (DistanceEarlyOut, "feasibility", lambda early_out, solid, hull: (len(hull.vertices),), work.testing),
+    "testing": (DistanceEarlyOut, "is_feasible", lambda early_out, solid, hull: (len(hull.vertices),), work.testing),
     "screening": (
         DistanceEarlyOut,
-        "feasibilities",
+        "feasible_volumes",
         lambda early_out, solid, hulls, pairs, threads: (
             sum(len(hulls[i]) for i in pairs.ravel().tolist()),
             len(pairs),

@@ -24,7 +24,7 @@ from rlacd.criteria import Concavity, Criterion, Navigable
 from rlacd.cut import CutTree
 from rlacd.errors import OptionError, RlacdError
 from rlacd.io.read.load import load_mesh
-from rlacd.merge import drop_slivers, merge_parts
+from rlacd.merge import merge_parts
 from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
 from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
@@ -98,10 +98,10 @@ def measure(
         if left and row["raw"] >= MOST_PARTS:
             return None
         if merge:
-            pieces = drop_slivers([*done, *left], run, suspects=left)
+            pieces = [*done, *left]
             settled = decides.settled(pieces)
-            row["navacd"] = float(len(drop_slivers(merge_parts(pieces, settled, run), run)))
-            row["merged"] = float(len(drop_slivers(merge_parts(pieces, settled, run, solid=root), run)))
+            row["navacd"] = float(len(merge_parts(pieces, settled, run)))
+            row["merged"] = float(len(merge_parts(pieces, settled, run, solid=root)))
     return row
 
 

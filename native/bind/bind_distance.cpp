@@ -11,7 +11,6 @@
 #include "surface/crossings.hpp"
 #include "surface/pushed.hpp"
 #include "surface/surface.hpp"
-#include "surface/surface_field.hpp"
 
 namespace rlacd {
 
@@ -97,14 +96,6 @@ void bind_surface(nb::module_& m) {
            "Groups of triangles farther than `accuracy` times their radius are expanded to second order: with the "
            "default 2 errors up to 0.03 were seen close to real surfaces, with 4 up to 0.01; infinity is exact. Around "
            "a closed surface they are whole numbers, and quicker to find.");
-  m.def("directed_hausdorff",
-        released([](const Mesh& mesh, const Surface& surface, double tolerance, int threads) -> Interval {
-          require_positive(tolerance);
-          return maximize_in_waves(SurfaceField(surface.bvh()), mesh, {tolerance}, threads);
-        }),
-        "vertices"_a, "faces"_a, "surface"_a, "tolerance"_a, "threads"_a = 0,
-        "(lower, upper) around the greatest distance from a point of the mesh's faces to the surface; upper - lower <= "
-        "tolerance.");
   m.def("apart_points",
         released([](const Surface& surface, const std::vector<Vec3>& points, double reach, std::size_t enough) {
           require(reach > 0, "the reach must be positive");
@@ -158,32 +149,25 @@ void bind_filling(nb::module_& m) {
            }),
            "vertices"_a, "faces"_a, "threads"_a = 1)
       .def_prop_ro("surface", &Filling::surface, nb::rv_policy::reference_internal, "The solid's surface.")
-      .def("feasibility", released([](const Filling& self, const ConvexBody& hull, double threshold) {
-             return static_cast<int>(self.feasibility(hull, threshold));
-           }),
-           "hull"_a, "threshold"_a,
-           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.\n\n"
-           "0: they may; 1: they are not; 2: nor are those of any hull that holds this one.")
-      .def("joint_feasibilities",
-           released([](const Filling& self, const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs,
-                       double threshold, int threads) {
-             const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
-             std::vector<double> volumes(pairs.shape(0));
-             std::vector<std::int32_t> verdicts(pairs.shape(0));
-             parallel_for(volumes.size(), threads, [&](std::size_t i) {
-               const Filling::Joint joint =
-                   self.joint_feasibility(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
-               volumes[i] = joint.volume;
-               verdicts[i] = static_cast<std::int32_t>(joint.feasibility);
-             });
-             return std::pair(std::move(volumes), std::move(verdicts));
-           }),
-           "hulls"_a, "pairs"_a, "threshold"_a, "threads"_a = 0,
-           "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, and the `feasibility` [P] of each, decided less "
-           "thoroughly than for a single hull, where the hulls themselves are close enough to their shares of the "
-           "solid. There is no volume (0) where it is 2.")
+      .def("is_feasible", released(&Filling::is_feasible), "hull"_a, "threshold"_a,
+           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.")
+      .def(
+          "feasible_volumes",
+          released([](const Filling& self, const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs,
+                      double threshold, int threads) {
+            const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
+            std::vector<double> volumes(pairs.shape(0));
+            parallel_for(volumes.size(), threads, [&](std::size_t i) {
+              volumes[i] = self.feasible_volume(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
+            });
+            return volumes;
+          }),
+          "hulls"_a, "pairs"_a, "threshold"_a, "threads"_a = 0,
+          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, infinite where a joint hull is not feasible: that "
+          "is decided less thoroughly than for a single hull, and where the hulls themselves are close enough to their "
+          "shares of the solid.")
       .def("comes_deeper", released(&Filling::comes_deeper), "hull"_a, "threshold"_a,
-           "Whether the solid's surface comes deeper than the threshold inside a hull: `feasibility` is 2.")
+           "Whether the solid's surface comes deeper than the threshold inside a hull: it is not feasible.")
       .def("clipped", released([](const Filling& self, const ConvexBody& hull) {
              ClippedSolid clip = self.clipped(hull);
              return std::tuple(std::move(clip.mesh.vertices), std::move(clip.mesh.faces), clip.volume);

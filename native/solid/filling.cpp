@@ -94,15 +94,15 @@ struct Cell {
 
 }  // namespace
 
-Feasibility Filling::feasibility(const ConvexBody& hull, double threshold) const {
-  if (comes_deeper(hull, threshold)) return Feasibility::kNever;
-  return is_missed(hull.mesh(), hull.mesh().faces, threshold, kMostCells) ? Feasibility::kNo : Feasibility::kMaybe;
+bool Filling::is_feasible(const ConvexBody& hull, double threshold) const {
+  return !comes_deeper(hull, threshold) && !is_missed(hull.mesh(), hull.mesh().faces, threshold, kMostCells);
 }
 
-Filling::Joint Filling::joint_feasibility(const ConvexBody& first, const ConvexBody& second, double threshold) const {
+double Filling::feasible_volume(const ConvexBody& first, const ConvexBody& second, double threshold) const {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
   const std::vector<Vec3>&all_first = first.mesh().vertices, &all_second = second.mesh().vertices;
   const ConvexBody few(hull_mesh(joined(first.few_corners(), second.few_corners())));
-  if (!few.mesh().faces.empty() && comes_deeper(few, threshold)) return {0, Feasibility::kNever};
+  if (!few.mesh().faces.empty() && comes_deeper(few, threshold)) return kNever;
   const bool are_all = &first.few_corners() == &all_first && &second.few_corners() == &all_second;
   const ConvexBody body(are_all ? few.mesh() : hull_mesh(joined(all_first, all_second)));
   const Mesh& hull = body.mesh();
@@ -119,10 +119,8 @@ Filling::Joint Filling::joint_feasibility(const ConvexBody& first, const ConvexB
   std::vector<Triangle> facets;
   for (std::size_t f = 0; f < hull.faces.size(); ++f)
     if (is_new[f]) facets.push_back(hull.faces[f]);
-  const double volume = mesh_volume(hull);
-  if (!are_all && is_missed(hull, facets, threshold, 0)) return {volume, Feasibility::kNo};
-  if (!are_all && comes_deeper(body, threshold)) return {volume, Feasibility::kNever};
-  return {volume, is_missed(hull, facets, threshold, kMostCellsOfPair) ? Feasibility::kNo : Feasibility::kMaybe};
+  if (!are_all && (is_missed(hull, facets, threshold, 0) || comes_deeper(body, threshold))) return kNever;
+  return is_missed(hull, facets, threshold, kMostCellsOfPair) ? kNever : mesh_volume(hull);
 }
 
 bool Filling::comes_deeper(const ConvexBody& hull, double threshold) const {

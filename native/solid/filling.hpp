@@ -22,12 +22,6 @@ std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const
 
 std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const ConvexBody& hull, double depth);
 
-enum class Feasibility : std::int32_t {
-  kMaybe = 0,
-  kNo = 1,     // not for this hull
-  kNever = 2,  // nor for any hull that contains it
-};
-
 struct ClippedSolid {
   Mesh mesh;
   double volume = 0;
@@ -38,15 +32,12 @@ class Filling {
   explicit Filling(const Mesh& solid, int threads = 1) : solid_(solid), surface_(solid, threads) {}
 
   const Surface& surface() const { return surface_; }
-  Feasibility feasibility(const ConvexBody& hull, double threshold) const;
-  // The same for the joint hull of two hulls that are close enough to their own shares of the solid, and its volume
-  // unless the verdict is kNever.
-  struct Joint {
-    double volume;
-    Feasibility feasibility;
-  };
-  Joint joint_feasibility(const ConvexBody& first, const ConvexBody& second, double threshold) const;
-  // Whether the verdict is kNever: much faster than the full verdict.
+  // Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.
+  bool is_feasible(const ConvexBody& hull, double threshold) const;
+  // The volume of the joint hull of two hulls that are close enough to their own shares of the solid; infinite if the
+  // joint hull is not feasible.
+  double feasible_volume(const ConvexBody& first, const ConvexBody& second, double threshold) const;
+  // Whether the solid's surface comes deeper than the threshold inside a hull: then it is not feasible.
   bool comes_deeper(const ConvexBody& hull, double threshold) const;
 
   // All that the solid fills of a convex hull, closed by caps on its facets.

@@ -7,16 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
 from rlacd.run import Run, work
 from rlacd.solid.component import Component, Plane, is_thin
 from rlacd.solid.frame import HALF_THICKNESS
-
-CUT_SLIVER = HALF_THICKNESS
-"""No point of a sliver that is dropped is farther than this from the solid across its cut."""
 
 MANY_COMPONENTS = 1000
 """With more components than this, a second policy is tried: there are solids that one policy breaks into thousands of
@@ -32,31 +28,20 @@ class CutCache:
     def __init__(self) -> None:
         self._pieces: dict[Component, list[Component]] = {}
         self._sides: dict[tuple[Component, Plane], list[Component]] = {}
-        self._across: dict[Component, Component] = {}  # the other side of the last cut
 
     def pieces(self, component: Component) -> list[Component]:
-        """Get the connected pieces of a component without slivers; ``[component]`` if it is connected."""
+        """Get the connected pieces of a component; ``[component]`` if it is connected."""
         if component not in self._pieces:
-            own = component.pieces()
-            if len(own) == 1:
-                own = [component]
-            across = self._across.get(component)
-            if len(own) > 1 and across is not None:
-                own = [piece for piece in own if not is_cut_sliver(piece, across)]
-                self._across.update((piece, across) for piece in own)
-            self._pieces[component] = own
+            pieces = component.pieces()
+            self._pieces[component] = pieces if len(pieces) > 1 else [component]
         return self._pieces[component]
 
     def sides(self, component: Component, plane: Plane) -> list[Component]:
-        """Get the sides below and above a plane, without slivers; an empty list if one side would be empty."""
+        """Get the sides below and above a plane; an empty list if one side would be empty."""
         key = component, plane
         if key not in self._sides:
             below, above = component.cut(plane)
-            if below is None or above is None:
-                self._sides[key] = []
-            else:
-                self._across[below], self._across[above] = above, below
-                self._sides[key] = [side for side in (below, above) if not is_cut_sliver(side, self._across[side])]
+            self._sides[key] = [] if below is None or above is None else [below, above]
         return self._sides[key]
 
 
@@ -170,7 +155,7 @@ class CutTree:
 
     def _divided(self, component: Component, threads: int) -> list[Component]:
         """The connected pieces of a component, or the sides of the plane that cuts it; empty if none does."""
-        pieces = self._cache.pieces(component) or [component]
+        pieces = self._cache.pieces(component)
         if pieces != [component]:
             return pieces
         plane = self._policy.choose(component, threads)
@@ -186,21 +171,8 @@ def halves(sliver: Component) -> list[Component]:
     """
     lower, upper = sliver.box
     axis = int(np.argmax(upper - lower))
-    if upper[axis] - lower[axis] <= CUT_SLIVER:
+    if upper[axis] - lower[axis] <= HALF_THICKNESS:
         return []
     normal = (float(axis == 0), float(axis == 1), float(axis == 2))
     below, above = sliver.cut(Plane(normal, float(lower[axis] + upper[axis]) / 2), least=-math.inf)
     return [] if below is None or above is None else [below, above]
-
-
-def is_cut_sliver(piece: Component, across: Component) -> bool:
-    """Whether a piece is a sliver that a cut nearly parallel to the surface has left of the solid across the cut.
-
-    Slivers have ragged outlines that take very many cuts to become convex. They can be dropped because every point of
-    one is within `CUT_SLIVER` of the solid across the cut.
-    """
-    if not is_thin(piece):
-        return False
-    surface = _native.Surface(across.vertices, across.faces)
-    _, farthest = _native.directed_hausdorff(piece.vertices, piece.faces, surface, CUT_SLIVER / 4, 1)
-    return farthest <= CUT_SLIVER

@@ -1,4 +1,4 @@
-"""One pass: cut until every part meets the criterion, drop slivers, merge, drop slivers."""
+"""One pass: cut until every part meets the criterion, and merge."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
-from rlacd.merge import drop_slivers, merge_parts
+from rlacd.merge import merge_parts
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part
 
@@ -29,11 +29,11 @@ class Pass:
     Attributes
     ----------
     pieces : list of Part
-        The parts after cutting; those that do not meet the criterion include no slivers.
+        The parts after cutting.
     unmet : list of Part
         The pieces that do not meet the criterion.
     parts : list of Part
-        The merged pieces, without slivers; the pieces themselves if merging was skipped.
+        The merged pieces; the pieces themselves if merging was skipped.
     criterion : Criterion
         The criterion used for merging: the requested one, settled on the pieces.
     """
@@ -53,7 +53,7 @@ def cut_and_merge(
     most: float = math.inf,
     strict: bool = False,
 ) -> Pass:
-    """Cut a solid until every part meets the criterion, drop slivers, merge, and drop slivers again.
+    """Cut a solid until every part meets the criterion, and merge.
 
     Merging stops after `MOST_MERGING` units of work; the merged parts meet the criterion in any case. Cutting stops
     after `MOST_CUTTING` and `MOST_PER_FACE`; parts left over then do not.
@@ -66,7 +66,6 @@ def cut_and_merge(
     run : Run
         Times the stages ``cut`` and ``merge``. When it stops, the parts reached so far are returned.
     merge : bool
-        Whether to merge, and to drop slivers afterwards.
     most : float
         Stop cutting as soon as it is clear that there will be more parts than this.
     strict : bool
@@ -81,24 +80,17 @@ def cut_and_merge(
             return Pass(pieces, [*left], pieces, criterion)
         try:
             if run.stopped_by is None:
-                pieces = drop_slivers(pieces, run, suspects=left)
                 criterion = criterion.settled(pieces)
         except Stopped:
             run.note_stop()
         if run.stopped_by is not None and not strict:
             left = _pieces(left, run)
             pieces = [*done, *left]
-        kept = {id(part) for part in pieces}
-        unmet: list[Part] = [part for part in left if id(part) in kept]
+        unmet: list[Part] = [*left]
     if not merge or (strict and unmet):
         return Pass(pieces, unmet, pieces, criterion)
     with run.stage("merge"), run.limited(MOST_MERGING, cuts=None if strict else "merge"):
         parts = merge_parts(pieces, criterion, run, solid=tree.root)
-        try:
-            if run.stopped_by is None:
-                parts = drop_slivers(parts, run)
-        except Stopped:
-            run.note_stop()
     return Pass(pieces, unmet, parts, criterion)
 
 

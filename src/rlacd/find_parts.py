@@ -16,7 +16,7 @@ from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, cut_and_merge
 from rlacd.limit import at_most, cut_to_limits
-from rlacd.merge import drop_slivers, grow_cover
+from rlacd.merge import grow_cover
 from rlacd.options import FAST, Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -76,12 +76,11 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
         run.note_stop()
         return covered(source, options, run)
     if options.max_hulls == 1:
-        pieces = drop_slivers(root.pieces(), run)
-        return Reached(solid, options, goal, pieces if len(pieces) == 1 else [root], None, root)
+        return Reached(solid, options, goal, [root], None, root)
     decomposer = _Decomposer.of(_model(solid, root, goal, run), goal, options, run)
     states, goal, found = decomposer.decompose(goal)
     limited, most, parts = LimitedCriterion(goal, options.hull_limits, sides=sides), options.max_hulls, states[-1]
-    if most is not None and not decomposer.keeps(most, parts):
+    if most is not None and len(parts) > most:
         parts = at_most(most, decomposer.coarser(states, goal), decomposer.unite, root, limited, run)
     elif any(options.hull_limits):
         with run.stage("limit"):
@@ -206,11 +205,6 @@ class _Decomposer:
             return parts
         policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
         return self.model.transfer(parts, goal, factor, policy, self.run, merge=self.options.merge)
-
-    def keeps(self, most: int, parts: list[Part]) -> bool:
-        """Whether there are at most so many parts."""
-        with self.run.shielded():
-            return len(parts) <= most or len(drop_slivers(parts, self.run)) <= most
 
     def unite(self, first: Part, second: Part) -> Part:
         """Unite two parts, across what lies between them where they were carried from a proxy."""

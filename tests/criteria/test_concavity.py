@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from rlacd import _native
 from rlacd.criteria.concavity import Concavity
 from rlacd.errors import OptionError
+from rlacd.solid.distance import hull_union
 from tests.shapes import Closed, box, dense, depth_in, from_manifold, to_manifold
 
 TOLERANCE = 1e-3
@@ -69,9 +70,7 @@ KNOWN: dict[str, tuple[manifold3d.Manifold, float | None, float]] = {
 def test_known_answers(name: str, levels: int, turn: float) -> None:
     solid, inward, outward = KNOWN[name]
     part = from_manifold(solid.rotate((turn, 2 * turn, 0)).refine(levels))
-    lower, upper = _native.directed_hausdorff(
-        part.hull.vertices, part.hull.faces, _native.Surface(part.vertices, part.faces), 1e-4
-    )
+    lower, upper, _ = hull_union([part.hull]).over(_native.Surface(part.vertices, part.faces), 1e-4)
     assert lower <= upper <= lower + 1e-4 + 1e-12
     assert lower == pytest.approx(outward, abs=1e-4)
     measured = Concavity().measure(part, TOLERANCE)

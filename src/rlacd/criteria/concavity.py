@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut, Feasibility
+from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
 from rlacd.errors import OptionError
 from rlacd.fit import LengthFit, told_apart
 from rlacd.options import Options
@@ -87,19 +87,15 @@ class DistanceEarlyOut(EarlyOut):
         ball = 4 / 3 * math.pi * radius * radius * radius
         return np.asarray(hull_volume - volume > ball)
 
-    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
+    def is_feasible(self, filling: _native.Filling, hull: Hull) -> bool:
         """Test the solid's corners and points of the hull."""
-        return Feasibility(filling.feasibility(hull.body, self.threshold))
+        return filling.is_feasible(hull.body, self.threshold)
 
-    def feasibilities(
+    def feasible_volumes(
         self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
-    ) -> tuple[FloatArray, IntArray]:
+    ) -> FloatArray:
         """Test the solid's corners and points of the joint hulls."""
-        return filling.joint_feasibilities(hulls, pairs, self.threshold, threads)
-
-    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Whether the solid's surface reaches deeper into the hull than the threshold."""
-        return filling.comes_deeper(hull.body, self.threshold)
+        return filling.feasible_volumes(hulls, pairs, self.threshold, threads)
 
 
 @dataclass(frozen=True)

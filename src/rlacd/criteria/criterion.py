@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -104,15 +103,6 @@ class Criterion(Protocol):
         ...
 
 
-class Feasibility(IntEnum):
-    """Whether a solid clipped to a hull may meet a criterion (see native/solid/filling.hpp)."""
-
-    MAYBE = 0
-    NO = 1
-    NEVER = 2
-    """The solid clipped to any hull that contains this one does not meet it either."""
-
-
 @dataclass(frozen=True)
 class EarlyOut:
     """Early-out tests: necessary conditions for a union to meet a criterion.
@@ -143,20 +133,13 @@ class EarlyOut:
         """Whether the volumes alone show that a part, or each of several, cannot meet the criterion."""
         return np.zeros(np.shape(volume), dtype=bool)
 
-    def feasibility(self, filling: _native.Filling, hull: Hull) -> Feasibility:
+    def is_feasible(self, filling: _native.Filling, hull: Hull) -> bool:
         """Decide whether a solid clipped to a hull may meet the criterion."""
-        return Feasibility.NEVER
-
-    def feasibilities(
-        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
-    ) -> tuple[FloatArray, IntArray]:
-        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls (undefined for `NEVER`), and the `feasibility` [P] of
-        each, decided less thoroughly."""
-        return np.zeros(len(pairs)), np.full(len(pairs), int(Feasibility.NEVER), dtype=np.int32)
-
-    def forbids(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Whether the solid clipped to a hull, or to any hull that contains it, certainly fails the criterion.
-
-        Cheaper than `feasibility`; False if unknown.
-        """
         return False
+
+    def feasible_volumes(
+        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
+    ) -> FloatArray:
+        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, infinite where one is not feasible, decided less
+        thoroughly."""
+        return np.full(len(pairs), np.inf)

@@ -21,7 +21,6 @@ from rlacd.find_parts import Reached
 from rlacd.finish.overlap import Seams, overlap_parts
 from rlacd.finish.primitives import primitive_part
 from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
-from rlacd.merge import drop_slivers
 from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
@@ -111,7 +110,7 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
 
 
 def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
-    """The parts without slivers, overlapping if asked for, as primitives or with simple hulls inside the limits."""
+    """The parts, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     options, goal, limits = reached.options, reached.goal, reached.options.hull_limits
     sides = NO_SIDES if reached.root is None else resting_sides(reached.root)
     slack = ROUNDING + 8 * reached.solid.frame.resolution
@@ -128,7 +127,7 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
             simple_part(part, goal, limits, near) if options.detail == SIMPLE else part, limits, goal, near
         )
 
-    parts, seams = drop_slivers(reached.parts, run), None
+    parts, seams = reached.parts, None
     if options.overlap > 0 and reached.root is not None:
         parts, seams = overlap_parts(parts, reached.root, goal, 2 * options.overlap)
     return run.map(cleaned, parts), seams

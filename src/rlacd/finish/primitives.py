@@ -99,7 +99,9 @@ def _candidates(part: Part, hull: Hull, solid: Component | None, criterion: Crit
     early_out = criterion.early_out
     if not early_out.excludes(part.volume, hull.volume):
         yield part.with_hull(hull)
-    if solid is None or criterion.obstacles is not None or early_out.forbids(solid.filling, hull):
+    if solid is None or criterion.obstacles is not None:
+        return
+    if early_out.looks_inside and not early_out.is_feasible(solid.filling, hull):
         return
     inside = solid.inside(hull)
     if inside.volume >= (1 - LOST_VOLUME) * part.volume and not early_out.excludes(inside.volume, hull.volume):

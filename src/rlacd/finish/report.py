@@ -18,7 +18,6 @@ from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
 from rlacd.fit import RESOLVED, length_unit, told_apart
-from rlacd.merge.slivers import is_sliver
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
@@ -28,7 +27,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import Place, hull_distances, hull_union
 from rlacd.solid.frame import HALF_THICKNESS, Frame
-from rlacd.solid.hull import Hull
+from rlacd.solid.hull import Hull, is_sliver
 from rlacd.solid.mass import joint_mass, mass_of
 from rlacd.solid.solid import Solid
 

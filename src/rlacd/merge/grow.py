@@ -12,14 +12,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import is_alone, merge_parts
-from rlacd.merge.slivers import drop_slivers
 from rlacd.run import Run, work
-from rlacd.solid.arrays import FloatArray, heights
-from rlacd.solid.component import DENSE, ClippedPart, Component, Part, Plane
-from rlacd.solid.hull import TOLERANCE, Hull
+from rlacd.solid.arrays import BoolArray, FloatArray, heights
+from rlacd.solid.component import DENSE, ClippedPart, Component, Part, Plane, is_thin
+from rlacd.solid.distance import hull_union
+from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.hull import TOLERANCE, Hull, is_sliver
 
 CROSSING = 1 / 3
 """Bodies cross where at least this share of the parts share material with others."""
@@ -35,6 +37,10 @@ LEAST = 0.5
 WORTH = 0.85
 """Keep grown parts only if they number at most this share of the merged ones: later stages save more of parts that were
 cut less. Of the 56 merged parts of a pot's proxy, 41 are left on the solid; of 55 grown ones, 47."""
+
+
+SLIVER_LOSS = 2 * HALF_THICKNESS
+"""A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
 
 
 def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
@@ -153,3 +159,38 @@ def _divided(components: Sequence[Component], spaces: FloatArray) -> tuple[list[
             inside.append(left)
             outside += cut_off
     return inside, outside, units
+
+
+def drop_slivers(parts: list[Part], run: Run) -> list[Part]:
+    """Drop slivers, which growing leaves beside grown hulls, where the other hulls cover them."""
+    thin = run.map(lambda part: is_thin(part) or is_sliver(part.hull), parts)
+    boxes = np.array([part.box for part in parts])
+    kept = np.ones(len(parts), dtype=bool)
+    stood_in: dict[int, BoolArray] = {}  # the hulls near each sliver when it was dropped
+
+    def is_missed(own: int) -> bool:
+        others = stood_in[own] = kept & _near(boxes, boxes[own])
+        near = [parts[i].hull for i in np.flatnonzero(others)]
+        return not near or _misses(hull_union(near, run.threads), parts[own], run.threads)
+
+    smallest_first = sorted(np.flatnonzero(thin).tolist(), key=lambda i: parts[i].hull.volume)
+    for own in smallest_first:
+        kept[own] = False
+        kept[own] = is_missed(own)
+    for own in reversed(smallest_first):  # in a stack of slivers, each would cover the next
+        if not kept[own] and (stood_in[own] & ~kept).any():
+            kept[own] = is_missed(own)
+    return [parts[i] for i in np.flatnonzero(kept)]
+
+
+def _misses(union: _native.HullUnion, sliver: Part, threads: int) -> bool:
+    """Whether a point of a sliver is too far from the other hulls; corners, tested first, decide most."""
+    if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > SLIVER_LOSS).any():
+        return True
+    return union.under(sliver.vertices, sliver.faces, SLIVER_LOSS / 4, threads)[1] > SLIVER_LOSS
+
+
+def _near(boxes: FloatArray, sliver: FloatArray) -> BoolArray:
+    """Which of the boxes [N, 2, 3] are within `SLIVER_LOSS` of a sliver's."""
+    gap = np.maximum(boxes[:, 0] - sliver[1], sliver[0] - boxes[:, 1])
+    return np.asarray((gap <= SLIVER_LOSS).all(axis=1))

@@ -13,7 +13,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd._native import Boxes, Stopped
-from rlacd.criteria.criterion import Criterion, Feasibility
+from rlacd.criteria.criterion import Criterion
 from rlacd.merge.numbered import NumberedParts
 from rlacd.run import Begun, Run, Work, work
 from rlacd.solid.arrays import FloatArray, IntArray
@@ -143,8 +143,8 @@ class _Bridged(_Adjoining):
             vertices, _, filled = alive.sums(some)
             if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
                 break
-            volumes, verdicts = early_out.feasibilities(self.solid.filling, alive.bodies, some, run.threads)
-            may = verdicts == Feasibility.MAYBE
+            volumes = early_out.feasible_volumes(self.solid.filling, alive.bodies, some, run.threads)
+            may = np.isfinite(volumes)
             found += _priced(some[may], (volumes - filled)[may])
         return found
 
@@ -152,7 +152,7 @@ class _Bridged(_Adjoining):
         """Test the joint hull more thoroughly, and clip the solid to it."""
         hull = Hull.around(first.hull, second.hull)
         price = work.testing(len(hull.vertices))
-        if self.criterion.early_out.feasibility(self.solid.filling, hull) is not Feasibility.MAYBE:
+        if not self.criterion.early_out.is_feasible(self.solid.filling, hull):
             return None, price
         union: Part | None = _clipped(first, second, hull, self.criterion, self.solid)
         if union is not None and self.confirmed is not None:
@@ -258,12 +258,11 @@ class Uniter:
         vertices = sum(len(part.hull.vertices) + len(hulls[i].vertices) for i in near)
         if not self.account.pay(work.screening(vertices, len(near))):
             return []
-        if not early_out.looks_inside:
+        if early_out.looks_inside:
+            volumes = early_out.feasible_volumes(self.solid.filling, bodies, pairs, 1)
+        else:
             volumes = _native.joint_hull_volumes(bodies, pairs, 1)
-            return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True)]
-        volumes, verdicts = early_out.feasibilities(self.solid.filling, bodies, pairs, 1)
-        found = zip(near, volumes.tolist(), verdicts.tolist(), strict=True)
-        return [(i - 1, volume) for i, volume, verdict in found if verdict == Feasibility.MAYBE]
+        return [(i - 1, volume) for i, volume in zip(near, volumes.tolist(), strict=True) if math.isfinite(volume)]
 
     def unite_feasible(self, first: Part, second: Part) -> Part | None:
         """Unite two parts that may be united; None if no union meets the criterion after all."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import drop_slivers, grow_cover
+from rlacd.merge import grow_cover
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import Greedy
 from rlacd.report import SearchSummary
@@ -78,15 +78,13 @@ def search(
         seed and the steps, and on time only if `seconds` or the run ends the search.
     summary : SearchSummary
     """
-    # Slivers are dropped at the end anyway; if they counted here, a level could end with more hulls than the last.
-    parts = drop_slivers(parts, run)
     begin, first_pass = time.perf_counter(), run.work.done
     allowed, bounded = math.inf, seconds is None and steps is None
     if seconds is None:
         allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
         if steps is not None:
             allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
-    state = _Search(context, parts, run, first_pass)
+    state = _Search(context, list(parts), run, first_pass)
     most = math.inf if steps is None else steps
     with run.limited(allowed, math.inf if seconds is None else seconds):
         state.go_on(most)

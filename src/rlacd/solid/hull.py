@@ -79,6 +79,14 @@ def keeps(hull: Hull, limits: HullLimits) -> bool:
     return limits.allow(len(hull.vertices), len(hull.faces))
 
 
+def is_sliver(hull: Hull, radius: float = SLIVER_RADIUS) -> bool:
+    """Whether the radius of the hull's inscribed ball is less than `radius` times its largest extent."""
+    least = radius * float(np.ptp(hull.vertices, axis=0).max())
+    # A convex body's inradius lies between volume / area and three times that.
+    ratio = hull.volume / _native.mesh_area(hull.vertices, hull.faces)
+    return ratio <= least and (3 * ratio < least or not _native.holds_ball(hull.vertices, hull.faces, least))
+
+
 def limit_hull(
     hull: Hull,
     limits: HullLimits = NO_LIMITS,
