@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import re
 import statistics
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import click
@@ -15,7 +17,7 @@ import click
 from benchmarks.cli import check_methods, experiment, words
 from benchmarks.methods import make_method
 from benchmarks.runner import Bench
-from benchmarks.store import Row
+from benchmarks.store import Row, Task
 from benchmarks.tables import Page, Table, failures, managed, mean, ratio_of
 
 METHODS = "coacd,vhacd,fast,default"
@@ -26,11 +28,18 @@ REACH = 0.055
 PACKAGES = {"coacd": "coacd", "vhacd": "vhacdx"}
 """Other tools' packages."""
 
+AS_MANY = "vhacd, as many"
+"""V-HACD with as many hulls as the first method left of each mesh."""
+
+SIZES = (0, 1_000, 10_000, math.inf)
+"""Triangles of the input between which the classes of size lie."""
+
 
 @experiment(check_methods)
 @click.option("--methods", default=METHODS, show_default=True, help="With commas between; the first is the reference.")
 @click.option("--threshold", "-t", type=float, help="Of all that have one; default: each tool's own.")
-def app(bench: Bench, methods: str, threshold: float | None) -> Page:
+@click.option("--as-many", is_flag=True, help="V-HACD once more, with as many hulls as the first left of each mesh.")
+def app(bench: Bench, methods: str, threshold: float | None, as_many: bool) -> Page:
     """Compare methods: number of hulls, how tight they are, broken promises, time.
 
     The first table is that of README and docs/benchmarks.md. NAME@SETTING sets a method's threshold, or whatever it has
@@ -49,7 +58,11 @@ def app(bench: Bench, methods: str, threshold: float | None) -> Page:
         given = threshold if method.setting == "threshold" else None
         settings[word] = (name, float(own) if own else method.default if given is None else given)
     groups = bench.run_together(settings)
-    blocks = [published(groups), about(bench, groups), comparison(groups), mesh_by_mesh(groups)]
+    if as_many:
+        first, rows = next(iter(groups.items()))
+        tasks = [Task(row["mesh"], "vhacd", row["parts"]) for row in rows if "error" not in row]
+        groups = {first: rows, AS_MANY: bench.run_tasks(tasks)} | groups
+    blocks = [published(groups), by_size(groups), about(bench, groups), comparison(groups), mesh_by_mesh(groups)]
     return Page("Side by side", [*blocks, failures(row for rows in groups.values() for row in rows)])
 
 
@@ -88,10 +101,10 @@ def machine() -> str:
 
 def published(groups: Mapping[str, Sequence[Row]]) -> Table:
     """The table of README, with the best of what is counted in bold."""
-    good = [rows for rows in managed(groups).values() if rows]
+    titles, good = _titles(groups), [rows for rows in managed(groups).values() if rows]
     if not good:
         return Table(["no mesh that all managed", *groups], [])
-    first = _title(good[0][0], versioned=False)
+    first = titles[0].partition(" 1.")[0]
     numbers: dict[str, tuple[Callable[[Sequence[Row]], float], str, Callable[[list[float]], float] | None]] = {
         "hulls": (lambda rows: sum(row["parts"] for row in rows), ",.0f", min),
         "triangles per mesh": (lambda rows: mean(rows, "faces"), ",.0f", min),
@@ -112,13 +125,30 @@ def published(groups: Mapping[str, Sequence[Row]]) -> Table:
     thresholds = {row["setting"] for rows in good for row in rows if row["exceeding"] is not None}
     told = f", threshold {min(thresholds):g}" if len(thresholds) == 1 else ""
     lines.append(["the threshold", *map(_certainty, good)])
-    return Table([f"{len(good[0])} meshes{told}", *(_title(rows[0]) for rows in good)], lines)
+    return Table([f"{len(good[0])} meshes{told}", *titles], lines)
 
 
-def _title(row: Row, versioned: bool = True) -> str:
-    tool = f"CoACD {row['version']}" if versioned else "CoACD"
-    titles = {"coacd": tool, "vhacd": "V-HACD 4", "default": "rlacd (default)"}
-    return titles.get(row["method"], f"rlacd `{row['method']}`")
+def by_size(groups: Mapping[str, Sequence[Row]]) -> Table:
+    """Hulls and speed on the meshes of each class of size."""
+    lines = []
+    for least, most in pairwise(SIZES):
+        some = [[row for row in rows if least <= row["input_faces"] < most] for rows in managed(groups).values()]
+        if some and some[0]:
+            cells = (f"{sum(row['parts'] for row in rows):,}; {_times_as_fast(rows, some[0]):.3g}" for rows in some)
+            lines.append([f"{least:,} to {most:,}" if most < math.inf else f"from {least:,}", len(some[0]), *cells])
+    note = "Hulls; times as fast as the first (CPU, median)."
+    return Table(["triangles", "meshes", *_titles(groups)], lines, note)
+
+
+def _titles(groups: Mapping[str, Sequence[Row]]) -> list[str]:
+    version = next((row["version"] for row in groups.get("coacd", ()) if "version" in row), "")
+    known = {
+        "coacd": f"CoACD {version}",
+        "vhacd": "V-HACD 4",
+        AS_MANY: "V-HACD 4, as many",
+        "default": "rlacd (default)",
+    }
+    return [known.get(label, f"rlacd `{label}`") for label in groups]
 
 
 def _times_as_fast(rows: Sequence[Row], reference: Sequence[Row]) -> float:
@@ -181,7 +211,8 @@ def _column(rows: Sequence[Row], reference: Sequence[Row]) -> dict[str, str]:
 
 def mesh_by_mesh(groups: Mapping[str, Sequence[Row]]) -> Table:
     """Hulls, distance and CPU seconds of each method on each mesh."""
-    lines = [[rows[0]["mesh"], *map(_cell, rows)] for rows in zip(*groups.values(), strict=True)]
+    found = [{row["mesh"]: _cell(row) for row in rows} for rows in groups.values()]
+    lines = [[mesh, *(cells.get(mesh, "–") for cells in found)] for mesh in found[0]]
     return Table(["mesh", *groups], lines, "Hulls / distance / CPU seconds.")
 
 

@@ -1,7 +1,8 @@
-"""What the site is made from at each build: the commands' help, a schema, the tests of the promises, a mesh to turn."""
+"""What the site is made from at each build: commands' help, a schema, the promises, the notebook, a mesh to turn."""
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -11,10 +12,12 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put the commands, the tests that hold the promises, and the README's table into the pages that ask for them."""
+    """Put the README's table, the notebook, the commands and the promises' tests into the pages that ask for them."""
     if page.file.src_uri == "index.md":
         readme = (ROOT / "README.md").read_text(encoding="utf-8")
         return markdown.replace("<!-- table -->", re.findall(r"(?:^\|.*\n)+", readme, re.MULTILINE)[0])
+    if page.file.src_uri == "quickstart.md":
+        return markdown.replace("<!-- notebook -->", _notebook(ROOT / "examples" / "quickstart.ipynb"))
     if page.file.src_uri == "reference/commands.md":
         return markdown.replace("<!-- commands -->", _commands())
     if page.file.src_uri == "promises.md":
@@ -46,6 +49,21 @@ def on_post_build(config: Any) -> None:
     mesh = Path(config.site_dir) / "gallery" / "chair.glb"
     sample().export(mesh)
     rlacd.decompose(mesh).save_report(mesh.with_suffix(".html"), up="y")
+
+
+def _notebook(path: Path) -> str:
+    """The text, the code and what it gave."""
+    parts = []
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        for output in cell.get("outputs", []):
+            if "text" in output:
+                parts.append(f"```text\n{''.join(output['text'])}```")
+            else:
+                png = "".join(output["data"]["image/png"].split())
+                parts.append(f'<img src="data:image/png;base64,{png}" alt="What the cell draws">')
+    return "\n\n".join(parts)
 
 
 def _commands() -> str:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import functools
 import inspect
+import json
 import re
 import shlex
 import shutil
 import subprocess
 import sys
+from ctypes.util import find_library
 from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
@@ -50,6 +52,23 @@ def test_the_script_that_trains_on_one_mesh_falls_from_random_planes_to_greedys(
     own = [point["validation_own_plane"] for point in points]
     assert min(own) <= 1 < own[0] < points[0]["validation_random"]
     assert points[-1]["seconds"] < 300
+
+
+@pytest.mark.slow
+def test_the_notebook_holds_a_ball_and_stores_what_it_prints(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in ("nbclient", "ipykernel", "mujoco", "mitsuba", "PIL"):
+        pytest.importorskip(package)
+    if not find_library("EGL"):
+        pytest.skip("MuJoCo draws without a display by EGL, which is not installed")
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    path = ROOT / "examples" / "quickstart.ipynb"
+    stored = [cell.get("outputs", []) for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]]
+    notebook = import_module("nbformat").read(path, as_version=4)
+    import_module("nbclient").NotebookClient(notebook, resources={"metadata": {"path": tmp_path}}).execute()
+    printed = ["".join(part.get("text", "") for part in cell.get("outputs", [])) for cell in notebook.cells]
+    assert ["".join("".join(part.get("text", "")) for part in cell) for cell in stored] == printed
+    assert sum("image/png" in part.get("data", {}) for cell in stored for part in cell) == 2
+    assert path.stat().st_size < 300_000, "small enough to show on a code host"
 
 
 @functools.cache

@@ -46,6 +46,8 @@ def test_a_command_does_not_wait_for_libraries_that_it_does_not_use(tmp_path: Pa
         "networkx",
         "shapely",
         "cascadio",
+        "fcl",
+        "jsonschema",
         "lxml",
         "rich",
         "onnxruntime",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -12,7 +13,7 @@ from typing import NoReturn
 
 from rlacd.cli.exit_codes import INTERRUPTED, ExitCode, leave, say
 
-NOT_OURS = ("scipy", "shapely", "rtree", "cascadio", "embreex", "svg")
+NOT_OURS = ("scipy", "shapely", "rtree", "cascadio", "embreex", "fcl", "svg")
 """What trimesh uses where it is installed, and rlacd never needs: half of a command's time."""
 
 NEEDLESS = {
@@ -24,6 +25,7 @@ NEEDLESS = {
 
 def import_trimesh(mesh: Path) -> None:
     """Import trimesh with what it needs to read a file like this; for commands that end with this mesh."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start threads for products that nothing here uses
     unused = (*NOT_OURS, *NEEDLESS.get(mesh.suffix.lower(), ()))
     hidden = [name for name in unused if name not in sys.modules]
     sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]

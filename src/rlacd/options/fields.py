@@ -254,7 +254,8 @@ def check_fields(options: Any) -> None:
         A value is of the wrong type or out of its range.
     """
     for field in dataclasses.fields(options):
-        object.__setattr__(options, field.name, checked(options, field.name, getattr(options, field.name)))
+        value = _plain(field.metadata["option"], field.name, getattr(options, field.name))
+        object.__setattr__(options, field.name, value)
 
 
 def checked(options: Any, name: str, value: Any) -> Any:
@@ -265,7 +266,10 @@ def checked(options: Any, name: str, value: Any) -> Any:
     OptionError
         It is of the wrong type or out of its range.
     """
-    known = about(options, name)
+    return _plain(about(options, name), name, value)
+
+
+def _plain(known: About, name: str, value: Any) -> Any:
     return None if value is None and known.optional else read(known.kind, name, value)
 
 

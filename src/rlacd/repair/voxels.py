@@ -156,9 +156,10 @@ def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, Int64Array]:
     steps = shape[1] * shape[2], shape[2], 1
     squares = []
     for axis in range(3):
-        ends = np.diff(solid.astype(np.int8), axis=axis, prepend=0, append=0)
-        for outward in (-1, 1):  # -1: the set ends there, so its squares face up; 1: it begins
-            at = np.unravel_index(np.flatnonzero(ends == outward), ends.shape)
+        pad = np.eye(3, dtype=int)[axis]
+        before, after = np.pad(solid, [(n, 0) for n in pad]), np.pad(solid, [(0, n) for n in pad])
+        for outward, here in ((-1, before > after), (1, after > before)):  # the set ends: squares face up; it begins
+            at = np.unravel_index(np.flatnonzero(here), here.shape)
             corner, along = np.ravel_multi_index(at, shape), (steps[(axis + 1) % 3], steps[(axis + 2) % 3])
             loop = np.array([(0, 0), (1, 0), (1, 1), (0, 1)][::-outward]) @ along
             squares.append(corner[:, None] + loop)
