@@ -5,7 +5,7 @@ Lengths are in the frame, where the longest side of the input is 2; those ending
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -289,6 +289,12 @@ class Report:
     def schema(cls) -> dict[str, Any]:
         """Get the JSON schema (draft 2020-12) of the report as a file."""
         return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema_of(cls)}
+
+
+def sizes_of(hulls: Sequence[Any]) -> dict[str, Any]:
+    """How many hulls there are, and how many triangles and vertices they have."""
+    faces, vertices = (sum(len(getattr(hull, what)) for hull in hulls) for what in ("faces", "vertices"))
+    return {"parts": len(hulls), "faces": faces, "vertices": vertices}
 
 
 def _length(length: float, scale: float) -> str:

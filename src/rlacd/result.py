@@ -14,7 +14,7 @@ from rlacd.fit import length_unit
 from rlacd.options.fields import checked
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.output import Axis, OutputOptions
-from rlacd.report import Report
+from rlacd.report import Report, sizes_of
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.mass import mass_of
@@ -46,10 +46,9 @@ class Result:
             Other fields of `rlacd.Report`.
         """
         whole = trimesh.util.concatenate([trimesh.Trimesh(), *hulls])
-        counts = {"parts": len(hulls), "faces": len(whole.faces), "vertices": len(whole.vertices)}
         mass = mass_of(whole.vertices, whole.faces, Frame(np.zeros(3), 1.0))
         scale = Frame.of(np.concatenate([whole.vertices, source.vertices])).scale if hulls else 1.0
-        return cls(hulls, Report(**{**counts, "scale": scale, "mass": mass, **known}), source)
+        return cls(hulls, Report(**{**sizes_of(hulls), "scale": scale, "mass": mass, **known}), source)
 
     def up_axis(self, up: str | None = None) -> Axis:
         """The axis that points up: as given, or by the convention of the input's format."""

@@ -75,15 +75,12 @@ class Tradeoff:
 
     def __str__(self) -> str:
         head = ("", self.option, "hulls", "triangles", "farthest", "volume added")
+        marks = ["*" if i == self.pick else "" for i in range(len(self.choices))]
         lines = [
-            ("*" if i == self.pick else "", f"{c.threshold:.4g}", c.hulls, c.triangles, f"{c.farthest:.4g}", _share(c))
-            for i, c in enumerate(self.choices)
+            (mark, f"{c.threshold:.4g}", c.hulls, c.triangles, f"{c.farthest:.4g}", f"{100 * c.added:.3g} %")
+            for mark, c in zip(marks, self.choices, strict=True)
         ]
         return "\n".join("{:1} {:>16} {:>6} {:>10} {:>9} {:>13}".format(*line) for line in (head, *lines))
-
-
-def _share(choice: Choice) -> str:
-    return f"{100 * choice.added:.3g} %"
 
 
 def tradeoff(

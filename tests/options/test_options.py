@@ -226,8 +226,6 @@ def test_none_is_as_good_as_not_given() -> None:
         (rlacd.decompose, "radius_abs", "It belongs to NavigableSpace(radius_abs=)."),
         (rlacd.decompose, "density", "It belongs to .save(density=)."),
         (rlacd.decompose, "qwx", "'qwx'."),
-        (coacd.run_coacd, "max_hulls", "Did you mean 'max_convex_hull'?"),
-        (vhacd.compute_vhacd, "max_convex_hulls", "Did you mean 'maxConvexHulls'?"),
     ],
 )
 def test_an_option_that_is_unknown_is_told_with_the_one_that_was_meant(call: Any, name: str, says: str) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.view.server import UPLOADS, ViewServer
+from rlacd.view.server import ViewServer
 from tests.view.viewing import PATIENCE, ask, open_viewer, port_of
 
 LONGEST_LINE = 1 << 16
@@ -109,13 +109,10 @@ def test_what_is_too_long_or_no_request_is_refused(viewer: ViewServer, request_:
 
 def test_slow_uploads_keep_nothing_else_waiting(viewer: ViewServer) -> None:
     with ExitStack() as stack:
-        for _ in range(UPLOADS):
+        for _ in range(8):
             stack.enter_context(connected(viewer)).sendall(upload(1000) + b"x")
-        wait_until(lambda: viewer.answers == UPLOADS)
+        wait_until(lambda: viewer.answers == 8)
         assert ask(viewer, "GET", "/scene").status == 200
-        with connected(viewer) as one_more:
-            one_more.sendall(upload(1000))
-            assert status_of(all_of(one_more)) == 503
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 from rlacd.clear.mend import Cleared
 from rlacd.clear.motion import Motion
@@ -40,10 +40,6 @@ class LinkPair:
     def kind(self) -> Contact:
         """As in the matrix: adjacent comes first; loose links sometimes touch."""
         return "adjacent" if self.adjacent else "sometimes" if self.loose else self.contact
-
-    def as_plain(self) -> dict[str, Any]:
-        """Plain values."""
-        return asdict(self)
 
 
 def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:

@@ -23,7 +23,7 @@ def warn_unused(function: Callable[..., Any], given: Mapping[str, Any], reasons:
         default, known = inspect.signature(function).parameters[name].default, (function.__name__, name)
         if not _same(given[name], default) and known not in _WARNED:
             _WARNED.add(known)
-            warnings.warn(f"{function.__name__}: rlacd ignores {name}: {reason}.", UnusedOptionWarning, stacklevel=4)
+            warnings.warn(f"{function.__name__}: rlacd ignores {name}: {reason}.", UnusedOptionWarning, stacklevel=3)
 
 
 def _same(given: Any, default: Any) -> bool:

@@ -21,7 +21,6 @@ from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.options import LENGTHS
 from rlacd.options.fields import flag, integer, number, one_of, read
-from rlacd.options.keywords import suggesting
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 
@@ -45,7 +44,6 @@ class Mesh:
         self.indices = np.ascontiguousarray(indices, dtype=np.int32).reshape(-1, 3)
 
 
-@suggesting()
 def run_coacd(
     mesh: Any,
     threshold: float = 0.05,

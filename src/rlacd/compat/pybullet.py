@@ -15,7 +15,6 @@ from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.io.write.atomic import write_file
 from rlacd.options.fields import integer, number, read
-from rlacd.options.keywords import suggesting
 
 __all__ = ["vhacd"]
 
@@ -30,7 +29,6 @@ _UNUSED = {
 }
 
 
-@suggesting()
 def vhacd(
     fileNameIn: str,
     fileNameOut: str,

@@ -14,7 +14,6 @@ from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshDataError
 from rlacd.options.fields import flag, integer, number, read
-from rlacd.options.keywords import suggesting
 
 __all__ = ["compute_vhacd"]
 
@@ -28,7 +27,6 @@ _UNUSED = {
 }
 
 
-@suggesting()
 def compute_vhacd(
     points: npt.ArrayLike,
     faces: npt.ArrayLike,

@@ -21,7 +21,7 @@ from rlacd.fit import RESOLVED, length_unit, told_apart
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
-from rlacd.report import Avoids, Hausdorff, Hole, NodeParts, Overlap, Point, Report, ShortSeam
+from rlacd.report import Avoids, Hausdorff, Hole, NodeParts, Overlap, Point, Report, ShortSeam, sizes_of
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
@@ -98,9 +98,7 @@ def make_report(
             options=options.as_plain(),
             complete=run.stopped_by is None,
             stopped_by=run.stopped_by,
-            parts=len(hulls),
-            faces=sum(len(hull.faces) for hull in hulls),
-            vertices=sum(len(hull.vertices) for hull in hulls),
+            **sizes_of(hulls),
             primitives=_primitives(parts) if options.primitives else None,
             overlap=_overlap(seams, solid.frame) if options.overlap > 0 else None,
             **summary.entries,
@@ -182,9 +180,7 @@ def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
         options=first.options,
         complete=stopped.complete,
         stopped_by=stopped.stopped_by,
-        parts=sum(report.parts for report in each),
-        faces=sum(report.faces for report in each),
-        vertices=sum(report.vertices for report in each),
+        **{what: sum(getattr(report, what) for report in each) for what in ("parts", "faces", "vertices")},
         primitives=_added([report.primitives for report in each]),
         overlap=_joint_overlap(each),
         **_joint_fit(each, factors),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import functools
 import inspect
 import re
 import textwrap
@@ -28,26 +27,6 @@ def unknown_option(function: str, name: str, known: Collection[str], elsewhere: 
     places = [place for options in elsewhere if (place := stated_in(options, name))]
     hint = f" It belongs to {places[0]}." if places else meant(name, known)
     return TypeError(f"{function}() got an unexpected keyword argument {name!r}.{hint}")
-
-
-def suggesting(
-    *elsewhere: type,
-) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:
-    """Let a function name the argument that was meant by an unknown one, as Python 3.13 does."""
-
-    def completed(function: Callable[Given, Returned]) -> Callable[Given, Returned]:
-        known = inspect.signature(function).parameters
-
-        @functools.wraps(function)
-        def call(*args: Given.args, **given: Given.kwargs) -> Returned:
-            for name in given:
-                if name not in known:
-                    raise unknown_option(function.__name__, name, known, elsewhere)
-            return function(*args, **given)
-
-        return call
-
-    return completed
 
 
 def taking(options: type[Any], *others: type[Any]) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:

@@ -13,8 +13,8 @@
 
 It listens on the loopback address alone. Pages of other sites are kept out: a request's Host header must name this
 server, which defeats DNS rebinding, and the request must not come from a page of another origin. Memory is bounded:
-`UPLOADS` of at most `LARGEST_MESH` bytes at a time, one decomposition with its scene and heat map, and `HEAVY` costly
-answers at a time.
+uploads of at most `LARGEST_MESH` bytes, one decomposition with its scene and heat map, and `HEAVY` costly answers at a
+time.
 """
 
 from __future__ import annotations
@@ -55,7 +55,6 @@ USUAL_PORT = 8765
 LONGEST_REQUEST = 10_000  # bytes of JSON
 LARGEST_MESH = 2**28  # bytes of an uploaded file
 HEAVY = 2  # concurrent scenes, and downloads: answers that take much memory and time
-UPLOADS = 4  # concurrent uploads, each in memory; slow ones keep nothing else waiting
 
 HARDENING = {
     "Cache-Control": "no-store",
@@ -84,7 +83,6 @@ class ViewServer(ThreadingHTTPServer):
         self.session, self.subject, self.read = session, subject, read
         self.answers, self._changed = 0, threading.Condition()
         self.heavy, self.downloads = threading.BoundedSemaphore(HEAVY), threading.BoundedSemaphore(HEAVY)
-        self.uploads = threading.BoundedSemaphore(UPLOADS)
         self.controls = options
         self._made: dict[str, tuple[int, bytes]] = {}
         self._making, self._opening = threading.Lock(), threading.Lock()
@@ -267,12 +265,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _open(self, query: dict[str, list[str]]) -> None:
         if self.headers.get_content_type() != "application/octet-stream":
             raise _Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send the mesh as application/octet-stream.")
-        if not self.server.uploads.acquire(blocking=False):
-            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, "too many meshes are being opened; try again.")
-        try:
-            content = self._read(LARGEST_MESH)
-        finally:
-            self.server.uploads.release()
+        content = self._read(LARGEST_MESH)
         with self.server.heavy:
             self.server.open_mesh(query.get("name", [""])[0], content)
 

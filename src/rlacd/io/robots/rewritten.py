@@ -17,6 +17,7 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError
 from rlacd.io.robots.decomposed import Checked
 from rlacd.io.robots.robot import Body, Collider, Results, Robot, Written
+from rlacd.plain_json import as_plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,7 @@ class Rewritten:
                 for link in self.links
             ],
             "samples": self.samples,
-            "pairs": [pair.as_plain() for pair in self.pairs],
+            "pairs": as_plain([*self.pairs]),
             "warnings": self.warnings,
         }
 
