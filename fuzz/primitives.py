@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
+import mapbox_earcut
 import numpy as np
 import numpy.typing as npt
-from manifold3d import triangulate
 from trimesh import creation
 
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -79,7 +79,11 @@ def profile(random: Random) -> Triangles:
 def extruded(outline: Floats) -> Triangles:
     """The prism of height 1 over a polygon [N, 2], counter-clockwise."""
     n = len(outline)
-    cap = triangulate([outline]).astype(np.int64)
+    flat = mapbox_earcut.triangulate_float64(np.ascontiguousarray(outline), np.array([n], dtype=np.uint32))
+    cap = np.array(flat, dtype=np.int64).reshape(-1, 3)
+    a, b, c = (outline[cap[:, k]] for k in range(3))
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    cap[turned] = cap[turned][:, ::-1]
     here = np.arange(n)
     there = (here + 1) % n
     sides = np.concatenate([np.stack([here, there, there + n], 1), np.stack([here, there + n, here + n], 1)])

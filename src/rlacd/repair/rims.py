@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import mapbox_earcut
 import numpy as np
-from manifold3d import triangulate
 
 from rlacd._native import angles, components, least_bent, long_normals, poll_stop, principal_axes_of_points
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
@@ -288,10 +288,13 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) 
     if len(points) <= _EXACT_LOOP:
         return least_bent(points, beside, taken)[:, ::-1].astype(np.int64)
     flat = heights(points - points.mean(axis=0), principal_axes_of_points(points)[:2])
-    x, y = flat.T
-    if (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() < 0:  # clockwise
-        flat = flat[:, ::-1]
-    return np.ascontiguousarray(triangulate([flat])[:, ::-1], dtype=np.int64)
+    ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
+    if len(ears) != len(points) - 2:  # the loop's projection crosses itself: no plane fits
+        return np.array([(0, i + 1, i) for i in range(1, len(points) - 1)], dtype=np.int64)
+    triangles: Int64Array = ears.astype(np.int64)
+    a, b, c = triangles.T
+    along = ((b - a) % len(points) < (c - a) % len(points)).sum() * 2 > len(triangles)
+    return triangles[:, ::-1] if along else triangles
 
 
 def smooth_share(soup: Soup, rims: Rims, caps: Int64Array, owner: Int64Array) -> FloatArray:
