@@ -5,6 +5,7 @@ Lengths are in the frame where the input's bounding box is centred and its longe
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -59,7 +60,7 @@ class Metrics:
         The larger of both, D_h.
     concavity : float
         Largest CoACD concavity of a part, decided by bounds and not by samples; a part is the intersection of the
-        repaired input with a hull.
+        repaired input with a hull, or with the hull grown by `TOLERANCE`, whichever is less concave.
     exceeding : int or None
         Parts that exceed the requested concavity by more than 0.001; None if none was requested.
     volume : float
@@ -157,18 +158,15 @@ def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> t
     """The largest concavity of a part, the number of parts above the promised one, and the number of empty hulls."""
     worst, exceeding, empty = 0.0, 0, 0
     for hull in hulls:
-        share = solid.manifold ^ to_manifold(hull.vertices, hull.faces.astype(np.int64))
-        if share.is_empty() or share.volume() < NOTHING:
+        part = _part(solid, hull)
+        if part is None:
             empty += 1
             continue
-        # A mesh may overlap itself: a piece that lies within another has no surface that could be seen.
-        mesh = Manifold.batch_boolean(share.decompose(), OpType.Add).to_mesh64()
-        vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
-        part = Part(vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32), share.volume(), hull)
+        both = [part, *filter(None, [_grown(solid, hull)])]
         # Only the maximum is needed: parts below the current worst need no exact value.
-        worst = max(worst, Concavity().measure(part, TOLERANCE, worst).value[1])
+        worst = max(worst, min(Concavity().measure(part, TOLERANCE, worst).value[1] for part in both))
         if promised is not None:
-            exceeding += not Concavity(promised + TOLERANCE).is_met(part)
+            exceeding += not any(Concavity(promised + TOLERANCE).is_met(part) for part in both)
     return worst, None if promised is None else exceeding, empty
 
 
@@ -197,3 +195,21 @@ def is_valid(vertices: FloatArray, faces: IntArray) -> bool:
     offsets = np.einsum("ij,ij->i", normals, corners[sound, 0])
     strips = (slice(i, i + 1024) for i in range(0, len(normals), 1024))
     return all((points_there @ normals[s].T - offsets[s]).max() <= CONVEX for s in strips)
+
+
+def _part(solid: Solid, hull: Hull) -> Part | None:
+    """What of the solid lies in a hull; None if nothing does."""
+    share = solid.manifold ^ to_manifold(hull.vertices, hull.faces.astype(np.int64))
+    if share.is_empty() or share.volume() < NOTHING:
+        return None
+    # A mesh may overlap itself: a piece that lies within another has no surface that could be seen.
+    mesh = Manifold.batch_boolean(share.decompose(), OpType.Add).to_mesh64()
+    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
+    return Part(vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32), share.volume(), hull)
+
+
+def _grown(solid: Solid, hull: Hull) -> Part | None:
+    """The part of a hull grown by `TOLERANCE`: a sheet on a face of the hull itself is lost to rounding."""
+    corners = TOLERANCE * np.array(list(itertools.product((-1, 1), repeat=3)))
+    grown = Hull.of((hull.vertices[:, None] + corners).reshape(-1, 3))
+    return None if grown is None else _part(solid, grown)
