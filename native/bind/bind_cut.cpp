@@ -77,6 +77,12 @@ void bind_cut(nb::module_& m) {
         "vertices"_a, "faces"_a, "x"_a, "y"_a, "z"_a, "offset"_a, "least"_a,
         "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and "
         "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
+  m.def("halve",
+        released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<const ConvexBody*>& around,
+                    double share, double least) { return columns(halve(mesh, hull, around, share, least)); }),
+        "vertices"_a, "faces"_a, "hull"_a, "around"_a, "share"_a, "least"_a,
+        "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
+        "other of the two hulls around whose volumes it would add the least to; None twice if there are no two.");
   m.def(
       "connected_pieces", released([](const Mesh& mesh, double least) {
         std::optional<std::vector<Columns>> all;

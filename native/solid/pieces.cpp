@@ -86,6 +86,19 @@ std::vector<Mesh> bodies(const Mesh& mesh) {
   return found;
 }
 
+double growth(const Mesh& hull, const std::vector<Vec3>& corners) {
+  HullBuilder joint;
+  joint.add(joined(hull.vertices, corners));
+  return joint.volume() - mesh_volume(hull);
+}
+
+Vec3 middle(const std::vector<Vec3>& points) {
+  Vec3 sum;
+  for (const Vec3 p : points) sum = sum + p;
+  const auto count = static_cast<double>(points.size());
+  return {sum.x / count, sum.y / count, sum.z / count};
+}
+
 }  // namespace
 
 std::optional<Piece> piece_of(Mesh mesh, double least) {
@@ -135,6 +148,27 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
     if (std::optional<Piece> piece = piece_of(std::move(own), least)) pieces.push_back(std::move(*piece));
   }
   return pieces;
+}
+
+std::array<std::optional<Piece>, 2> halve(const Mesh& piece, const ConvexBody& hull,
+                                          const std::vector<const ConvexBody*>& around, double share, double least) {
+  const std::vector<Vec3>& corners = hull.mesh().vertices;
+  if (around.size() < 2 || corners.empty()) return {};  // what one cannot take, it cannot take in halves
+  std::vector<std::pair<double, std::size_t>> by_growth;
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    poll_stop();
+    by_growth.emplace_back(growth(around[i]->mesh(), corners), i);
+  }
+  std::partial_sort(by_growth.begin(), by_growth.begin() + 2, by_growth.end());
+  const Vec3 along =
+      middle(around[by_growth[1].second]->mesh().vertices) - middle(around[by_growth[0].second]->mesh().vertices);
+  const double length = norm(along);
+  if (length == 0) return {};
+  const Vec3 direction = {along.x / length, along.y / length, along.z / length};
+  const auto [lowest, highest] = std::minmax_element(
+      corners.begin(), corners.end(), [&](Vec3 p, Vec3 q) { return dot(p, direction) < dot(q, direction); });
+  const double from = dot(*lowest, direction), to = dot(*highest, direction);
+  return cut(piece, direction, from + share * (to - from), least);
 }
 
 Mesh inside_all(Mesh mesh, const Mesh& hull) {

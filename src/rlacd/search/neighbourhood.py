@@ -178,9 +178,9 @@ class Neighbourhood:
             return None
         near = self._neighbours()[trial.part]
         key = operator, trial.part, near
-        self._tries[key] = self._tries.get(key, 0) + 1
+        tries = self._tries[key] = self._tries.get(key, 0) + 1
         random = np.random.default_rng(int(self._random.integers(2**32)))
-        divide = give if operator is Operator.GIVE else redistribute
+        divide = give if operator is Operator.GIVE else partial(redistribute, again=tries > 1)
         return partial(divide, parts[trial.part], [parts[i] for i in near], context.criterion, random, context.root)
 
     def _make(self, trials: Iterator[_Trial], most: float = math.inf) -> None:

@@ -64,6 +64,7 @@ def redistribute(
     random: np.random.Generator,
     solid: Component,
     run: Run,
+    again: bool = False,
 ) -> Exchange | None:
     """Divide a part among the parts around it.
 
@@ -80,13 +81,15 @@ def redistribute(
         The solid that was decomposed.
     run : Run
         Give up when it is over.
+    again : bool
+        Whether it was tried before: then pieces are halved along random axes, not between the parts that can take most.
 
     Returns
     -------
     Exchange or None
         An exchange that saves one part; None if some piece cannot be taken.
     """
-    division = _Division(around, Uniter(criterion, solid, run.work), random, run)
+    division = _Division(around, Uniter(criterion, solid, run.work), random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
     if not all(division.takers(piece) or division.may_go(piece) for piece in pieces):
         return None  # a quick test that ends most trials
@@ -110,7 +113,7 @@ def give(
     Exchange or None
         Equally many parts or one fewer; None if nothing can be taken, or what is left does not meet the criterion.
     """
-    division = _Division(around, Uniter(criterion, solid, run.work), random, run)
+    division = _Division(around, Uniter(criterion, solid, run.work), random, run, again=True)
     left = [component for member in part.members for component in division.left_of(_Piece(member))]
     if run.is_over or all(now is before for now, before in zip(division.now, around, strict=True)):
         return None
@@ -155,11 +158,14 @@ class _Piece:
 class _Division:
     """Parts that are offered pieces of another, which are halved if none can take them."""
 
-    def __init__(self, around: Sequence[Part], uniter: Uniter, random: np.random.Generator, run: Run) -> None:
+    def __init__(
+        self, around: Sequence[Part], uniter: Uniter, random: np.random.Generator, run: Run, again: bool
+    ) -> None:
         self.now = list(around)
         self._uniter = uniter
         self._random = random
         self._run = run
+        self._again = again
 
     def takers(self, piece: _Piece) -> list[int]:
         """The parts that may take a piece, those first whose hulls would grow the least."""
@@ -195,8 +201,10 @@ class _Division:
         return piece.halves
 
     def _halved(self, component: Component) -> list[Component]:
-        """Cut near the middle of the longest axis, of the frame or the piece's own; the smaller half comes first."""
+        """Cut near the middle; the smaller half comes first."""
         share = self._random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
+        if not self._again:
+            return component.halved([part.hull for part in self.now], share)
         axes = np.eye(3) if self._random.random() < 0.5 else component.principal_axes
         along = heights(component.hull.vertices, axes)
         lower, upper = along.min(axis=0), along.max(axis=0)
