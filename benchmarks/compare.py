@@ -145,7 +145,7 @@ def _titles(groups: Mapping[str, Sequence[Row]]) -> list[str]:
     known = {
         "coacd": f"CoACD {version}",
         "vhacd": "V-HACD 4",
-        AS_MANY: "V-HACD 4, as many",
+        AS_MANY: "V-HACD 4, as many hulls",
         "default": "rlacd (default)",
     }
     return [known.get(label, f"rlacd `{label}`") for label in groups]
