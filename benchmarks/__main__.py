@@ -8,7 +8,6 @@ from importlib import import_module
 COMMANDS = {
     "fetch": "brings the meshes that the numbers are of, from public repositories, with git",
     "compare": "rlacd beside CoACD, V-HACD and itself with other options; quality levels, whole corpora",
-    "damaged": "closed meshes with a share of their surface destroyed: what repair recovers",
     "late": "how late a decomposition ends after a timeout or Ctrl-C",
     "batch": "the overhead of a batch beside its meshes",
     "physics": "ten tasks in MuJoCo and PyBullet: a mug on a hook, gears that mesh, a stack; a film of two",
