@@ -266,6 +266,9 @@ def test_collada_is_read_as_it_defines(tmp_path: Path, prefix: bytes) -> None:
         np.testing.assert_array_equal(whole.vertices, solid.vertices)
         assert warned[-1] == "'#gone', which a node of box.dae places, is missing"
 
+    hand = box.replace(b"<node>", b"<node>" * 60).replace(b"</node>", b"</node>" * 60)  # the bones down to a finger
+    np.testing.assert_array_equal(load(hand)[0].vertices, solid.vertices)
+
     spread = box.replace(b'count="8" stride="3">', b'count="8" stride="4" offset="2"><param type="float"/>', 1)
     numbers = re.search(rb'<float_array id="p-a"[^>]*>([^<]*)', spread)
     rows = np.array(numbers[1].split()).reshape(-1, 3).tolist()

@@ -29,9 +29,8 @@ MOST_PLACES = 100_000
 LONGEST_NAME = 1000
 """Characters of a node's name that are kept."""
 
-DEEPEST_PART = 20
-"""Depth of nested instances: the cost of an instance grows with the cube of its depth."""
-
+DEEPEST_PART = 100
+"""Depth of nested nodes and instances: several times that of a skeleton down to its fingers."""
 
 HIDDEN = "hidden nodes were left out, with those below them"
 
