@@ -160,6 +160,7 @@ def test_counts_of_every_variant_of_off_are_held_against_the_file(tmp_path, lett
         ("a.obj", f"{OBJ}f 1 2 3.0\n".encode(), "'3.0' is no whole number"),
         ("a.obj", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "run  git lfs pull"),
         ("a.glb", b"<!DOCTYPE html><html>", "is a web page"),
+        ("a.glb", b"glTF\1\0\0\0" + bytes(20), "another version than glTF 2.0"),
         ("a.ply", BOX.export(file_type="ply").replace(b" z\n", b" w\n"), "'z' is missing"),
         ("a.obj", b"v 1 2\n" + OBJ.encode(), "a vertex of 2 coordinates"),
         *(("a.obj", f"{OBJ}f 1 2 {corner}\n".encode(), "counts from 1") for corner in ("0", "0/1", "-0", "0//1 # 1")),

@@ -54,6 +54,8 @@ def read_gltf(path: Path, content: bytes) -> Contents:
     FileNotFoundError
         A file that a buffer names is not in the folder.
     """
+    if content.startswith(MAGIC + b"\1"):
+        raise _other_version(path)
     header, rest = split(content)
     primitives = _checked(path, header)
     arrays = Arrays(header, rest, len(content), FolderFiles(path.parent).get)
@@ -81,13 +83,13 @@ def split(content: bytes) -> tuple[Json, bytes | None]:
         raise ValueError("its JSON nests too deeply") from error
     if not isinstance(header, dict):
         raise ValueError("its JSON is no object")
-    if str(header.get("asset", {}).get("version", 2)).split(".")[0] != "2":
-        raise ValueError("it is of another version than glTF 2")
     return header, rest
 
 
 def _checked(path: Path, header: Json) -> list[Json]:
-    """Refuse extensions that are not read, and more than is reasonable; returns all primitives."""
+    """Refuse another version, extensions that are not read, and more than is reasonable; returns all primitives."""
+    if str(header.get("asset", {}).get("version", 2)).split(".")[0] != "2":
+        raise _other_version(path)
     for name in header.get("extensionsRequired", []):
         if READ.fullmatch(str(name)) is None:
             raise _unread(path, name)
@@ -100,6 +102,10 @@ def _checked(path: Path, header: Json) -> list[Json]:
         if count > MOST_PLACES:
             raise MeshFileError(f"{path} has {count} {what}, more than {MOST_PLACES}: join its meshes first")
     return primitives
+
+
+def _other_version(path: Path) -> MeshFileError:
+    return MeshFileError(f"{path} is of another version than glTF 2.0, which alone is read: export it so")
 
 
 def _unread(path: Path, extension: str) -> MeshFileError:
