@@ -36,7 +36,7 @@ auto columns(std::array<std::optional<Piece>, 2> sides) {
 
 void bind_cut(nb::module_& m) {
   m.def(
-      "candidate_planes", released([](const Mesh& mesh, const Mesh& hull, int per_axis, std::size_t edges) {
+      "candidate_planes", released([](const Mesh& mesh, const ConvexBody& hull, int per_axis, std::size_t edges) {
         std::vector<Plane> planes;
         if (per_axis > 0) planes = equidistant_planes(mesh, hull, per_axis);
         for (const Plane& plane : concave_planes(mesh, hull, edges)) planes.push_back(plane);
@@ -45,7 +45,7 @@ void bind_cut(nb::module_& m) {
         for (const auto& [normal, offset] : planes) normals.push_back(normal), offsets.push_back(offset);
         return std::pair(std::move(normals), std::move(offsets));
       }),
-      "vertices"_a, "faces"_a, "hull_vertices"_a, "hull_faces"_a, "per_axis"_a, "edges"_a,
+      "vertices"_a, "faces"_a, "hull"_a, "per_axis"_a, "edges"_a,
       "Unit normals [K, 3] and offsets [K] of planes: `per_axis` along each coordinate axis and principal axis, which "
       "divide the hull's extent into equal slabs, and at most three for each of the concave edges chosen.");
   m.def(

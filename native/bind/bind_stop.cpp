@@ -1,11 +1,9 @@
 // Python bindings of Stop.
 #include <nanobind/nanobind.h>
-#include <nanobind/stl/tuple.h>
 
 #include <limits>
 
 #include "core/interrupts.hpp"
-#include "core/kernel_time.hpp"
 #include "core/stop.hpp"
 
 namespace rlacd {
@@ -56,17 +54,6 @@ void bind_stop(nb::module_& m) {
         "Exit with `code` some seconds after the second Ctrl-C from now on, whatever holds the GIL.");
   m.def("forget_interrupts", &forget_interrupts, nb::call_guard<nb::gil_scoped_release>(),
         "Let Ctrl-C be as it was before `count_interrupts`.");
-  m.def(
-      "time_kernels", [](bool on) { is_timed = on; }, nb::arg("on"),
-      "Count the time of kernels from now on, or no more.");
-  m.def(
-      "kernel_times",
-      [] {
-        const KernelTime& t = kernel_time;
-        return std::make_tuple(t.unlocked, t.in_loops, t.of_loops, t.kernels);
-      },
-      "CPU seconds of this thread's kernels so far without the GIL, those in loops shared with other threads, the "
-      "seconds of all threads in these loops, and the number of kernels.");
   m.def("poll_stop", [] { poll_stop(); }, "Raise `Stopped` if this thread's work has to stop.");
 }
 

@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "core/geometry.hpp"
-#include "core/kernel_time.hpp"
 
 namespace rlacd {
 
@@ -216,16 +215,6 @@ auto out(T own) {
   }
 }
 
-// The GIL is held while arguments and results are converted, and not in between.
-struct WithoutGil {
-  nb::gil_scoped_release released;
-  double begun = thread_seconds();
-  ~WithoutGil() {
-    kernel_time.unlocked += thread_seconds() - begun;
-    ++kernel_time.kernels;
-  }
-};
-
 template <class... P>
 struct Types {};
 
@@ -252,7 +241,7 @@ decltype(auto) call(const Kernel& kernel, Arguments& arguments, Types<P, Rest...
 template <class Kernel, class... P, class... Argument>
 auto released_with(Kernel kernel, Types<P...> parameters, const std::tuple<Argument...>*) {
   return [=](Argument... arguments) {
-    const WithoutGil unlocked;
+    const nb::gil_scoped_release unlocked;  // between the conversions of arguments and results
     auto all = std::forward_as_tuple(arguments...);
     if constexpr (std::is_void_v<decltype(call<0>(kernel, all, parameters))>)
       call<0>(kernel, all, parameters);

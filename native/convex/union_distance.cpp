@@ -201,9 +201,9 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
 
 Greatest HullUnion::over(const Bvh& surface, const Goal& goal, double gap, int threads) const {
   const Exposed found = exposed(gap, threads);
-  Greatest over = maximize_in_waves(SurfaceField(surface), found.exposed, goal, threads);
+  Greatest over = maximize(SurfaceField(surface), found.exposed, goal, threads);
   if (!found.unresolved.faces.empty()) {
-    const Greatest most = maximize_in_waves(SurfaceField(surface), found.unresolved, goal, threads);
+    const Greatest most = maximize(SurfaceField(surface), found.unresolved, goal, threads);
     if (most.upper > over.upper) over.upper = most.upper, over.at = most.at;
   }
   return over;
@@ -270,7 +270,7 @@ Greatest HullUnion::under(const Mesh& surface, const Goal& goal, int threads) co
   Gathering left;
   for (const std::vector<Polygon>& polygons : outside)
     for (const Polygon& polygon : polygons) left.add(polygon);
-  return maximize_in_waves(HullField(*this), left.take(), goal, threads);
+  return maximize(HullField(*this), left.take(), goal, threads);
 }
 
 }  // namespace rlacd

@@ -8,8 +8,6 @@
 #include <mutex>
 #include <system_error>
 
-#include "core/kernel_time.hpp"
-
 #ifndef _WIN32
 #include <pthread.h>
 #endif
@@ -24,12 +22,10 @@ class Loop {
   Loop(std::size_t count, std::size_t helpers, const std::function<void(std::size_t)>& task)
       : seats(helpers), count_(count), task_(task) {}
 
-  // Takes items until none is left; returns the CPU seconds that it took.
-  double work() {
+  // Takes items until none is left.
+  void work() {
     const ThisStop same(stop_);
-    const double begun = thread_seconds();
     for (std::size_t i; (i = next_.fetch_add(1)) < count_;) attempt([&] { task_(i); });
-    return thread_seconds() - begun;
   }
 
   // After an exception no item begins any more.
@@ -49,7 +45,6 @@ class Loop {
 
   // Guarded by the pool:
   std::size_t seats, inside = 0;  // for helpers to come; helpers at work
-  double helped = 0;              // CPU seconds of those that have left
   std::condition_variable left;
 
  private:
@@ -95,9 +90,8 @@ class Pool {
       if (--loop.seats == 0) open_.pop_front();
       ++loop.inside;
       lock.unlock();
-      const double seconds = loop.work();
+      loop.work();
       lock.lock();
-      loop.helped += seconds;
       if (--loop.inside == 0) loop.left.notify_all();
     }
   }
@@ -129,10 +123,8 @@ void share(std::size_t count, std::size_t helpers, const std::function<void(std:
   Loop loop(count, helpers, task);
   Pool& helping = pool();
   helping.open(loop);
-  const double own = loop.work();
+  loop.work();
   helping.close(loop);
-  kernel_time.in_loops += own;
-  kernel_time.of_loops += own + loop.helped;
   loop.rethrow();
 }
 

@@ -20,8 +20,7 @@ constexpr double kFold =
 constexpr double kThinnestFace = 1e-6;  // the normals of faces thinner than this are meaningless in single precision
 constexpr double kStraightOn = 0.8660254037844387;  // cosine of 30 degrees: edges that turn by less continue each other
 constexpr std::size_t kMostAtVertex = 4;            // more reflex edges at a vertex mean a rough surface, not a crease
-constexpr std::size_t kContenders = 256;            // number of edges weighed exactly; scans have thousands
-constexpr std::size_t kFacets = 64;      // number of hull facets, the largest, that bound the depth of all edges
+constexpr std::size_t kContenders = 256;            // edges that are compared with each other; scans have thousands
 constexpr double kFlat = 1e-6;           // corners this close to a face's plane are on it in single precision
 constexpr double kHair = 1e-9;           // above rounding (1e-15), below the clean-up of hulls (1e-6)
 constexpr double kSameDirection = 3e-7;  // a normal this close to a coordinate axis is replaced by it
@@ -85,42 +84,6 @@ Vec3 divided(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
 Vec3 middle(const Mesh& mesh, const ReflexEdge& edge) {
   return 0.5 * (mesh.vertices[edge.end[0]] + mesh.vertices[edge.end[1]]);
 }
-
-// Planes of a hull's facets, the largest triangles first.
-class Facets {
- public:
-  explicit Facets(const Mesh& hull) {
-    std::vector<Vec3> scaled;
-    std::vector<double> size;
-    for (const Triangle& f : hull.faces) {
-      scaled.push_back(long_normal(hull, f));
-      size.push_back(norm(scaled.back()));
-    }
-    std::vector<std::size_t> order(hull.faces.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&size](std::size_t i, std::size_t j) { return size[i] > size[j]; });
-    for (const std::size_t i : order) {
-      if (!(size[i] > 0)) break;
-      normals_.push_back(divided(scaled[i], size[i]));
-      offsets_.push_back(dot(normals_.back(), hull.vertices[hull.faces[i][0]]));
-    }
-  }
-
-  std::size_t size() const { return normals_.size(); }
-
-  // Distance of an interior point from the nearest of the first `count` planes; with all planes, from the hull's
-  // surface.
-  double depth(Vec3 p, std::size_t count) const {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < std::min(count, size()); ++i)
-      least = std::min(least, offsets_[i] - dot(normals_[i], p));
-    return std::max(least, 0.0);
-  }
-
- private:
-  std::vector<Vec3> normals_;
-  std::vector<double> offsets_;
-};
 
 // Length of the whole crease that each edge belongs to, capped at `most`.
 std::vector<double> crease_lengths(const Mesh& mesh, const std::vector<ReflexEdge>& edges, double most) {
@@ -248,36 +211,30 @@ Plane turned(const Plane& plane) {
 }
 
 // Up to `count` of a mesh's reflex edges; edges that offer no new plane are never chosen.
-std::vector<ReflexEdge> chosen_edges(const Mesh& mesh, const Mesh& hull, std::size_t count) {
+std::vector<ReflexEdge> chosen_edges(const Mesh& mesh, const ConvexBody& hull, std::size_t count) {
   const std::vector<ReflexEdge> edges = reflex_edges(mesh);
   if (edges.empty() || count == 0) return {};
-  const Box box = Box::of(hull.vertices);
-  const Facets facets(hull);
+  const Box& box = hull.box();
   const std::vector<double> length = crease_lengths(mesh, edges, max_abs(box.upper - box.lower));
-  std::vector<double> worth, bound;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    worth.push_back(edges[i].angle * length[i]);
-    bound.push_back(worth[i] * facets.depth(middle(mesh, edges[i]), kFacets));
-  }
+  std::vector<double> weight;
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    weight.push_back(edges[i].angle * length[i] * std::max(hull.planes().nearest(middle(mesh, edges[i])).depth, 0.0));
   std::vector<std::size_t> kept(edges.size());
   std::iota(kept.begin(), kept.end(), std::size_t{0});
   if (kept.size() > kContenders) {
-    std::stable_sort(kept.begin(), kept.end(), [&bound](std::size_t i, std::size_t j) { return bound[i] > bound[j]; });
+    std::stable_sort(kept.begin(), kept.end(), [&](std::size_t i, std::size_t j) { return weight[i] > weight[j]; });
     kept.resize(kContenders);
   }
   std::vector<Contender> contenders;
-  for (const std::size_t i : kept) {
-    const Vec3 centre = middle(mesh, edges[i]);
-    const double weight = facets.size() <= kFacets ? bound[i] : worth[i] * facets.depth(centre, facets.size());
-    contenders.push_back({edges[i], weight, centre, planes_of(mesh, edges[i])});
-  }
+  for (const std::size_t i : kept)
+    contenders.push_back({edges[i], weight[i], middle(mesh, edges[i]), planes_of(mesh, edges[i])});
   return spread_out(contenders, PlaneSpace(box), count);
 }
 
 }  // namespace
 
-std::vector<Plane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_t count) {
-  const PlaneSpace space(Box::of(hull.vertices));
+std::vector<Plane> concave_planes(const Mesh& mesh, const ConvexBody& hull, std::size_t count) {
+  const PlaneSpace space(hull.box());
   std::vector<Plane> planes;
   for (const ReflexEdge& edge : chosen_edges(mesh, hull, count)) {
     EdgePlanes own = planes_of(mesh, edge);
@@ -293,7 +250,7 @@ std::vector<Plane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_
   return planes;
 }
 
-std::vector<Plane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int per_axis) {
+std::vector<Plane> equidistant_planes(const Mesh& mesh, const ConvexBody& hull, int per_axis) {
   constexpr double kSameAxis = 1e-3;  // sine of an angle
   std::vector<Vec3> directions = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (const Vec3 axis : principal_axes(mesh)) {
@@ -305,7 +262,8 @@ std::vector<Plane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int pe
   std::vector<Plane> planes;
   for (const Vec3 direction : directions) {
     double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Vec3 p : hull.vertices) low = std::min(low, dot(p, direction)), high = std::max(high, dot(p, direction));
+    for (const Vec3 p : hull.mesh().vertices)
+      low = std::min(low, dot(p, direction)), high = std::max(high, dot(p, direction));
     for (int i = 1; i <= per_axis; ++i)
       planes.push_back({direction, low + (high - low) * (static_cast<double>(i) / (per_axis + 1))});
   }

@@ -6,14 +6,13 @@
 // Algorithm: every reflex edge is weighted by its depth below the hull's surface, its angle and the length of its whole
 // crease. Edges are chosen one after the other, the weight multiplied by the distance to the nearest chosen one and by
 // how much the edge's planes differ from those already chosen. (J. Andrews, "Navigation-Driven Approximate Convex
-// Decomposition", SIGGRAPH 2024.) Depth is first bounded by the largest facets of the hull; only the best edges are
-// weighed exactly.
+// Decomposition", SIGGRAPH 2024.)
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
-#include "core/geometry.hpp"
+#include "convex/convex_body.hpp"
 
 namespace rlacd {
 
@@ -21,10 +20,10 @@ namespace rlacd {
 // in single precision, lies wholly on one side: not at all if the plane is normal to a coordinate axis (such cuts are
 // exact), else by a hair. A cut exactly through the face would let rounding decide the side of each corner, and the
 // part beyond would carry the face along as a film.
-std::vector<Plane> concave_planes(const Mesh& mesh, const Mesh& hull, std::size_t count);
+std::vector<Plane> concave_planes(const Mesh& mesh, const ConvexBody& hull, std::size_t count);
 
 // The paper's candidates: along x, y, z and the principal axes of a mesh, planes that divide its hull's extent into
 // equal slabs. Principal axes that hardly differ from a coordinate axis are replaced by it.
-std::vector<Plane> equidistant_planes(const Mesh& mesh, const Mesh& hull, int per_axis);
+std::vector<Plane> equidistant_planes(const Mesh& mesh, const ConvexBody& hull, int per_axis);
 
 }  // namespace rlacd

@@ -4,10 +4,9 @@
 //      set of convex objects (triangles, hulls) is such a function; so is depth under a set of planes.
 //        Sample at(Vec3 p, int32 hint, double enough)  a witness with f_w(p) = f(p), or any with f_w(p) <= enough
 //        double from(int32 witness, Vec3 p)            f_w(p)
-//        double quick_upper(corners)                   a cheap upper bound over a triangle, or infinity
-//        void settled(corners, witness)                is called with the single witness that closed a triangle
-// Out: an interval that holds the maximum, narrow enough for the goal; in waves, also where it is reached.
-// How: branch and bound over the triangles, halved at their longest edge.
+// Out: an interval that holds the maximum, narrow enough for the goal, and where it is reached.
+// How: branch and bound over the triangles: all that are open are halved at once at their longest edges, wave after
+//      wave. A wave depends only on those before it, so nothing depends on the number of threads.
 //      Lower bound: f at the corners.
 //      Upper bound over a triangle: for weights l_w >= 0 that add up to 1, f <= sum l_w f_w, which is convex, so its
 //      maximum over the triangle is at a corner. The bound is the least such number over every single witness and every
@@ -72,14 +71,14 @@ inline double best_mixture(const std::array<double, 3>& a, const std::array<doub
 }
 
 template <class Field>
-double upper_bound(const Field& field, const Corners& corner, const std::int32_t* witnesses, int count) {
-  std::array<double, 3> row[4];
-  std::int32_t known[4];
+double upper_bound(const Field& field, const Cell& cell) {
+  std::array<double, 3> row[3];
+  std::int32_t known[3];
   int rows = 0;
-  for (int i = 0; i < count; ++i) {
-    if (std::find(known, known + rows, witnesses[i]) != known + rows) continue;
-    known[rows] = witnesses[i];
-    for (int j = 0; j < 3; ++j) row[rows][j] = field.from(witnesses[i], corner[j]);
+  for (const Sample& sample : cell.sample) {
+    if (std::find(known, known + rows, sample.witness) != known + rows) continue;
+    known[rows] = sample.witness;
+    for (int j = 0; j < 3; ++j) row[rows][j] = field.from(sample.witness, cell.corner[j]);
     ++rows;
   }
   if (rows == 1) return std::max({row[0][0], row[0][1], row[0][2]});
@@ -87,12 +86,6 @@ double upper_bound(const Field& field, const Corners& corner, const std::int32_t
   for (int i = 0; i < rows; ++i)
     for (int k = i + 1; k < rows; ++k) best = std::min(best, best_mixture(row[i], row[k]));
   return best;
-}
-
-template <class Field>
-double upper_bound(const Field& field, const Cell& cell) {
-  const std::int32_t witnesses[3] = {cell.sample[0].witness, cell.sample[1].witness, cell.sample[2].witness};
-  return upper_bound(field, cell.corner, witnesses, 3);
 }
 
 // The two halves of a cell, cut at the middle of its longest edge; corner 0 of both is the new point.
@@ -111,97 +104,26 @@ std::array<Cell, 2> bisect(const Field& field, const Cell& cell, double enough) 
   return halves;
 }
 
-// One thread, the cell with the greatest upper bound first.
-template <class Field>
-Interval maximize(Field& field, const Mesh& mesh, const Goal& goal) {
-  Interval found;
-  double dropped = 0;  // greatest upper bound among the cells not examined further
-  const auto needed = [&] { return std::max(goal.pass, found.lower + goal.tolerance); };
-  const auto enough = [&] { return kEnough * std::max(goal.pass, found.lower); };
-  const auto learn = [&](const Sample& sample, double exact_above) {
-    if (sample.value > exact_above) found.lower = std::max(found.lower, sample.value);
-  };
-  const auto lower_first = [](const Cell& a, const Cell& b) { return a.upper < b.upper; };
-
-  std::vector<Sample> at_vertex(mesh.vertices.size());
-  std::vector<Cell> heap;
-  for (const Triangle& face : mesh.faces) {
-    poll_stop();
-    Cell cell;
-    cell.corner = corners_of(mesh, face);
-    cell.upper = field.quick_upper(cell.corner);
-    if (cell.upper <= needed()) {
-      dropped = std::max(dropped, cell.upper);
-      continue;
-    }
-    const double exact_above = enough();
-    const Vec3 centre = (1.0 / 3.0) * (cell.corner[0] + cell.corner[1] + cell.corner[2]);
-    const Sample centred = field.at(centre, -1, exact_above);
-    learn(centred, exact_above);
-    cell.upper = std::min(cell.upper, upper_bound(field, cell.corner, &centred.witness, 1));
-    if (cell.upper <= needed()) {
-      field.settled(cell.corner, centred.witness);
-    } else {
-      std::int32_t witnesses[4] = {centred.witness};
-      for (int i = 0; i < 3; ++i) {
-        Sample& sample = at_vertex[face[i]];
-        if (sample.witness < 0) {
-          sample = field.at(cell.corner[i], centred.witness, exact_above);
-          learn(sample, exact_above);
-        }
-        cell.sample[i] = sample;
-        witnesses[i + 1] = sample.witness;
-      }
-      cell.upper = std::min(cell.upper, upper_bound(field, cell.corner, witnesses, 4));
-    }
-    if (found.lower > goal.fail) return {found.lower, std::numeric_limits<double>::infinity()};
-    if (cell.upper <= needed())
-      dropped = std::max(dropped, cell.upper);
-    else
-      heap.push_back(cell);
-  }
-
-  std::make_heap(heap.begin(), heap.end(), lower_first);
-  for (std::size_t looked_at = 0; !heap.empty() && looked_at < kMostCells; ++looked_at) {
-    poll_stop();
-    if (heap.front().upper <= needed()) break;
-    std::pop_heap(heap.begin(), heap.end(), lower_first);
-    const Cell cell = heap.back();
-    heap.pop_back();
-    const double exact_above = enough();
-    for (const Cell& half : bisect(field, cell, exact_above)) {
-      learn(half.sample[0], exact_above);
-      if (half.upper <= needed()) {
-        dropped = std::max(dropped, half.upper);
-      } else {
-        heap.push_back(half);
-        std::push_heap(heap.begin(), heap.end(), lower_first);
-      }
-    }
-    if (found.lower > goal.fail) return {found.lower, std::numeric_limits<double>::infinity()};
-  }
-  found.upper = std::max({found.lower, dropped, heap.empty() ? 0.0 : heap.front().upper});
-  return found;
-}
-
 // An interval around the greatest value, and where its lower end is reached; undefined where no value is above 0.
 struct Greatest : Interval {
   Vec3 at{};
 };
 
-// Multi-threaded: all open cells are halved at once, wave after wave. A wave depends only on the waves before it, so
-// the interval does not depend on the number of threads, nor does the place.
 template <class Field>
-Greatest maximize_in_waves(const Field& field, const Mesh& mesh, const Goal& goal, int threads) {
+Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int threads) {
   constexpr std::size_t kChunk = 128;
   const auto for_each = [&](std::size_t count, const auto& task) {
     parallel_for(count, count <= 3 * kChunk ? 1 : threads, task, kChunk);
   };
 
   Greatest found;
+  found.upper = std::numeric_limits<double>::infinity();
   const auto learn = [&](const Sample& sample, Vec3 at, double exact_above) {
     if (sample.value > exact_above && sample.value > found.lower) found.lower = sample.value, found.at = at;
   };
+  // Where only a verdict is wanted, values that pass need not be exact.
+  const bool is_verdict = goal.fail < std::numeric_limits<double>::infinity();
+  const auto enough = [&] { return kEnough * std::max(is_verdict ? goal.pass : 0.0, found.lower); };
   double dropped = 0;
   std::vector<Sample> at_vertex(mesh.vertices.size());
   std::vector<char> is_corner(mesh.vertices.size(), 0);
@@ -209,11 +131,12 @@ Greatest maximize_in_waves(const Field& field, const Mesh& mesh, const Goal& goa
     for (const std::int32_t corner : face) is_corner[corner] = 1;
   // A few corners first: they show what distance matters, so that most of the others need no exact answer.
   for (const std::size_t stride : {std::size_t{kChunk}, std::size_t{1}}) {
-    const double exact_above = kEnough * found.lower;
+    const double exact_above = enough();
     for_each((at_vertex.size() + stride - 1) / stride, [&](std::size_t i) {
       if (is_corner[i * stride]) at_vertex[i * stride] = field.at(mesh.vertices[i * stride], -1, exact_above);
     });
     for (std::size_t i = 0; i < at_vertex.size(); ++i) learn(at_vertex[i], mesh.vertices[i], exact_above);
+    if (found.lower > goal.fail) return found;
   }
 
   std::vector<Cell> cells(mesh.faces.size()), halves;
@@ -233,7 +156,7 @@ Greatest maximize_in_waves(const Field& field, const Mesh& mesh, const Goal& goa
   };
   drop(cells);
   for (std::size_t looked_at = 0; !cells.empty() && looked_at < kMostCells; looked_at += cells.size()) {
-    const double exact_above = kEnough * found.lower;
+    const double exact_above = enough();
     halves.resize(2 * cells.size());
     for_each(cells.size(), [&](std::size_t c) {
       auto pair = bisect(field, cells[c], exact_above);
@@ -241,6 +164,7 @@ Greatest maximize_in_waves(const Field& field, const Mesh& mesh, const Goal& goa
       halves[2 * c + 1] = pair[1];
     });
     for (std::size_t c = 0; c < halves.size(); c += 2) learn(halves[c].sample[0], halves[c].corner[0], exact_above);
+    if (found.lower > goal.fail) return found;
     cells.swap(halves);
     drop(cells);
   }

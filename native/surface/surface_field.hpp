@@ -16,8 +16,6 @@ class SurfaceField {
     return {std::sqrt(hit.distance2), hit.slot};
   }
   double from(std::int32_t slot, Vec3 p) const { return bvh_.distance(slot, p); }
-  double quick_upper(const Corners&) const { return std::numeric_limits<double>::infinity(); }
-  void settled(const Corners&, std::int32_t) {}
 
  private:
   const Bvh& bvh_;

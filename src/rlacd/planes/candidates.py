@@ -94,5 +94,4 @@ def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
 
 
 def _planes(component: Component, per_axis: int, edges: int) -> tuple[FloatArray, FloatArray]:
-    hull = component.hull
-    return _native.candidate_planes(component.vertices, component.faces, hull.vertices, hull.faces, per_axis, edges)
+    return _native.candidate_planes(component.vertices, component.faces, component.hull.body, per_axis, edges)

@@ -11,7 +11,6 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-from rlacd._native import kernel_times, time_kernels
 from rlacd.errors import OutputError
 
 _R = TypeVar("_R")
@@ -33,23 +32,21 @@ class Trace:
                 Path(path).open("a").close()  # before the work: writing comes after it
             except OSError as error:
                 raise OutputError(f"cannot write the trace {path} ({error.strerror}): correct RLACD_TRACE.") from error
-            time_kernels(True)
 
     @contextmanager
     def span(self, kind: Kind, name: str, number: int | None = None) -> Iterator[None]:
-        """Record what is done inside: wall and CPU time, and what `kernel_times` counts at both ends."""
+        """Record what is done inside: wall and CPU time."""
         if not self._path:
             yield
             return
-        start, used, kernels = time.perf_counter(), time.thread_time(), kernel_times()
+        start, used = time.perf_counter(), time.thread_time()
         try:
             yield
         finally:
             times = {"ts": start, "dur": time.perf_counter() - start, "tts": used, "tdur": time.thread_time() - used}
             where = {"pid": os.getpid(), "tid": threading.get_ident(), "name": name, "cat": kind, "ph": "X"}
             microseconds = {key: round(1e6 * seconds, 1) for key, seconds in times.items()}
-            args = {"number": number, "begin": kernels, "end": kernel_times()}
-            self._spans.append(where | microseconds | {"args": args})
+            self._spans.append(where | microseconds | {"args": {"number": number}})
 
     def each(self, name: str, function: Callable[..., _R]) -> Callable[..., _R]:
         """The function, with a span for each item it is called for."""
