@@ -110,6 +110,20 @@ def test_a_needle_of_inverted_shells_has_a_mass() -> None:
         assert repair(load_mesh((shape.vertices, shape.faces)), keep_cavities=keep).manifold.volume() > 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("corners", [14, 60])
+@pytest.mark.parametrize("limit", [None, 5])
+def test_sheets_that_cross_take_no_more_hulls_than_they_have_faces(corners: int, limit: int | None) -> None:
+    """Cut, they fall into hundreds of pieces."""
+    random = np.random.default_rng(0)
+    vertices = random.random((corners, 3))
+    faces = np.array([random.choice(corners, 3, replace=False) for _ in range(24)])
+    result = rlacd.decompose(vertices, faces, open="thin", quality="fast", threads=1, max_hulls=limit)
+    assert len(result) <= (limit or 24)
+    assert result.report.hausdorff.under < 0.005
+    assert limit or result.report.concavity.max < 0.05
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(3, 40))
 @pytest.mark.promise("any-mesh", "covered", "report-true")

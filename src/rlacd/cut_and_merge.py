@@ -67,7 +67,7 @@ def cut_and_merge(
         Times the stages ``cut`` and ``merge``. When it stops, the parts reached so far are returned.
     merge : bool
     most : float
-        Stop cutting as soon as it is clear that there will be more parts than this.
+        Stop as soon as it is clear that cutting leaves more parts than this.
     strict : bool
         Skip merging unless all pieces meet the criterion: the caller has no use for other passes.
     """
@@ -76,7 +76,7 @@ def cut_and_merge(
         with run.limited(most_work, cuts=None if strict else "cut"):
             done, left = tree.cut_until(criterion, most)
         pieces: list[Part] = [*done, *left]
-        if strict and len(pieces) > most:
+        if len(pieces) > most:
             return Pass(pieces, [*left], pieces, criterion)
         try:
             if run.stopped_by is None:

@@ -27,7 +27,7 @@ from rlacd.run import Run
 from rlacd.search import SearchContext, at_least, cost, eliminate_parts, search
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
-from rlacd.solid.cover import cover
+from rlacd.solid.cover import cover, slabs
 from rlacd.solid.hull import NO_SIDES, Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.resting import resting_sides
@@ -40,6 +40,10 @@ only tangles take so long. In between, parts are united two at a time; pairs are
 TIMES_TOO_MANY, TOO_MANY = 1.5, 5
 """Parts are not searched if they are more than so many times the hulls asked for and so many more: on 30 real meshes no
 search divides them by more than 1.32."""
+
+PIECES_A_FACE = 4
+"""Sheets are cut into at most so many pieces a face: real ones take a quarter of one, those that cross themselves may
+take a hundred."""
 
 
 class Reached(NamedTuple):
@@ -77,7 +81,7 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
         return covered(source, options, run)
     if options.max_hulls == 1:
         return Reached(solid, options, goal, [root], None, root)
-    decomposer = _Decomposer.of(_model(solid, root, goal, run), goal, options, run)
+    decomposer = _Decomposer.of(_model(solid, root, goal, run), solid, goal, options, run)
     states, goal, found = decomposer.decompose(goal)
     limited, most, parts = LimitedCriterion(goal, options.hull_limits, sides=sides), options.max_hulls, states[-1]
     if most is not None and len(parts) > most:
@@ -95,7 +99,7 @@ def find_parts_under(source: InputMesh, options: Options, factors: Sequence[floa
     """
     try:
         solid, options, goal, root, sides = _prepared(source, options, run)
-        decomposer = _Decomposer.of(_model(solid, root, goal, run), goal, options, run)
+        decomposer = _Decomposer.of(_model(solid, root, goal, run), solid, goal, options, run)
     except Stopped:
         run.note_stop()
         return
@@ -142,6 +146,7 @@ class _Decomposer:
     Attributes
     ----------
     model : Model
+    solid : Solid
     options : Options
     run : Run
     sweeps : SweepCache
@@ -150,29 +155,37 @@ class _Decomposer:
     """
 
     model: Model
+    solid: Solid
     options: Options
     run: Run
     sweeps: SweepCache
     tree: CutTree
 
     @classmethod
-    def of(cls, model: Model, goal: Criterion, options: Options, run: Run) -> _Decomposer:
+    def of(cls, model: Model, solid: Solid, goal: Criterion, options: Options, run: Run) -> _Decomposer:
         """Prepare to decompose a model."""
         is_default = options.first_policy == options.default_policy
         sweeps = SweepCache(seed=(options.seed,) if is_default and options.seed else None)
         second = Greedy("hull-sum", sweeps=sweeps) if is_default else None
         policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(goal)))
         tree = CutTree(model.component, policy, run, second=second)
-        return cls(model, options, run, sweeps, tree)
+        return cls(model, solid, options, run, sweeps, tree)
 
     def decompose(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         """Cut, merge, search and transfer.
 
         Returns the parts that the levels up to the one asked for end with, the best last, the goal as settled on them,
-        and a summary of the search.
+        and a summary of the search. Sheets that would take more parts than they have faces get one for each face.
         """
+        few = len(self.solid.surface[1]) if self.solid.is_sheets else math.inf
+        states, settled, found = self._decomposed(goal, PIECES_A_FACE * few)
+        return (states, settled, found) if len(states[-1]) <= few else ([slabs(self.solid, self.run)], goal, None)
+
+    def _decomposed(self, goal: Criterion, most: float) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         with self.run.limited():
-            done = cut_and_merge(self.tree, self.model.tighter(goal), self.run, merge=self.options.merge)
+            done = cut_and_merge(self.tree, self.model.tighter(goal), self.run, merge=self.options.merge, most=most)
+            if len(done.pieces) > most:
+                return [done.pieces], goal, None
             states, found = self._searched(done.parts, done.criterion, goal)
             best = states[-1]
             states = [parts for parts in states if parts is not best] + [best]

@@ -16,7 +16,7 @@ from rlacd.merge.merge import united_in_turn
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
-from rlacd.run import Run, Work
+from rlacd.run import Run, Work, work
 from rlacd.search import SearchContext, eliminate_parts
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import NO_SIDES
@@ -29,6 +29,9 @@ SHARE_OF_WORK, LEAST_SHARE = 0.3, 0.4e6
 
 PIECES = 2
 """Cutting on stops at so many times the parts that may be added: merging leaves half of them."""
+
+HULLS_A_PART = 9
+"""Limited hulls that cutting a part on takes, about: they are most of its price."""
 
 NEARLY_EQUAL = 1.02
 """Errors within this factor are equal: they are measured to a fiftieth of the threshold."""
@@ -62,8 +65,9 @@ def _cut_for(
         met = run.map(limited.is_met, parts)
         with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_SHARE)):
             pieces: dict[Part, list[Part]] = {}
-            for part, is_met in zip(parts, met, strict=True):
-                if not is_met and limited.criterion.is_met(part):
+            for part, is_met in sorted(zip(parts, met, strict=True), key=lambda item: len(item[0].hull.vertices)):
+                price = HULLS_A_PART * work.limiting(len(part.hull.vertices))
+                if not is_met and limited.criterion.is_met(part) and run.work.pay(price):
                     pieces[part] = _cut_on(part, limited, solid, options, run, extra)
             kept = {part: [part] for part in parts}
             for part, new in sorted(pieces.items(), key=lambda item: len(item[1])):

@@ -39,6 +39,9 @@ CONVEX = {
     "cloud of 100": cloud(100),
     "cloud of 500": cloud(500),
 }
+CROSSING_BALLS = trimesh.creation.icosphere(4) + trimesh.creation.icosphere(4).apply_translation((1.2, 0.1, 0.05))
+"""Hulls of 2,300 corners: too dear to be cut on for the limit."""
+
 LIMITS: list[dict[str, Any]] = [*({"preset": name} for name in PRESETS), {"max_vertices": 8}, {"max_faces": 4}]
 
 
@@ -62,14 +65,15 @@ def test_a_convex_body_is_one_hull_within_any_limits_and_a_warning_tells_how_far
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.promise("presets")
-def test_a_preset_takes_at_most_twice_the_hulls(name: str) -> None:
-    preset, mesh = PRESETS[name], trimesh.creation.torus(1.0, 0.35, 48, 32)
+@pytest.mark.parametrize("mesh", [trimesh.creation.torus(1.0, 0.35, 48, 32), CROSSING_BALLS], ids=["torus", "balls"])
+def test_a_preset_takes_at_most_twice_the_hulls(name: str, mesh: trimesh.Trimesh) -> None:
+    preset = PRESETS[name]
     free = rlacd.decompose(mesh, threads=1, quality="fast")
     result = rlacd.decompose(mesh, preset=name, threads=1, quality="fast")
     assert max(len(hull.vertices) for hull in result) <= (preset.max_vertices or np.inf)
     assert max(len(hull.faces) for hull in result) <= (preset.max_faces or np.inf)
     assert result.report.options["preset"] == name
-    assert len(free) <= len(result) <= 2 * len(free)
+    assert len(free) <= len(result) <= (len(free) if mesh is CROSSING_BALLS else 2 * len(free))
     over = result.report.concavity.max > 0.05
     assert over == any("stick" in warning for warning in result.report.warnings)
 

@@ -332,11 +332,10 @@ def united_in_turn(
                 reach = math.inf
                 queue = _bounded_pairs(numbered, list(alive), reach, criterion, run)
                 pair = _pop_least(queue, alive, unite, criterion, account)
-            if pair is None or not run.step(len(parts) - len(alive), len(parts), len(alive)):
+            if pair is None or pair.union is None or not run.step(len(parts) - len(alive), len(parts), len(alive)):
                 return
-            union = unite(alive[pair.first], alive[pair.second])
             numbered.remove([pair.first, pair.second])
-            newest = numbered.add(union)
+            newest = numbered.add(pair.union)
             origin.append(min(origin[pair.first], origin[pair.second]))
             errors = {i: errors[i] for i in alive if i in errors} | {newest: pair.error}
             for bounded in _bounded_pairs(numbered, [newest], reach, criterion, run):
@@ -349,7 +348,7 @@ class _BoundedPair(NamedTuple):
     error: float  # of the union: a lower bound, or the value if `measured`
     first: int
     second: int
-    measured: bool
+    union: Part | None  # once it is measured
 
 
 def _bounded_pairs(
@@ -358,7 +357,7 @@ def _bounded_pairs(
     pairs = alive.boxes.pairs(new, reach)
     volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.bodies, pairs, run.threads)
     errors = map(criterion.early_out.least_error, volumes.tolist(), hulls.tolist())
-    queue = [_BoundedPair(error, i, j, False) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
+    queue = [_BoundedPair(error, i, j, None) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)
     return queue
 
@@ -375,10 +374,10 @@ def _pop_least(
         pair = heapq.heappop(queue)
         if pair.first not in alive or pair.second not in alive:
             continue
-        if pair.measured:
+        if pair.union is not None:
             return pair
         if not account.pay(price_of_uniting(alive[pair.first], alive[pair.second])):
             return None
-        error = criterion.error(unite(alive[pair.first], alive[pair.second]))
-        heapq.heappush(queue, _BoundedPair(max(error, pair.error), pair.first, pair.second, True))
+        union = unite(alive[pair.first], alive[pair.second])
+        heapq.heappush(queue, pair._replace(error=max(criterion.error(union), pair.error), union=union))
     return None

@@ -85,6 +85,11 @@ def growing(vertices: int, points: int) -> float:
     return testing(vertices) + 0.1 * points
 
 
+def limiting(vertices: int) -> float:
+    """Find a hull of few corners around one of `vertices` corners, and even it out."""
+    return 60 * vertices
+
+
 def gluing(faces: int) -> float:
     """Glue two parts that have `faces` faces in total."""
     return 16 + 0.2 * faces

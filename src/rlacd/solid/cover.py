@@ -1,4 +1,4 @@
-"""The fallback for a decomposition that had no time to begin: one hull for every body of any input."""
+"""Fallbacks: a hull for every body of an input that there was no time to repair, or for every face of sheets."""
 
 from __future__ import annotations
 
@@ -63,7 +63,17 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
     solid = Solid(
         Manifold(), (vertices, faces), frame, (), (*mesh.warnings, warning), left_out=frame.to_frame(mesh.specks)
     )
-    return solid, [Part(hull.vertices, hull.faces, hull.volume, hull) for hull in hulls]
+    return solid, [_part(hull) for hull in hulls]
+
+
+def slabs(solid: Solid, run: Run) -> list[Part]:
+    """A thin hull around every face of the surface of a solid."""
+    vertices, faces = solid.surface
+    return run.map(lambda face: _part(_hull(vertices[face], run)), list(faces))
+
+
+def _part(hull: Hull) -> Part:
+    return Part(hull.vertices, hull.faces, hull.volume, hull)
 
 
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:

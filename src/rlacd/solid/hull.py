@@ -36,6 +36,11 @@ class Hull:
     primitive: Primitive | None = None
 
     @cached_property
+    def limited(self) -> dict[object, Hull]:
+        """What `limit_hull` made of it: cutting, merging and finishing ask for the same."""
+        return {}
+
+    @cached_property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
         return self.body.box
@@ -123,8 +128,10 @@ def limit_hull(
     while the hull stays convex and contains the given one. If it sticks out too far, all corners are moved at once to
     stick out about equally (``native/convex/even_out.hpp``).
     """
-    most, most_faces = (min(limit or _NO_LIMIT, _NO_LIMIT) for limit in limits)
-    vertices, faces = _native.simplify_hull(hull.body, most, most_faces, tolerance, sides, enough)
-    if len(vertices) == len(hull.vertices) and (vertices == hull.vertices).all():
-        return hull
-    return Hull(vertices, faces, _native.mesh_volume(vertices, faces))
+    asked = limits, tolerance, enough, sides.tobytes()
+    if asked not in hull.limited:
+        most, most_faces = (min(limit or _NO_LIMIT, _NO_LIMIT) for limit in limits)
+        vertices, faces = _native.simplify_hull(hull.body, most, most_faces, tolerance, sides, enough)
+        is_same = len(vertices) == len(hull.vertices) and (vertices == hull.vertices).all()
+        hull.limited[asked] = hull if is_same else Hull(vertices, faces, _native.mesh_volume(vertices, faces))
+    return hull.limited[asked]

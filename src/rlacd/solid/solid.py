@@ -118,6 +118,11 @@ class Solid:
         """Meshes ``[V, 3]``, ``[F, 3]`` that together bound what the input bounds: the solid less its cavities."""
         return [self.mesh] if self.cavity_walls is None else [self.mesh, mesh_of(self.cavity_walls)]
 
+    @property
+    def is_sheets(self) -> bool:
+        """Whether it is made of sheets only, which were given thickness."""
+        return len(self.bodies) > 0 and all(body.step == "slab" for body in self.bodies)
+
     @cached_property
     def manifold(self) -> Manifold:
         """The shape, ready for booleans; made when first needed, which takes longer than all of repair."""
