@@ -286,13 +286,6 @@ class TestCommands:
         assert "| hulls; a mesh | 3; 1.5 | 2; 1.0 |" in page
         assert "| wall s, 2 threads: median, mean, most, sum |" in page
 
-    @pytest.mark.slow
-    def test_prices_are_held_against_times(self, meshes: Path) -> None:
-        """In a process of its own, since kernels are replaced by ones that are timed."""
-        command = [sys.executable, "-m", "benchmarks", "prices", str(meshes)]
-        told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
-        assert all(f"| {kernel} |" in told for kernel in ("choosing", "cutting", "judging", "filling"))
-
     @pytest.mark.parametrize(
         ("words", "says"),
         [

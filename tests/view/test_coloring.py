@@ -37,26 +37,3 @@ def test_neighbours_of_boxes_that_touch_have_other_hues(places: np.ndarray, most
     hulls = boxes(places)
     assert max(map(len, neighbours(hulls)), default=0) == most
     check(hulls)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_overlapping_boxes_found_by_brute_force(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    hulls = boxes(random.random((40, 3)) * 6.0)
-    for hull in hulls:
-        hull.apply_transform(trimesh.transformations.random_rotation_matrix(random.random(3), True))
-    beside = neighbours(hulls)
-    for one, other in itertools.combinations(range(len(hulls)), 2):
-        inside = hulls[one].contains(hulls[other].vertices).any() or hulls[other].contains(hulls[one].vertices).any()
-        if inside:
-            assert other in beside[one]
-            assert one in beside[other]
-    check(hulls)
-
-
-def test_legs_under_a_plate_share_hues_with_each_other_only() -> None:
-    plate = trimesh.creation.box(bounds=[(-1, -1, 0), (60, 3, 1)])
-    legs = [trimesh.creation.box(bounds=[(x, 0, -5), (x + 1, 1, 0)]) for x in range(0, 58, 2)]
-    rgb, rank = color_hulls([*legs, plate])
-    assert rank[-1] not in rank[:-1]
-    assert len(np.unique(rgb, axis=0)) == len(legs) + 1
