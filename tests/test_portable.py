@@ -130,8 +130,6 @@ assert 2**23 < peak_memory() < 2**33
     [
         ("io/test_load.py", "not slow and not nightly"),
         ("io/test_formats.py", "not slow and not nightly"),
-        ("options/test_options.py", "not slow and not nightly"),
-        ("test_decomposition.py", "not slow and not nightly"),
         ("pool/test_pool.py", "not nightly"),
     ],
 )
