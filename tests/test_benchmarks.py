@@ -56,19 +56,6 @@ def run(app: Any, *words: object, code: int = 0) -> str:
 
 
 class TestMethods:
-    @pytest.mark.parametrize(
-        ("name", "setting", "default"),
-        [
-            ("default", "threshold", 0.05),
-            ("fast:policy=navacd", "threshold", 0.05),
-            ("default:space", "tolerance", 0.1),
-            ("vhacd", "hulls", 64),
-        ],
-    )
-    def test_names(self, name: str, setting: str, default: float) -> None:
-        method = make_method(name)
-        assert (method.name, method.setting, method.default) == (name, setting, default)
-
     @pytest.mark.parametrize("name", ["", "gredy", "fast:polcy=x", "fast:best", "coacd:best", "planes", "space"])
     def test_unknown_names_are_one_sentence(self, name: str) -> None:
         with pytest.raises(OptionError, match=r"has to be|is not known"):
@@ -149,7 +136,7 @@ def test_a_deployment_leaves_out_the_planes_that_it_names() -> None:
         policy_of(f"planes:no-edges:{network}", 0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 class TestRunner:
     def test_a_row_a_mesh_and_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         """Nor if the rows are lost: hulls that are there are only measured, and keep their seconds."""
@@ -272,7 +259,7 @@ class TestCommands:
         assert wrong.returncode == 1
         assert "there is no command 'x'" in wrong.stderr
 
-    @pytest.mark.slow
+    @pytest.mark.nightly
     def test_compare_writes_a_page_and_does_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
         text = run(compare.app, meshes, "--out", out, "--methods", "fast,fast:policy=navacd", "--first", 2)

@@ -30,7 +30,7 @@ from tests.learning import small_solids, write_meshes
 from tests.scripts import script
 from tests.test_learn_train import TINY as TINY_RUN
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 TINY = Sizes((32, 16, 8), (8, 4, 4), (12, 24, 48), depth=1, heads=2, embedding=16)

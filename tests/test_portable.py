@@ -124,7 +124,7 @@ assert 2**23 < peak_memory() < 2**33
     assert run.returncode == 0, run.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("file", "marks"),
     [
