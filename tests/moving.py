@@ -23,6 +23,13 @@ class Joint:
     limits: tuple[float, float]
 
 
+LINK = """<link name="{0}">
+<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><mesh filename="{0}.stl"/></geometry></collision></link>"""
+JOINT = """<joint name="{0}_joint" type="{1}"><parent link="{2}"/><child link="{0}"/><origin xyz="{3}"/>
+<axis xyz="{4}"/><limit lower="{5}" upper="{6}" effort="10" velocity="1"/></joint>"""
+
+
 @dataclass(frozen=True)
 class Robot:
     """Links in one frame, at rest."""
@@ -33,31 +40,16 @@ class Robot:
 
     def write(self, folder: Path) -> Path:
         """Write it as URDF with an STL file a link."""
-        lines = [f'<robot name="{self.name}">']
         origins = {joint.child: np.array(joint.at) for joint in self.joints}
         for name, mesh in self.links.items():
-            own = mesh.copy()
-            own.apply_translation(-origins.get(name, np.zeros(3)))
-            own.export(folder / f"{name}.stl")
-            lines += [
-                f'  <link name="{name}">',
-                '    <inertial><mass value="1"/>'
-                '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>',
-                f'    <collision><geometry><mesh filename="{name}.stl"/></geometry></collision>',
-                "  </link>",
-            ]
+            mesh.copy().apply_translation(-origins.get(name, np.zeros(3))).export(folder / f"{name}.stl")
+        lines = [LINK.format(name) for name in self.links]
         for joint in self.joints:
             at = np.array(joint.at) - origins.get(joint.parent, np.zeros(3))
-            lines += [
-                f'  <joint name="{joint.child}_joint" type="{joint.kind}">',
-                f'    <parent link="{joint.parent}"/><child link="{joint.child}"/>',
-                f'    <origin xyz="{at[0]} {at[1]} {at[2]}"/>',
-                f'    <axis xyz="{joint.axis[0]} {joint.axis[1]} {joint.axis[2]}"/>',
-                f'    <limit lower="{joint.limits[0]}" upper="{joint.limits[1]}" effort="10" velocity="1"/>',
-                "  </joint>",
-            ]
+            places = [" ".join(map(str, place)) for place in (at, joint.axis)]
+            lines.append(JOINT.format(joint.child, joint.kind, joint.parent, *places, *joint.limits))
         path = folder / f"{self.name}.urdf"
-        path.write_text("\n".join([*lines, "</robot>", ""]))
+        path.write_text("\n".join([f'<robot name="{self.name}">', *lines, "</robot>"]))
         return path
 
 
@@ -103,37 +95,4 @@ def drawer(play: float = 0.003) -> Robot:
     return Robot("cabinet", {"cabinet": cabinet, "drawer": box}, (slide,))
 
 
-def oven(play: float = 0.002) -> Robot:
-    """An oven with a door that turns down about its lower edge, into a recess, `play` apart."""
-    shell = block((-0.3, -0.25, 0), (0.3, 0.3, 0.6))
-    hollow = block((-0.26, -0.4, 0.1), (0.26, 0.26, 0.56))
-    recess = block((-0.28, -0.3, 0.06), (0.28, -0.22, 0.58))
-    body = trimesh.boolean.difference([shell, hollow, recess])
-    door = block((-0.28 + play, -0.25, 0.06 + play), (0.28 - play, -0.22 - play, 0.58 - play))
-    glass = block((-0.2, -0.3, 0.15), (0.2, -0.235, 0.5))
-    handle = [block((x - 0.01, -0.29, 0.53), (x + 0.01, -0.24, 0.55)) for x in (-0.2, 0.2)]
-    bar = block((-0.21, -0.29, 0.53), (0.21, -0.275, 0.55))
-    leaf = trimesh.boolean.union([trimesh.boolean.difference([door, glass]), *handle, bar])
-    hinge = Joint("revolute", "oven", "door", (1, 0, 0), (0, -0.25, 0.06 + play), (0.0, 1.5))
-    return Robot("oven", {"oven": body, "door": leaf}, (hinge,))
-
-
-def gripper(left: float = 0.0005) -> Robot:
-    """Two fingers that close on a plate of 5 mm until `left` is between; a ridge of it stands in their grooves."""
-    palm = block((-0.06, -0.02, -0.03), (0.06, 0.02, 0))
-    plate = block((-0.0025, -0.03, 0.05), (0.0025, 0.03, 0.12))
-    stem = block((-0.0025, -0.005, -0.001), (0.0025, 0.005, 0.06))
-    ridge = block((-0.0035, -0.03, 0.072), (0.0035, 0.03, 0.076))
-    links, joints = {"palm": trimesh.boolean.union([palm, plate, stem, ridge])}, []
-    for side, name in ((-1.0, "left"), (1.0, "right")):
-        near = 0.0025 + left
-        tip = block((side * near, -0.01, 0.06), (side * (near + 0.01), 0.01, 0.09))
-        groove = block((side * (near - 0.001), -0.02, 0.07), (side * (near + 0.001 + left), 0.02, 0.078))
-        bar = block((side * (near + 0.02), -0.01, 0.002), (side * (near + 0.03), 0.01, 0.09))
-        across = block((side * (near + 0.005), -0.01, 0.08), (side * (near + 0.03), 0.01, 0.09))
-        links[name] = trimesh.boolean.union([trimesh.boolean.difference([tip, groove]), bar, across])
-        joints.append(Joint("prismatic", "palm", name, (side, 0, 0), (0, 0, 0), (0.0, 0.02)))
-    return Robot("gripper", links, tuple(joints))
-
-
-ALL = (fork_and_lug, drawer, oven, gripper)
+ALL = (fork_and_lug, drawer)

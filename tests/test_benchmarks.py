@@ -56,19 +56,6 @@ def run(app: Any, *words: object, code: int = 0) -> str:
 
 
 class TestMethods:
-    @pytest.mark.parametrize(
-        ("name", "setting", "default"),
-        [
-            ("default", "threshold", 0.05),
-            ("fast:policy=navacd", "threshold", 0.05),
-            ("default:space", "tolerance", 0.1),
-            ("vhacd", "hulls", 64),
-        ],
-    )
-    def test_names(self, name: str, setting: str, default: float) -> None:
-        method = make_method(name)
-        assert (method.name, method.setting, method.default) == (name, setting, default)
-
     @pytest.mark.parametrize("name", ["", "gredy", "fast:polcy=x", "fast:best", "coacd:best", "planes", "space"])
     def test_unknown_names_are_one_sentence(self, name: str) -> None:
         with pytest.raises(OptionError, match=r"has to be|is not known"):
@@ -149,7 +136,7 @@ def test_a_deployment_leaves_out_the_planes_that_it_names() -> None:
         policy_of(f"planes:no-edges:{network}", 0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 class TestRunner:
     def test_a_row_a_mesh_and_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         """Nor if the rows are lost: hulls that are there are only measured, and keep their seconds."""
@@ -272,7 +259,7 @@ class TestCommands:
         assert wrong.returncode == 1
         assert "there is no command 'x'" in wrong.stderr
 
-    @pytest.mark.slow
+    @pytest.mark.nightly
     def test_compare_writes_a_page_and_does_nothing_twice(self, meshes: Path, tmp_path: Path) -> None:
         out = tmp_path / "run"
         text = run(compare.app, meshes, "--out", out, "--methods", "fast,fast:policy=navacd", "--first", 2)
@@ -285,13 +272,6 @@ class TestCommands:
         assert "| 2 meshes | fast | fast@1.9 |" in page
         assert "| hulls; a mesh | 3; 1.5 | 2; 1.0 |" in page
         assert "| wall s, 2 threads: median, mean, most, sum |" in page
-
-    @pytest.mark.slow
-    def test_prices_are_held_against_times(self, meshes: Path) -> None:
-        """In a process of its own, since kernels are replaced by ones that are timed."""
-        command = [sys.executable, "-m", "benchmarks", "prices", str(meshes)]
-        told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
-        assert all(f"| {kernel} |" in told for kernel in ("choosing", "cutting", "judging", "filling"))
 
     @pytest.mark.parametrize(
         ("words", "says"),

@@ -12,12 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
 from scipy.spatial import ConvexHull
-from scipy.spatial.transform import Rotation
 
 import rlacd
 from rlacd import _native
 from rlacd.planes.candidates import Candidates, reflex_edge_planes
-from rlacd.policies import Policy, make_policy
+from rlacd.policies import make_policy
 from rlacd.policies.greedy import mid_planes
 from rlacd.solid.component import Component, Plane
 from tests.shapes import Floats, box, to_manifold, trimesh_of
@@ -140,19 +139,6 @@ def test_edges_that_more_than_two_faces_share_are_left_out() -> None:
         _native.candidate_planes(vertices[:3], fan[1:2], hull.body, 0, 4)
 
 
-@pytest.mark.parametrize(
-    "solid",
-    [
-        lambda: Manifold.cube((1, 2, 3)).rotate((10, 20, 30)),
-        lambda: Manifold.sphere(1, 48),
-        lambda: Manifold.cylinder(1, 1, 0.2, 32).refine(3),
-        Manifold.tetrahedron,
-    ],
-)
-def test_convex_solids_have_no_candidates(solid: Callable[[], Manifold]) -> None:
-    assert len(reflex_edge_planes(Component(solid()))) == 0
-
-
 X, Y, Z = np.eye(3).tolist()
 KNOWN: dict[str, tuple[Callable[[], Manifold], int, list[tuple[list[float], float]]]] = {
     "an L has one edge": (l_shape, 3, [(X, 1), (Y, 1), ([1, -1, 0], 0)]),
@@ -194,17 +180,6 @@ def test_the_best_edge_is_deep_sharp_and_long() -> None:
     assert weight[best] == pytest.approx(weight.max())
 
 
-def test_edges_of_a_scan_lie_deep_not_in_its_noise() -> None:
-    component = Component(noisy_scan())
-    edges = ReflexEdges.of(component)
-    depth = depth_below_hull(component, edges.middle)
-    chosen = depth[edges.chosen(reflex_edge_planes(component))]
-    assert len(depth) > 1000
-    assert len(chosen) == 4
-    assert chosen.min() > np.median(depth)
-    assert chosen.max() > np.quantile(depth, 0.9)
-
-
 def assert_planes_belong_to_edges(component: Component, count: int = 4) -> None:
     """Every plane contains a reflex edge; it halves its angle, or has one of its faces on one side and touches it."""
     edges, candidates = ReflexEdges.of(component), reflex_edge_planes(component, count)
@@ -227,7 +202,7 @@ def test_planes_belong_to_edges(name: str) -> None:
     assert_planes_belong_to_edges(Component(SOLIDS[name]()))
 
 
-boxes = st.lists(st.tuples(*[st.integers(0, 5)] * 3, *[st.integers(1, 4)] * 3), min_size=2, max_size=5)
+boxes = st.lists(st.tuples(*[st.integers(0, 5)] * 3, *[st.integers(1, 4)] * 3), min_size=1, max_size=5)
 turns = st.tuples(*[st.floats(-180, 180)] * 3)
 
 
@@ -240,16 +215,6 @@ def test_planes_of_any_boxes_belong_to_edges(sizes: list[tuple[int, ...]], turn:
         solid = to_manifold(np.float64(np.float32(mesh.vert_properties[:, :3])), mesh.tri_verts.astype(np.int32))
     if not solid.is_empty() and solid.volume() > 1e-6:
         assert_planes_belong_to_edges(Component(solid))
-
-
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_planes_turn_with_the_solid(axis: str) -> None:
-    turn = Rotation.from_euler(axis, 33, degrees=True)
-    still = reflex_edge_planes(Component(lopsided()))
-    turned = reflex_edge_planes(Component(lopsided().rotate(tuple(turn.as_euler("xyz", degrees=True)))))
-    assert len(still) == len(turned)
-    for plane in planes_of(still):
-        assert has(turned, tuple(turn.apply(plane.normal)), plane.offset)
 
 
 @pytest.mark.parametrize("name", ["L", "tilted table", "grooved cylinder", "lopsided"])
@@ -269,20 +234,6 @@ def test_navacd_halves_a_box_that_has_to_be_cut() -> None:
     plane = make_policy("navacd").choose(Component(box((0, 0, 0), (4, 2, 1))))
     assert plane is not None
     assert (abs(np.asarray(plane.normal)).max(), plane.offset) in {(1, 2), (1, 1), (1, 0.5)}
-
-
-@pytest.mark.parametrize("policy", [make_policy("navacd"), make_policy("greedy")], ids=["navacd", "greedy"])
-@pytest.mark.parametrize("name", SOLIDS)
-def test_policies_cut_every_solid_an_l_into_two_convex_parts(policy: Policy, name: str) -> None:
-    component = Component(SOLIDS[name]())
-    plane = policy.choose(component)
-    assert plane is not None
-    sides = component.cut(plane)
-    assert None not in sides
-    assert sum(side.volume for side in sides) == pytest.approx(component.volume)
-    assert plane == policy.choose(component, threads=3)
-    if name == "L":
-        assert sum(side.hull.volume for side in sides) == pytest.approx(3, rel=1e-7)
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (17, 31, 5)], ids=["upright", "tilted"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -164,23 +163,6 @@ def of_hull(hull: Hull) -> tuple[Floats, Floats]:
     return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize("squeezed", [(1, 1, 1e-10), (1, 1, 1e-7), (1, 1e-6, 1e-6), (1, 1e-4, 1e-10), (1, 1e-8, 1e-8)])
-def test_nothing_beyond_the_rim_of_a_flat_hull_or_the_tip_of_a_needle_is_inside(squeezed: tuple[float, ...]) -> None:
-    random = np.random.default_rng(4)
-    for turn in trimesh.transformations.random_rotation_matrix(random.random((3, 10))).transpose(2, 0, 1)[:, :3, :3]:
-        thin = np.vstack([random.normal(size=(6, 3)), (4, 0, 0), (-4, 0, 0)]) * squeezed
-        hull = Hull.of(thin @ turn.T)
-        if hull is None:
-            continue  # rounded to a plane
-        points = random.normal(size=(200, 3)) * 2 * (np.array(squeezed) > 1e-3) @ turn.T
-        expected = point_to_triangles(points, hull.vertices, hull.faces)
-        np.testing.assert_allclose(hull_union([hull]).distance(points), expected, atol=2e-5)
-        corners = np.ascontiguousarray(points[:120])
-        faces = np.arange(120, dtype=np.int32).reshape(-1, 3)
-        lower, upper, _ = hull_union([hull]).under(corners, faces, 1e-4)
-        assert lower - 2e-5 <= expected[:120].max() <= upper + 2e-5
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_places_of_the_greatest_distances(seed: int) -> None:
     """Measured there by point-to-triangle distances alone, it is as far as the lower bound says."""
@@ -200,31 +182,11 @@ def test_places_of_the_greatest_distances(seed: int) -> None:
     assert threaded == found
 
 
-def test_trees_made_by_several_threads_are_the_same() -> None:
-    ball = trimesh.creation.icosphere(6)
-    ball.vertices *= 1 + 0.01 * np.random.default_rng(0).normal(size=(len(ball.vertices), 1))
-    points = np.random.default_rng(1).uniform(-1.5, 1.5, (2000, 3))
-    vertices, faces = np.array(ball.vertices), np.array(ball.faces, dtype=np.int32)
-    assert len(faces) > 80_000  # or one thread makes it
-    answers = []
-    for threads in (1, 2, 7):
-        surface = _native.Surface(vertices, faces, threads)
-        answers.append((*surface.closest(points), surface.distance(points), surface.winding(points)))
-    for other in answers[1:]:
-        assert all(np.array_equal(a, b) for a, b in zip(answers[0], other, strict=True))
-
-
 def distances_to_a_ball(threads: int) -> Floats:
     ball = trimesh.creation.icosphere(3)
     points = np.random.default_rng(2).uniform(-1.5, 1.5, (3000, 3))
     surface = _native.Surface(np.array(ball.vertices), np.array(ball.faces, dtype=np.int32))
     return surface.distance(points, threads)
-
-
-def test_loops_that_share_threads_all_end() -> None:
-    alone = distances_to_a_ball(1)
-    with ThreadPoolExecutor(5) as callers:
-        assert all(np.array_equal(alone, found) for found in callers.map(distances_to_a_ball, [3, 8, 2, 16] * 10))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
@@ -244,19 +206,11 @@ def test_no_hulls_add_nothing_and_miss_everything() -> None:
 # --- closest points, winding numbers and samples of surfaces of any quality -------------------------------------------
 
 
-@pytest.mark.parametrize("width", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0.0])
-def test_needles_are_as_near_as_their_edges(width: float) -> None:
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0.3, width, 0]])
-    surface = _native.Surface(vertices, np.array([[0, 1, 2]], dtype=np.int32))
-    points = np.random.default_rng(0).uniform(-1, 2, (200, 3))
-    on_segment = np.stack([np.clip(points[:, 0], 0, 1), 0 * points[:, 0], 0 * points[:, 0]], axis=1)
-    np.testing.assert_allclose(surface.distance(points), np.linalg.norm(points - on_segment, axis=1), atol=width + 1e-8)
-
-
 @pytest.mark.parametrize("width", [1.0, 1e-9])
 def test_around_a_closed_surface_windings_are_whole_numbers(width: float) -> None:
     """Two rings through each other, at best as thick as rounding; rays meet their edges, corners, and faces edge on."""
-    ring, other = trimesh.creation.torus(1.0, 0.3), trimesh.creation.torus(1.0, 0.3).apply_translation([0.3, 0, 0])
+    ring = trimesh.creation.torus(1.0, 0.3, major_sections=16, minor_sections=8)
+    other = ring.copy().apply_translation([0.3, 0, 0])
     both = trimesh.util.concatenate([ring, other])
     scale = np.array([1, 1, width])
     vertices = np.ascontiguousarray(both.vertices * scale)

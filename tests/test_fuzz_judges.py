@@ -11,8 +11,7 @@ import trimesh
 from trimesh import creation
 
 import rlacd
-from fuzz.eye import farthest_from_triangles, outer_points
-from fuzz.geometry import Polytope, distance_to_triangles, distance_to_union, why_not_convex
+from fuzz.geometry import why_not_convex
 from fuzz.judges import Case, judge
 from fuzz.kernels import try_seed
 from fuzz.recipes import Shape
@@ -96,47 +95,6 @@ def test_what_is_wrong_with_a_hull_is_reported() -> None:
     pushed = np.array(ball.vertices)
     pushed[0] *= 0.9
     assert why_not_convex(pushed, np.array(ball.faces)) is not None
-
-
-def test_distances_are_those_of_the_brute_force_reference() -> None:
-    random = np.random.default_rng(3)
-    points = 2 * random.normal(size=(200, 3))
-    _, expected, _ = trimesh.proximity.closest_point(trimesh.Trimesh(ELL.vertices, ELL.faces), points)
-    np.testing.assert_allclose(distance_to_triangles(points, ELL.vertices[ELL.faces]), expected, atol=1e-12)
-    beyond = [np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=1) for low, high in CUBES]
-    hulls = [cube(bounds) for bounds in CUBES]
-    np.testing.assert_allclose(distance_to_union(points, hulls), np.minimum(*beyond), atol=1e-12)
-
-
-CUBES = np.array([[(0, 0, 0), (1, 1, 1)], [(1, 0, 0), (3, 1, 1)]], dtype=float)
-
-
-def cube(bounds: Any) -> Polytope:
-    return Polytope(*arrays(creation.box(bounds=bounds)))
-
-
-def test_the_farthest_point_is_that_of_trying_all() -> None:
-    random = np.random.default_rng(5)
-    for size in (0.01, 0.3, 2.0):
-        corners = random.uniform(-1, 1, (300, 1, 3)) + size * random.normal(size=(300, 3, 3))
-        points = 2 * random.normal(size=(1000, 3))
-        distance = distance_to_triangles(points, corners)
-        found = farthest_from_triangles(points, corners, random)
-        assert found.distance == pytest.approx(distance.max(), abs=1e-12)
-        np.testing.assert_array_equal(found.point, points[distance.argmax()])
-    assert farthest_from_triangles(np.zeros((0, 3)), corners, random).distance == 0
-
-
-@pytest.mark.parametrize("step", [0, 1e-7, -1e-7])
-def test_a_seam_between_hulls_is_not_outer(step: float) -> None:
-    hulls = [cube(CUBES[0]), cube(CUBES[1] + [step, 0, 0])]
-    points = outer_points(hulls, 20_000, np.random.default_rng(1))
-    on_seam = (np.abs(points[:, 0] - 1) < 1e-5) & (np.abs(points[:, 1:] - 0.5) < 0.49).all(axis=1)
-    assert len(points) > 10_000
-    assert not on_seam.any()
-    apart = [hulls[0], cube(CUBES[1] + [step + 1e-3, 0, 0])]
-    points = outer_points(apart, 20_000, np.random.default_rng(1))
-    assert ((points[:, 0] == 1) & (np.abs(points[:, 1:] - 0.5) < 0.49).all(axis=1)).sum() > 100
 
 
 @pytest.mark.parametrize("seed", [*range(40), 1047])

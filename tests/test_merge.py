@@ -13,29 +13,23 @@ from manifold3d import CrossSection, Manifold, Mesh64, OpType
 import rlacd
 from rlacd import _native
 from rlacd.criteria import Concavity
-from rlacd.criteria.navigable import Navigable
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import grow_cover, merge_parts
 from rlacd.merge.grow import SLIVER_LOSS, drop_slivers
-from rlacd.merge.merge import united_in_turn
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
-from rlacd.run import Run, Work
-from rlacd.solid.component import ClippedPart, Component, Part, Plane, is_thin, reunite
+from rlacd.run import Run
+from rlacd.solid.component import Component, Part, Plane, is_thin, reunite
 from rlacd.solid.hull import Hull, is_sliver
-from rlacd.solid.primitive import Balls
 from tests.shapes import (
-    bent_bar,
     block,
     box,
     dense,
     depth_outside,
     from_manifold,
     own_volume,
-    strangers,
     to_manifold,
-    together,
 )
 
 
@@ -55,60 +49,6 @@ def along(normal: tuple[float, float, float], offset: float) -> Plane:
 def run():
     with Run(2) as pool:
         yield pool
-
-
-def test_a_shattered_box_becomes_one_part(run) -> None:
-    parts = pieces_of(Manifold.cube((2, 1, 1), True), along((1, 2, 3), 0.1), along((-1, 1, 0.3), 0.0))
-    assert len(parts) == 4
-    (whole,) = merge_parts(parts, Concavity(0.01), run)
-    assert whole.volume == pytest.approx(2)
-    assert whole.hull.volume == pytest.approx(2)
-
-
-def sheets(gap: float) -> list[Component]:
-    return [Component(Manifold.cube((1, 1, 0.01)).translate((0, 0, i * (0.01 + gap)))) for i in range(2)]
-
-
-APART: dict[str, Callable[[], list[Component]]] = {
-    "an L": lambda: pieces_of(
-        Manifold.cube((2, 1, 1)) + Manifold.cube((1, 2, 1)), *(along(normal, 0.5) for normal in np.eye(3).tolist())
-    ),
-    # Joint R_v is small for a thin bore, but its wall lies deep inside the joint hull: both ways have to be tested.
-    "a tube": lambda: pieces_of(
-        Manifold.cube((1, 1, 1), True) - Manifold.cylinder(2, 0.06, 0.06, 24, True), along((1, 0, 0), 0.0)
-    ),
-    # The walls of the crack are surface of the union, and lie half a unit inside its hull.
-    "a deep crack": lambda: [Component(Manifold.cube((1, 1, 1)).translate((i * 1.001, 0, 0))) for i in range(2)],
-    "a gap deeper than the threshold": lambda: sheets(0.2),
-}
-
-
-@pytest.mark.parametrize("name", APART)
-def test_parts_stay_apart_where_their_joint_hull_is_not_tight(run, name: str) -> None:
-    assert len(merge_parts(APART[name](), Concavity(0.05), run)) >= 2
-
-
-def test_parts_apart_unite_where_the_gap_is_no_deeper_than_the_threshold(run) -> None:
-    assert len(merge_parts(sheets(0.015), Concavity(0.05), run)) == 1
-
-
-def test_every_part_of_a_merge_meets_the_criterion(run) -> None:
-    criterion = Concavity(0.05)
-    ring = Manifold.cylinder(0.3, 1, 1, 40, True) - Manifold.cylinder(1, 0.8, 0.8, 40, True)
-    parts = pieces_of(ring, *(along((np.cos(a), np.sin(a), 0), 0.0) for a in np.linspace(0, 3, 7)))
-    merged = merge_parts(parts, criterion, run)
-    assert len(merged) < len(parts)
-    assert all(criterion.is_met(part) for part in merged)
-    assert sum(part.volume for part in merged) == pytest.approx(sum(part.volume for part in parts))
-
-
-def test_only_the_common_area_of_two_faces_vanishes() -> None:
-    base = Component(Manifold.cube((3, 3, 1)))
-    tower = Component(Manifold.cube((1, 1, 2)).translate((1, 1, 1)))
-    glued = Part.glued(base, tower)
-    assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(30 + 10 - 2)
-    glued = Part.glued(Component(box((0, 0, 0), (1, 1, 1))), Component(box((2, 0, 0), (3, 1, 1))))
-    assert _native.mesh_area(glued.vertices, glued.faces) == pytest.approx(12), "coplanar faces on the same side stay"
 
 
 def test_parts_that_are_all_slivers_keep_their_surfaces() -> None:
@@ -202,15 +142,6 @@ def test_bars_that_cross_take_fewer_parts_that_are_tight_and_lose_nothing() -> N
         assert [part.hull.vertices.tobytes() for part in others] == [part.hull.vertices.tobytes() for part in after]
 
 
-@pytest.mark.parametrize("solid", [together(bent_bar()), Component(box((0, 0, 0), (2, 1, 1)))], ids=["bent", "box"])
-def test_where_nothing_crosses_no_work_is_done(solid: Component) -> None:
-    with Run(1) as run:
-        parts = merged(solid, run)
-        done = run.work.done
-        assert grow_cover(parts, CRITERION, run, solid) is parts
-        assert run.work.done == done
-
-
 @pytest.mark.parametrize("units", [0, 3_000, 30_000])
 def test_without_enough_work_the_merged_parts_stay(units: int) -> None:
     solid = bars(8, 0)
@@ -233,17 +164,6 @@ def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
     left, rest = root.cut(Plane((1.0, 0.0, 0.0), -0.15))
     middle, right = rest.cut(Plane((1.0, 0.0, 0.0), 0.15))
     return root, [left, middle, right]
-
-
-def test_a_beam_is_one_part_although_another_crosses_it(run: Run) -> None:
-    root, parts = arms_and_beam(CROSS)
-    assert len(merge_parts(parts, TIGHT, run)) == 3
-    merged = merge_parts(parts, TIGHT, run, solid=root)
-    assert sorted(part.hull.volume for part in merged) == pytest.approx([2 * 0.09, 2 * 0.09])
-    assert all(part.volume == pytest.approx(2 * 0.09) for part in merged)  # the crossing belongs to both
-    (beam,) = (part for part in merged if isinstance(part, ClippedPart))
-    assert set(beam.members) == {parts[0], parts[2]}
-    assert TIGHT.error(beam) < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -271,17 +191,6 @@ def test_hulls_of_crossing_beams_cover_them_and_no_more() -> None:
     assert (window - Manifold.batch_boolean(hulls, OpType.Add)).volume() == pytest.approx(0, abs=1e-9)
     assert all((hull - window).volume() == pytest.approx(0, abs=1e-9) for hull in hulls)
     assert found.report.concavity.max < 1e-3
-
-
-def test_what_is_united_with_a_share_is_a_share(run: Run) -> None:
-    """Gluing would count what two of them have in common twice."""
-    root, parts = arms_and_beam(CROSS)
-    merged = merge_parts(parts, TIGHT, run, solid=root)
-    *_, ((whole,), _) = united_in_turn(merged, Part.glued, TIGHT, Work(), run)
-    assert isinstance(whole, ClippedPart)
-    assert whole.volume == pytest.approx(CROSS.volume())
-    united = reunite(strangers(whole.members))
-    assert united.volume == pytest.approx(CROSS.volume())
 
 
 def heap_of_blocks(random: np.random.Generator) -> tuple[Component, list[Manifold]]:
@@ -328,13 +237,6 @@ def test_a_quick_no_about_a_hull_or_a_pair_is_never_wrong(seed: int, threshold: 
             assert not alone
 
 
-def test_time_may_run_out_before_pairs_are_looked_at() -> None:
-    root, parts = arms_and_beam(CROSS)
-    late = Run(1, timeout=-1.0)
-    assert len(merge_parts(parts, TIGHT, late, solid=root)) == len(parts)
-    assert late.stopped_by == "timeout"
-
-
 def grooved() -> Manifold:
     """A groove from end to end: its corners lie on the hull, its bottom deep inside; the hull is nowhere far away."""
     groove = CrossSection([[(-0.04, 0.0), (0.0, -0.3), (0.04, 0.0)]])
@@ -364,9 +266,3 @@ def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:
     pieces = [Component(piece) for piece in folded.split_by_plane((1, 0.2, 0.1), 0.1)]
     united = reunite(pieces)
     assert united.volume == pytest.approx((block(2, 0.5, 0.5) + block(0.5, 2, 0.02, (0.3, 0, 0))).volume(), rel=1e-6)
-
-
-def test_balls_do_not_ask_what_is_inside_a_hull() -> None:
-    component = Component(CROSS)
-    space = Navigable(0.1, 0.05, Balls(np.zeros((0, 3)), np.zeros(0)))
-    assert not space.early_out.is_feasible(component.filling, component.hull)

@@ -124,14 +124,12 @@ assert 2**23 < peak_memory() < 2**33
     assert run.returncode == 0, run.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("file", "marks"),
     [
         ("io/test_load.py", "not slow and not nightly"),
         ("io/test_formats.py", "not slow and not nightly"),
-        ("options/test_options.py", "not slow and not nightly"),
-        ("test_decomposition.py", "not slow and not nightly"),
         ("pool/test_pool.py", "not nightly"),
     ],
 )

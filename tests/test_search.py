@@ -257,21 +257,3 @@ def test_a_convex_solid_needs_no_search() -> None:
     result = rlacd.decompose(trimesh.creation.icosphere(), quality="best")
     assert len(result) == 1
     assert result.report.search.steps == 0
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"quality": "better"},
-        {"quality": "best", "budget": 0},
-        {"quality": "best", "budget": math.inf},
-        {"quality": "best", "search_steps": -1},
-        {"quality": "best", "search_steps": 1.5},
-        {"quality": "fast", "budget": 1.0},
-        {"merge": False, "search_steps": 3},
-        {"quality": "balanced", "merge": False},
-    ],
-)
-def test_bad_options(options: dict[str, Any]) -> None:
-    with pytest.raises(rlacd.OptionError):
-        rlacd.decompose(([[0, 0, 0]], [[0, 0, 0]]), **options)

@@ -133,15 +133,6 @@ def test_candidates_are_the_papers_150() -> None:
     assert plane.offset == candidates.offsets[4, 7]
 
 
-@pytest.mark.parametrize("score", SCORES)
-def test_greedy_cuts_a_dumbbell_at_its_bar(score: str) -> None:
-    balls = Manifold.sphere(0.5, 32).translate((-1, 0, 0)) + Manifold.sphere(0.5, 32).translate((1, 0, 0))
-    dumbbell = Component(balls + Manifold.cylinder(2, 0.1, 0.1, 16, True).rotate((0, 90, 0)))
-    plane = Greedy(score).choose(dumbbell)
-    assert abs(plane.normal[0]) > 0.99
-    assert abs(plane.offset) < 0.7
-
-
 def test_section_of_a_box() -> None:
     component = Component(Manifold.cube((1, 2, 3)))
     scores = _native.sweep(component.vertices, component.faces, np.eye(3), np.full((3, 1), 0.25), 1)

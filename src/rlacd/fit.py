@@ -8,8 +8,6 @@ from typing import Any, Literal, NamedTuple
 
 from rlacd.options.names import UNITS
 
-_LENGTHS = ("concavity", "distance")
-
 RESOLVED = 1e-3
 """Distances in the frame above this (0.05 % of the longest side) are measured to 1 %; others are upper bounds."""
 
@@ -79,15 +77,15 @@ class Fit(NamedTuple):
     """Number of balls of navigable space."""
 
     @classmethod
-    def of(cls, *, volume: VolumeFit | None, navigable: SpaceFit | None, **lengths: LengthFit | None) -> Fit | None:
-        """That of the criterion that was measured; None if none was."""
-        for name, found in lengths.items():
-            if found is not None:
+    def of(cls, report: object) -> Fit | None:
+        """That of the criterion that a report has measurements of; None if it has none."""
+        for name, found in vars(report).items():
+            if isinstance(found, LengthFit):
                 return cls(name, found.per_part, found.max, found.threshold)
-        if volume is not None:
-            return cls("added_volume", volume.per_part, volume.max, volume.tolerance)
-        if navigable is not None:
-            return cls("intrusion", navigable.intrusion.per_part, navigable.intrusion.max, None, navigable.balls)
+            if isinstance(found, VolumeFit):
+                return cls("added_volume", found.per_part, found.max, found.tolerance)
+            if isinstance(found, SpaceFit):
+                return cls("intrusion", found.intrusion.per_part, found.intrusion.max, None, found.balls)
         return None
 
     @property
@@ -98,7 +96,7 @@ class Fit(NamedTuple):
     @property
     def is_length(self) -> bool:
         """Whether it is a length, which the threshold limits."""
-        return self.name in _LENGTHS
+        return self.name not in ("added_volume", "intrusion")
 
     def unit(self, scale: float) -> float:
         """Unit of the measurement, where the unit of lengths is `scale`: 1 for a share of volume."""

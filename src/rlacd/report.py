@@ -265,7 +265,7 @@ class Report:
     @property
     def fit(self) -> Fit | None:
         """How tight the hulls are, whatever the criterion; None if it is unknown."""
-        return Fit.of(concavity=self.concavity, distance=self.distance, volume=self.volume, navigable=self.navigable)
+        return Fit.of(self)
 
     def fit_words(self, unit: str | None = None) -> str:
         """Say how well hulls fit, by the criterion, and how far they reach beyond the input; empty if it is unknown.

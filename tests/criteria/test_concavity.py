@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 from rlacd import _native
 from rlacd.criteria.concavity import Concavity
-from rlacd.errors import OptionError
 from rlacd.solid.distance import hull_union
 from tests.shapes import Closed, box, dense, depth_in, from_manifold, to_manifold
 
@@ -200,11 +199,3 @@ def test_parts_out_of_reach_and_excluded_volumes_never_meet() -> None:
         assert not criterion.early_out.excludes(pair.volume, pair.hull.volume) or not criterion.is_met(pair)
     assert not criterion.early_out.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.166**3)
     assert criterion.early_out.excludes(1.0, 1.0 + 4 / 3 * np.pi * 0.167**3)
-
-
-@pytest.mark.parametrize("threshold", [0, -1, float("nan")])
-def test_bad_options_are_refused(threshold: float) -> None:
-    with pytest.raises(OptionError, match="must be positive"):
-        Concavity(threshold)
-    with pytest.raises(OptionError, match="must be positive"):
-        Concavity().measure(from_manifold(box((0, 0, 0), (1, 1, 1))), threshold)

@@ -102,8 +102,10 @@ def test_a_second_parser_reads_the_same(tmp_path: Path, ending: str) -> None:
 def test_hulls_stay_hulls_in_the_file(
     tmp_path: Path, ending: str, seed: int, scale: float, distance: float, squash: float
 ) -> None:
-    """At any size, however far from the origin compared to the size, and thin as well as round."""
-    hull = moved(hull_of(random_hull(seed).vertices * [1.0, 1.0, squash]), scale, np.full(3, distance * scale))
+    """At any size, however far from the origin compared to the size; thin, round, or with flat sides that may dent."""
+    turn = trimesh.transformations.random_rotation_matrix(np.random.default_rng(seed).random(3))[:3, :3]
+    points = (random_hull(seed) if seed % 2 else trimesh.creation.box()).vertices * [1.0, 1.0, squash] @ turn
+    hull = moved(hull_of(points), scale, np.full(3, distance * scale))
     path = save_hulls([hull], tmp_path / f"out.{ending}")
     if ending == "glb":
         mesh = in_place(path)
@@ -257,6 +259,18 @@ def test_a_file_of_somebody_else_in_the_folder_is_never_replaced(tmp_path: Path,
     with pytest.raises(OutputError, match="did not write"):
         save_hulls(THREE, tmp_path, stem="chair")
     assert (tmp_path / "precious").read_text() == "precious"
+
+
+def test_a_folder_is_locked_before_anything_in_it_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def there() -> dict[str, bytes]:
+        return {path.name: path.read_bytes() for path in tmp_path.glob("chair*")}
+
+    fcntl, seen = pytest.importorskip("fcntl"), []
+    save_hulls(THREE, tmp_path, stem="chair")
+    before = there()
+    monkeypatch.setattr(fcntl, "flock", lambda _, how: seen.append((how, there())))
+    save_hulls(THREE[:1], tmp_path, stem="chair")
+    assert seen == [(fcntl.LOCK_EX, before)]
 
 
 AT_ONCE = """

@@ -57,13 +57,3 @@ def test_a_perfect_fit_is_cold_and_inner_walls_are_marked() -> None:
         assert wall.any()
         assert (part.distance[wall] == INNER).all()
         assert np.abs(part.distance[~wall]).max() < 1e-12
-
-
-def test_the_number_of_triangles_and_the_threads_are_kept() -> None:
-    result = rlacd.decompose(elbow(), threshold=0.05)
-    few, many = heat_map(result, triangles=500), heat_map(result, triangles=50_000)
-    assert sum(len(part.faces) for part in few) < 4 * 500
-    assert sum(len(part.faces) for part in few) < sum(len(part.faces) for part in many)
-    for one, two in zip(heat_map(result, threads=1), heat_map(result, threads=2), strict=True):
-        assert np.array_equal(one.vertices, two.vertices)
-        assert np.array_equal(one.distance, two.distance)

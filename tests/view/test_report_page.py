@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import itertools
 import json
 import re
 import sys
@@ -69,6 +70,14 @@ def test_the_scene_lies_about_the_origin_and_knows_its_up(result: Decomposition)
         corners = np.concatenate([points(part["vertices"]) for part in drawn["parts"]])
         assert corners.max(axis=0) == pytest.approx([1.0, 0.2, 0.5], abs=1e-6)
         assert corners.min(axis=0) == pytest.approx([-1.0, -0.2, -0.5], abs=1e-6)
+
+
+def test_hulls_that_touch_have_other_colours() -> None:
+    places = np.array(list(itertools.product(range(3), repeat=3)), dtype=float)
+    boxes = [hull_of(trimesh.creation.box().vertices + place) for place in places]
+    colors = [part["color"] for part in scene(Decomposition.of(boxes, trimesh.util.concatenate(boxes)), "z")["parts"]]
+    for (here, one), (there, other) in itertools.combinations(zip(places, colors, strict=True), 2):
+        assert one != other or np.abs(here - there).max() > 1
 
 
 @pytest.mark.promise("no-network")

@@ -1,8 +1,7 @@
 """Work, counted rather than timed, so that it is the same on every machine and for every number of threads.
 
-A unit takes about a microsecond on one core; the weights below were fitted to measured CPU times
-(`benchmarks/prices.py`).
-A limit on work does not depend on the clock, so results under such a limit depend only on the input.
+A unit takes about a microsecond on one core; the weights below were fitted to measured CPU times. A limit on work does
+not depend on the clock, so results under such a limit depend only on the input.
 """
 
 from __future__ import annotations

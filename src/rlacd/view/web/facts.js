@@ -46,18 +46,23 @@ export const HINTS = {
   wrapped: "The surface could not be closed face by face, so a tight skin was wrapped around it.",
 };
 
+/** A criterion that is a length, by its name, with what it measured; nothing with others. */
+export const lengthOf = (report) => Object.entries(report ?? {}).find(([, fit]) => fit?.per_part !== undefined && fit.threshold) ?? [];
+
+export const capital = (word) => word[0].toUpperCase() + word.slice(1);
+
 /** One line: hulls, triangles, how tight, how long; each with its explanation. */
 export function summary(scene, { draft = false } = {}) {
   const { report, parts } = scene;
   if (!report) return [];
-  const { concavity, distance, volume, navigable, seconds } = report;
+  const { volume, navigable, seconds } = report;
+  const [criterion, length] = lengthOf(report);
   const words = [
     term(plural(parts.length, "hull"), HINTS.hull),
     report.primitives && term(plural(parts.filter((part) => part.primitive).length, "primitive"), HINTS.primitives),
     scene.robot && term(plural(scene.robot.links.length, "link"), HINTS.links),
     term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
-    concavity && term(`concavity at most\u00a0${digits(concavity.max)}`, HINTS.concavity),
-    distance && term(`distance at most\u00a0${digits(distance.max)}`, HINTS.concavity),
+    length && term(`${criterion} at most\u00a0${digits(length.max)}`, HINTS.concavity),
     volume?.max != null && term(`${percent(volume.max)} of volume added`, HINTS.added),
     navigable && term(`${plural(navigable.balls, "ball")} left free`, HINTS.balls),
     !draft && seconds?.total != null && term(`${seconds.total.toFixed(2)}\u00a0s`, HINTS.seconds),
@@ -97,8 +102,8 @@ export function fitTable(report, scene) {
   const add = (name, value, hint) => {
     if (value != null) rows.push([term(name, hint), measure(value, scene), `${digits(50 * value, 2)}\u00a0%`]);
   };
-  add("Concavity, at most", report.concavity?.max, HINTS.concavity);
-  add("Distance, at most", report.distance?.max, HINTS.concavity);
+  const [criterion, length] = lengthOf(report);
+  if (length) add(`${capital(criterion)}, at most`, length.max, HINTS.concavity);
   if (report.volume?.max != null) rows.push([term("Largest added volume", HINTS.added), percent(report.volume.max), ""]);
   add("Deepest intrusion", report.navigable?.intrusion?.max, HINTS.intrusion);
   add("Hulls beyond the input", report.hausdorff?.over, HINTS.over);

@@ -1,5 +1,5 @@
 // The list of parts. Hovering highlights, clicking shows one part alone; arrow keys walk through it.
-import { HINTS } from "page/facts";
+import { HINTS, capital, lengthOf } from "page/facts";
 import { column, make } from "page/widgets";
 
 /** What a part is called: by its link, if it is of a robot. */
@@ -31,8 +31,9 @@ export class PartList {
     const navigable = Boolean(scene.report?.navigable);
     const all = scene.parts.reduce((sum, part) => sum + part.volume, 0) || 1;
     const volume = scene.report?.volume;
+    const [criterion, length] = lengthOf(scene.report);
     this.asShare = Boolean(volume);
-    this.limit = navigable ? null : (volume?.tolerance ?? (scene.report?.concavity ?? scene.report?.distance)?.threshold);
+    this.limit = navigable ? null : (volume?.tolerance ?? length?.threshold);
     this.data = scene.parts.map((part, index) => ({
       index,
       name: scene.robot ? partName(part, index, scene) : String(index).padStart(3, "0"),
@@ -46,7 +47,7 @@ export class PartList {
       ["index", "Part", "In the order of the file."],
       ["faces", "Faces", scene.report?.primitives ? "Triangles of the hull, or the primitive that the part is." : "Triangles of the hull."],
       ["share", "Volume", "Share of all hulls' volume."],
-      volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", "Intrusion", HINTS.intrusion] : ["error", scene.report?.distance ? "Distance" : "Concavity", `${HINTS.concavity} The bar is full at the threshold.`],
+      volume ? ["error", "Added", `${HINTS.added} The bar is full at the tolerance.`] : navigable ? ["error", "Intrusion", HINTS.intrusion] : ["error", capital(criterion ?? "concavity"), `${HINTS.concavity} The bar is full at the threshold.`],
     ];
     this.head.replaceChildren(
       ...this.columns.map(([key, text, hint]) =>
