@@ -288,7 +288,7 @@ def gears_that_mesh() -> Scene:
 
 
 def pile_of_fifty() -> Scene:
-    """Mugs, turned at random, come to lie in a bin."""
+    """Mugs, turned at random, come to lie in a bin: after 3 s, whichever hulls they have, one may still slide."""
     walls = [
         Body((0.02 if x else 0.7, 0.02 if y else 0.7, 2.0), (0.34 * x, 0.34 * y, 1.0), moves=())
         for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))
@@ -305,7 +305,7 @@ def pile_of_fifty() -> Scene:
         fastest = max(float(np.linalg.norm(world.joints(4 + index)[1])) for index in range(50))
         return bool(np.abs(there[:, :2]).max() < 0.4 and there[:, 2].min() > -0.003 and fastest < 0.3)
 
-    return Scene([*walls, *mugs], 3.0, passed)
+    return Scene([*walls, *mugs], 4.0, passed)
 
 
 def stack_of_ten() -> Scene:

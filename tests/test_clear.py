@@ -59,6 +59,24 @@ def test_links_too_close_for_any_hulls_are_named_with_depth_and_joint_position(t
     assert "lug_joint = " in said or "at rest" in said
 
 
+@pytest.mark.slow
+@pytest.mark.promise("links-clear")
+def test_links_that_would_take_too_many_hulls_keep_theirs_and_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, found = fork_and_lug().write(tmp_path), []
+    for growth, spare in ((3, 16), (1, 0)):
+        monkeypatch.setattr(rlacd.clear.mend, "MOST_GROWTH", growth)
+        monkeypatch.setattr(rlacd.clear.mend, "SPARE", spare)
+        done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", quality="fast", threads=1, samples=50)
+        is_told = [warning.endswith("to be clear of each other takes too many hulls.") for warning in done.warnings]
+        found.append(([len(link.hulls) for link in done.links], is_told))
+    ((fork, lug), free), (kept, told) = found
+    assert (free, told) == ([], [True])
+    assert kept[0] == fork
+    assert kept[1] < lug <= max(3 * kept[1], kept[1] + 16), "the lug alone is mended"
+
+
 def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: Path) -> None:
     """Of three links in a row, the outer two cross in the input wherever the joints are."""
     links = {

@@ -206,7 +206,7 @@ def test_where_episodes_are_played_and_a_worker_that_is_killed_change_nothing(me
     killed: list[psutil.Process] = []
 
     def kill_one(line: str) -> None:
-        if line.startswith("cut") and len(killed) < 2:
+        if line.startswith("step") and len(killed) < 2:
             killed.append(pool_processes()[-1])
             killed[-1].kill()
 

@@ -57,6 +57,7 @@ def test_a_format_whose_extra_is_missing_names_it(tmp_path: Path, ending: str, m
         pytest.param("step", b"ISO-10303-21;", id="the head of a STEP file"),
         pytest.param("stp", (CASES / "stand.step").read_bytes()[:9000], id="a STEP file cut off"),
         pytest.param("igs", bytes(200) + b"S", id="zeros as IGES"),
+        pytest.param("igs", (CASES / "ball_inch.igs").read_bytes()[:4000], id="an IGES file cut off"),
         pytest.param("usda", b"#usda 1.0\n(((", id="USD as text"),
         pytest.param("usdc", b"PXR-USDC" + b"\xff" * 200, id="USD in binary"),
         pytest.param("usdz", b"PK\x03\x04" + bytes(60), id="an archive of USD"),

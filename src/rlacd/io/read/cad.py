@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from pathlib import Path
 
@@ -24,6 +25,9 @@ MOST_OF_CAD = 500_000
 ANGLE = 0.5
 """Radians between neighbouring triangles of a curved surface, however small: 13 sides a circle."""
 
+_LAST_LINE = re.compile(rb"^.{72}T", re.MULTILINE)
+"""Of an IGES file. Without it, OpenCASCADE takes what is there for all."""
+
 ROUGH = 0.1
 """The same as a share of the edge that a surface ends at, where only its size is wanted."""
 
@@ -41,6 +45,8 @@ def read_cad(path: Path, content: bytes, fineness: Fineness) -> Contents:
         The extra ``cad`` is not installed.
     """
     kind = "step" if path.suffix.lower() in (".step", ".stp") else "iges"
+    if kind == "iges" and _LAST_LINE.search(content) is None:
+        raise damaged(path, "IGES", "its last line is missing")
     wanted = {"path": str(path), "kind": kind, **fineness._asdict()}
     answer = answer_of(SERVER, path, kind.upper(), wanted, {"file": content})
     glb, contents = answer.blobs["glb"], read_gltf(path, answer.blobs["glb"])
