@@ -59,13 +59,19 @@ def test_a_convex_body_is_one_hull_within_any_limits_and_a_warning_tells_how_far
         assert result.report.hausdorff.over == pytest.approx(out, abs=0.003)
 
 
+RING = trimesh.creation.torus(1.0, 0.35, 48, 32)
+
+
+@pytest.fixture(scope="module")
+def free() -> rlacd.Decomposition:
+    return rlacd.decompose(RING, threads=1, quality="fast")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.promise("presets")
-def test_a_preset_takes_at_most_twice_the_hulls(name: str) -> None:
-    preset, mesh = PRESETS[name], trimesh.creation.torus(1.0, 0.35, 48, 32)
-    free = rlacd.decompose(mesh, threads=1, quality="fast")
-    result = rlacd.decompose(mesh, preset=name, threads=1, quality="fast")
+def test_a_preset_takes_at_most_twice_the_hulls(name: str, free: rlacd.Decomposition) -> None:
+    preset, result = PRESETS[name], rlacd.decompose(RING, preset=name, threads=1, quality="fast")
     assert max(len(hull.vertices) for hull in result) <= (preset.max_vertices or np.inf)
     assert max(len(hull.faces) for hull in result) <= (preset.max_faces or np.inf)
     assert result.report.options["preset"] == name
