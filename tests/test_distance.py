@@ -233,7 +233,7 @@ def test_winding_of_an_open_surface_is_the_solid_angle_it_covers() -> None:
 
 
 def test_fast_winding_is_near_the_exact_sum(corpus: Path) -> None:
-    for name in (corpus / "quick.txt").read_text().split()[:8]:
+    for name in (corpus / "quick.txt").read_text().split()[:4]:
         mesh = trimesh.load(corpus / name, process=False)
         vertices = np.ascontiguousarray(2 * (mesh.vertices - mesh.bounds.mean(axis=0)) / mesh.extents.max())
         faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)

@@ -20,8 +20,8 @@ from rlacd.merge.grow import SLIVER_LOSS, drop_slivers
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.run import Run
-from rlacd.solid.component import Component, Part, Plane, is_thin, reunite
-from rlacd.solid.hull import Hull, is_sliver
+from rlacd.solid.component import Component, Part, Plane, reunite
+from rlacd.solid.hull import Hull
 from tests.shapes import (
     block,
     box,
@@ -64,14 +64,6 @@ def test_parts_that_are_all_slivers_keep_their_surfaces() -> None:
 
 def slab(height: float, z: float = 0.0) -> Component:
     return Component(Manifold.cube((1, 1, height)).translate((0, 0, z)))
-
-
-def test_slivers_are_distinguished_from_thin_but_sound_parts() -> None:
-    assert is_sliver(slab(0.01).hull)
-    assert not is_sliver(slab(0.03).hull)
-    assert not is_sliver(Component(Manifold.sphere(1, 32)).hull)
-    assert is_thin(slab(1e-4))
-    assert not is_thin(slab(2e-3))
 
 
 def test_a_sliver_goes_only_where_others_stand_for_it() -> None:

@@ -142,31 +142,6 @@ def test_stopped_at_any_time_the_hulls_cover_the_solid() -> None:
         assert uncovered(result, mesh) <= 1e-3
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_a_proxy_is_near_closed_and_of_the_same_kind(shape: str) -> None:
-    mesh = SHAPES[shape]()
-    solid = component_of(mesh)
-    proxy = simplify(solid, 0.05)
-    simple = trimesh.Trimesh(proxy.component.vertices, proxy.component.faces, process=False)
-    assert len(simple.faces) < 0.2 * len(mesh.faces)
-    assert simple.is_watertight
-    assert simple.is_winding_consistent
-    assert simple.euler_number == mesh.euler_number
-    assert simple.volume == pytest.approx(solid.volume, rel=0.02)
-    distances = _native.Surface(proxy.component.vertices, proxy.component.faces).distance(solid.vertices, 1)
-    assert np.quantile(distances, 0.98) <= 0.005
-
-
-def test_simplifying_stops_where_the_topology_would_change() -> None:
-    torus = trimesh.creation.torus(1.0, 0.3, 24, 12)
-    simplifier = _native.Simplifier(np.array(torus.vertices), np.array(torus.faces, dtype=np.int32))
-    simplifier.reduce(0)
-    simple = trimesh.Trimesh(*simplifier.mesh(), process=False)
-    assert simple.is_watertight
-    assert simple.euler_number == 0
-    assert 7 <= len(simple.vertices) < 40  # no triangulation of a torus has fewer than seven vertices
-
-
 def test_simplifying_gives_the_same_bytes_every_time_and_for_any_number_of_threads() -> None:
     mesh = noisy(trimesh.creation.torus(1.0, 0.3, 200, 100))  # large enough for sweeps, and for several threads
     found = []

@@ -238,15 +238,6 @@ def test_where_one_policy_fails_the_other_takes_over_for_good() -> None:
         assert len(cut_by(tree, coarser)) == len(cut_by(CutTree(solid, Greedy(), run), coarser))
 
 
-@pytest.mark.usefixtures("few")
-def test_a_second_policy_that_is_no_better_changes_nothing() -> None:
-    solid = cross()
-    with Run(1) as run:
-        alone = cut_by(CutTree(solid, Slices(), run))
-        both = cut_by(CutTree(solid, Slices(), run, second=Slices()))
-    assert [part.volume for part in both] == [part.volume for part in alone]
-
-
 @pytest.mark.parametrize("units", [0.0, 3e3])
 def test_work_ends_the_cutting(units: float) -> None:
     with Run(1) as run:

@@ -97,17 +97,6 @@ def test_deepest_point_that_is_no_corner_and_no_centroid(levels: int) -> None:
     assert not Concavity(1 - x - 1e-3).is_met(part)
 
 
-@pytest.mark.parametrize("thickness", [0.3, 0.05, 0.01, 1e-3])
-def test_thin_shell(thickness: float) -> None:
-    # A cup: solid of a box with a box taken out from the top.
-    t = thickness
-    cup = box((-1, -1, -1), (1, 1, 1)) - box((-1 + t, -1 + t, -1 + t), (1 - t, 1 - t, 2))
-    check(from_manifold(cup))
-    measured = Concavity().measure(from_manifold(cup), TOLERANCE)
-    assert measured.hull_to_part[0] == pytest.approx(1 - t, abs=TOLERANCE)  # the middle of the open top
-    assert measured.part_to_hull[0] <= t + 1e-12  # no point of the walls is deeper, nor are the rim's inner faces
-
-
 def test_sliver_facets_do_not_shorten_distances() -> None:
     # Points along a box's edges, off by rounding: the hull has needle facets whose computed normals are noise.
     rng = np.random.default_rng(0)

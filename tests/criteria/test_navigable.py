@@ -148,38 +148,10 @@ def test_the_boundary_is_covered(name: str, radius: float, tolerance: float) -> 
     assert np.quantile(gap, 0.99) < 0.6 * nav.radius
 
 
-@pytest.mark.parametrize("turn", range(4))
-def test_creases_and_corners_get_a_ball(turn: int) -> None:
-    """Where three walls meet a ball touches all of them, and where two meet there is one every spacing."""
-    corner = turned(box((-1, -1, -1), (1, 1, 1)) - box((-0.5, -0.5, -0.5), (2, 2, 2)), turn)
-    solid = solid_of(corner)
-    nav = Navigable.of(NavigableSpace(RADIUS, TOLERANCE), solid)
-    off_walls = (upright(solid.frame.to_input(nav.balls.centres), turn) + 0.5) * solid.frame.scale
-    touched = (np.abs(off_walls - (R + T)) < 1e-6).sum(axis=1)
-    assert (touched == 3).sum() == 1
-    for axis in range(3):
-        others = np.delete(off_walls, axis, axis=1)
-        along = np.sort(off_walls[(np.abs(others - (R + T)) < 1e-6).all(axis=1), axis])
-        assert np.diff(along).max() < 1.25 * R
-        assert along[-1] > 1.3 * solid.frame.scale
-
-
-@pytest.mark.parametrize("turn", [0, 1])
-@pytest.mark.parametrize("hole", [0.2, 0.4])
-@pytest.mark.parametrize(("share", "is_open"), [(0.97, True), (1.1, False)])
-def test_the_hole_of_a_torus_is_open_when_the_ball_fits(turn: int, hole: float, share: float, is_open: bool) -> None:
-    """A ball too large for it sinks into the hole from both sides, but not to its middle."""
-    solid = solid_of(turned(torus(hole), turn))
-    nav = Navigable.of(NavigableSpace(radius_abs=0.7 * share * hole, tolerance_abs=0.3 * share * hole), solid)
-    centres = solid.frame.to_input(nav.balls.centres)
-    assert len(centres) > 0
-    assert (np.linalg.norm(centres, axis=1) < 0.43 * hole).any() == is_open
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize("turn", range(2))
 @pytest.mark.parametrize("wall", [0.01, 0.06, 0.3])
-@pytest.mark.parametrize("share", [0.96, 0.98, 1.02, 1.04])
+@pytest.mark.parametrize("share", [0.98, 1.02])
 def test_a_door_lets_in_what_is_narrower(turn: int, wall: float, share: float) -> None:
     diameter = 0.2
     home = turned(house(share * diameter, wall), turn)

@@ -62,13 +62,21 @@ def test_a_convex_body_is_one_hull_within_any_limits_and_a_warning_tells_how_far
         assert result.report.hausdorff.over == pytest.approx(out, abs=0.003)
 
 
+RING = trimesh.creation.torus(1.0, 0.35, 48, 32)
+
+
+@pytest.fixture(scope="module", params=[RING, CROSSING_BALLS], ids=["ring", "balls"])
+def unlimited(request: pytest.FixtureRequest) -> tuple[trimesh.Trimesh, rlacd.Decomposition]:
+    return request.param, rlacd.decompose(request.param, threads=1, quality="fast")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.promise("presets")
-@pytest.mark.parametrize("mesh", [trimesh.creation.torus(1.0, 0.35, 48, 32), CROSSING_BALLS], ids=["torus", "balls"])
-def test_a_preset_takes_at_most_twice_the_hulls(name: str, mesh: trimesh.Trimesh) -> None:
-    preset = PRESETS[name]
-    free = rlacd.decompose(mesh, threads=1, quality="fast")
+def test_a_preset_takes_at_most_twice_the_hulls(
+    name: str, unlimited: tuple[trimesh.Trimesh, rlacd.Decomposition]
+) -> None:
+    preset, (mesh, free) = PRESETS[name], unlimited
     result = rlacd.decompose(mesh, preset=name, threads=1, quality="fast")
     assert max(len(hull.vertices) for hull in result) <= (preset.max_vertices or np.inf)
     assert max(len(hull.faces) for hull in result) <= (preset.max_faces or np.inf)

@@ -11,7 +11,7 @@ from rlacd.repair.union import to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.solid.frame import HALF_THICKNESS
 from tests.repair.repaired import BOX, join, moved, solid_of, steps, volume
-from tests.shapes_bad import band
+from tests.shapes_bad import band, klein_bottle
 
 
 def test_a_sheet_that_hangs_between_two_boxes_stays():
@@ -125,3 +125,7 @@ def test_cloth_is_never_filled():
     solid = solid_of(cloth)
     assert steps(solid) == ["slab"]
     assert not solid.warnings
+
+
+def test_a_bottle_without_an_inside_becomes_a_closed_solid():
+    solid_of(klein_bottle())
