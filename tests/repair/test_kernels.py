@@ -16,7 +16,7 @@ from rlacd import _native
 from rlacd._native import face_areas, long_normals, signed_tetrahedra
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.repair.union import unite, volume_of
+from rlacd.repair.union import one_body, unite, volume_of
 from rlacd.repair.voxels import _grown
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.topology import Edges, bodies_of, first_of_doubled
@@ -137,6 +137,15 @@ def test_edges_bodies_areas_and_volumes_of_soups(seed: int, count: int, faces: i
     assert np.array_equal(long_normals(vertices, triangles), np.cross(along, across))
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
     np.testing.assert_allclose(_native.longest_edges(vertices, triangles), longest, rtol=1e-14)
+
+
+@pytest.mark.parametrize("major", [1.0, 3.0])
+def test_one_body_is_turned_outwards_and_taken_only_where_it_has_no_pinch(major: float) -> None:
+    """A ring without a hole touches itself in one corner, where manifold3d makes two."""
+    ring = trimesh.creation.torus(major, 1.0, 24, 24)
+    vertices, faces, _ = _native.weld(np.round(ring.vertices, 9), np.asarray(ring.faces)[:, ::-1].copy())
+    taken = one_body(vertices, faces)
+    assert taken is None if major == 1 else volume_of(taken[0]) == pytest.approx(ring.volume)
 
 
 @pytest.mark.parametrize("sliver", [1e-13, 1e-11])
