@@ -108,7 +108,8 @@ def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> Non
 
 @given(st.floats(0, 200), st.floats(0, 200), PRICES)
 def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: list[float]) -> None:
-    run = Run(1).alone(most)
+    outer = Run(1)
+    run = outer.result(outer.apart(lambda own: own, most).begun)
     with run.limited(units, cuts="cut"):
         for price in prices:
             run.work.pay(price)

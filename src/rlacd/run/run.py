@@ -11,9 +11,9 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import count
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 from manifold3d import Manifold
 
@@ -65,6 +65,14 @@ _R = TypeVar("_R")
 
 Begun: TypeAlias = "Future[_R] | Callable[[], _R]"
 """Some work under way on another thread, or still to do on this one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Apart(Generic[_R]):
+    """Some work under way, and its own account."""
+
+    account: Work
+    begun: Begun[_R]
 
 
 class Run:
@@ -212,11 +220,18 @@ class Run:
         finally:
             self._is_quiet = before
 
-    def alone(self, units: float = math.inf) -> Run:
-        """Get a run of a single thread with its own account of `units`, for one of several trials made at a time."""
-        trial = Run(1, seed=self.seed)
-        trial.work, trial._end, trial._outer = Work(units), self._end, self
-        return trial
+    def apart(self, function: Callable[[Run], _R], units: float = math.inf) -> Apart[_R]:
+        """`start` some work with a run of a single thread, and an account of `units` of its own that nobody pays."""
+        own = Run(1, seed=self.seed)
+        own.work, own._end, own._outer = Work(units), self._end, self
+        return Apart(own.work, self.start(partial(function, own)))
+
+    def abandon(self, apart: Iterable[Apart[Any]]) -> None:
+        """Let work end at its next step, and wait for it."""
+        apart = [*apart]
+        for each in apart:
+            each.account.close()
+        self.drop([each.begun for each in apart])
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report a step of the current stage; True if the work may continue."""
