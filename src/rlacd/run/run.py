@@ -76,7 +76,7 @@ class Apart(Generic[_R]):
 
 
 class Run:
-    """Threads, seed, time and work of one decomposition; a context that has to be entered before it is used.
+    """Threads, time and work of one decomposition; a context that has to be entered before it is used.
 
     Work stops in two ways: between steps, `step` returns False; within a step, kernels and all other code that calls
     `rlacd._native.poll_stop` raise `Stopped`. Code that can continue with the result of earlier steps catches it and
@@ -91,8 +91,6 @@ class Run:
     progress : callable, optional
         Called at every step, and several times a second during long ones; when it returns anything false but None,
         `stopped_by` becomes "cancel".
-    seed : int
-        Of all random choices.
 
     Attributes
     ----------
@@ -113,10 +111,8 @@ class Run:
         threads: int | None = None,
         timeout: float | None = None,
         progress: ProgressCallback | None = None,
-        seed: int = 0,
     ) -> None:
         self.threads = threads or available_cpus()
-        self.seed = seed
         self.work = Work()
         self.seconds: dict[str, float] = {}
         self.stopped_by: StoppedBy | None = None
@@ -174,20 +170,10 @@ class Run:
         return time.perf_counter() - self._start
 
     @property
-    def seconds_left(self) -> float:
-        """Seconds left of the innermost time limit; infinite if there is none."""
-        return self._end - time.perf_counter()
-
-    @property
-    def at_once(self) -> int:
-        """How many things to `start` so that no thread waits for the next."""
-        return self.threads if self.threads == 1 else self.threads + 1
-
-    @property
     def is_over(self) -> bool:
         """Whether the work has to end: the run was stopped, or the time or the work allowed for it is used up."""
         stopped = self.stopped_by if self._outer is None else self._outer.stopped_by
-        return stopped is not None or self.work.is_spent or self.seconds_left <= 0
+        return stopped is not None or self.work.is_spent or time.perf_counter() >= self._end
 
     @contextmanager
     def limited(self, units: float = math.inf, seconds: float = math.inf, cuts: str | None = None) -> Iterator[None]:
@@ -222,7 +208,7 @@ class Run:
 
     def apart(self, function: Callable[[Run], _R], units: float = math.inf) -> Apart[_R]:
         """`start` some work with a run of a single thread, and an account of `units` of its own that nobody pays."""
-        own = Run(1, seed=self.seed)
+        own = Run(1)
         own.work, own._end, own._outer = Work(units), self._end, self
         return Apart(own.work, self.start(partial(function, own)))
 

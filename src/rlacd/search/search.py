@@ -158,27 +158,24 @@ class _Search:
 
     def go_on(self, most: float) -> None:
         """Search until the run is over, `most` trials are made, or parts are as few as the lower bound."""
-        try:
-            self._begin_pass()
-            self._go_on(most)
-        finally:
-            self._run.abandon(self._next)
-            self._next = []
-
-    def _go_on(self, most: float) -> None:
         run, enough, in_vain = self._run, self._context.enough, 0
-        while self.steps < most and not run.is_over and len(self.best) > enough() and in_vain < IN_VAIN:
-            before = len(self.best)
-            if self._state is None:
-                self._state = self._begun(self.best)
-                self._ahead = len(self._state.parts)
-                if self._context.criterion.eliminates:
-                    self.early = self._state.parts
-            self._improve(self._state, most)
-            if self.steps < most and not run.is_over:
-                with run.quietly():
-                    self._challenge(self._state, most)
-            in_vain = in_vain + 1 if len(self.best) == before else 0
+        try:
+            while self.steps < most and not run.is_over and len(self.best) > enough() and in_vain < IN_VAIN:
+                self._begin_pass()
+                before = len(self.best)
+                if self._state is None:
+                    self._state = self._begun(self.best)
+                    self._ahead = len(self._state.parts)
+                    if self._context.criterion.eliminates:
+                        self.early = self._state.parts
+                self._improve(self._state, most)
+                if self.steps < most and not run.is_over:
+                    with run.quietly():
+                        self._challenge(self._state, most)
+                in_vain = in_vain + 1 if len(self.best) == before else 0
+        finally:
+            run.abandon(self._next)
+            self._next = []
 
     def _challenge(self, best: Neighbourhood, most: float) -> None:
         """Search from another start unless it is behind already; the better of two goes on."""
@@ -235,7 +232,6 @@ class _Search:
         self._passes += 1
         parts = run.result(other.begun)
         run.work.pay(other.account.done)
-        self._begin_pass()
         return parts
 
     def _pass(self, number: int, run: Run) -> list[Part] | None:
