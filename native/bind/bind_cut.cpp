@@ -1,5 +1,6 @@
 // Python bindings of candidate planes, of the plane sweep, of plane cuts, and of reuniting the pieces they leave.
 #include "bind/released.hpp"
+#include "core/mesh_measures.hpp"
 #include "decompose/concave_edges.hpp"
 #include "decompose/least_excess.hpp"
 #include "decompose/sweep.hpp"
@@ -30,6 +31,12 @@ std::optional<Columns> columns(std::optional<Piece> piece) {
 
 auto columns(std::array<std::optional<Piece>, 2> sides) {
   return std::pair(columns(std::move(sides[0])), columns(std::move(sides[1])));
+}
+
+auto columns(std::vector<Piece> pieces) {
+  std::vector<Columns> all;
+  for (Piece& piece : pieces) all.push_back(*columns(std::optional(std::move(piece))));
+  return all;
 }
 
 }  // namespace
@@ -77,20 +84,25 @@ void bind_cut(nb::module_& m) {
         "vertices"_a, "faces"_a, "x"_a, "y"_a, "z"_a, "offset"_a, "least"_a,
         "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and "
         "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
-  m.def("halve",
-        released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<const ConvexBody*>& around,
-                    double share, double least) { return columns(halve(mesh, hull, around, share, least)); }),
-        "vertices"_a, "faces"_a, "hull"_a, "around"_a, "share"_a, "least"_a,
-        "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
-        "other of the two hulls around whose volumes it would add the least to; None twice if there are no two.");
+  m.def(
+      "halve_between",
+      released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<const ConvexBody*>& around, double share,
+                  double least) { return columns(halve(mesh, hull, between(hull, around), share, least)); }),
+      "vertices"_a, "faces"_a, "hull"_a, "around"_a, "share"_a, "least"_a,
+      "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
+      "other of the two hulls around whose volumes it would add the least to: the smaller first, none if one would "
+      "be empty or there are no two.");
+  m.def("halve_along",
+        released([](const Mesh& mesh, const ConvexBody& hull, bool principal, double share, double least) {
+          const auto axes = principal ? principal_axes(mesh) : std::array<Vec3, 3>{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+          return columns(halve(mesh, hull, {axes.begin(), axes.end()}, share, least));
+        }),
+        "vertices"_a, "faces"_a, "hull"_a, "principal"_a, "share"_a, "least"_a,
+        "The same along the longest coordinate axis or principal axis.");
   m.def(
       "connected_pieces", released([](const Mesh& mesh, double least) {
-        std::optional<std::vector<Columns>> all;
-        if (std::optional<std::vector<Piece>> found = connected_pieces(mesh, least)) {
-          all.emplace();
-          for (Piece& piece : *found) all->push_back(*columns(std::optional(std::move(piece))));
-        }
-        return all;
+        std::optional<std::vector<Piece>> found = connected_pieces(mesh, least);
+        return found ? std::optional(columns(std::move(*found))) : std::nullopt;
       }),
       "vertices"_a, "faces"_a, "least"_a,
       "The pieces of a closed mesh that edges connect, with their cavities, as `cut` returns its sides, without those "

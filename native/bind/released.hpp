@@ -194,6 +194,7 @@ auto out(T own) {
     using Row = typename T::value_type;
     using Scalar = decltype(scalar(Tag<Row>()));
     if constexpr (!std::is_void_v<Scalar>) {
+      own.shrink_to_fit();  // it may live for long
       return Rows<Scalar, Row>{std::move(own)};
     } else {
       std::vector<decltype(out(std::declval<Row>()))> all;
@@ -289,7 +290,7 @@ struct type_caster<rlacd::Rows<Scalar, Row>> {
     const capsule owner(rows, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
     const std::size_t shape[] = {rows->size(), columns};
     return Array::from_cpp({reinterpret_cast<Scalar*>(rows->data()), columns == 1 ? 1u : 2u, shape, owner},
-                           rv_policy::move, cleanup);
+                           rv_policy::automatic, cleanup);
   }
 };
 

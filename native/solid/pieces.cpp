@@ -165,8 +165,7 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
   return pieces;
 }
 
-std::array<std::optional<Piece>, 2> halve(const Mesh& piece, const ConvexBody& hull,
-                                          const std::vector<const ConvexBody*>& around, double share, double least) {
+std::vector<Vec3> between(const ConvexBody& hull, const std::vector<const ConvexBody*>& around) {
   const std::vector<Vec3>& corners = hull.mesh().vertices;
   if (around.size() < 2 || corners.empty()) return {};  // what one cannot take, it cannot take in halves
   std::vector<std::pair<double, std::size_t>> by_growth;
@@ -179,11 +178,27 @@ std::array<std::optional<Piece>, 2> halve(const Mesh& piece, const ConvexBody& h
       middle(around[by_growth[1].second]->mesh().vertices) - middle(around[by_growth[0].second]->mesh().vertices);
   const double length = norm(along);
   if (length == 0) return {};
-  const Vec3 direction = {along.x / length, along.y / length, along.z / length};
-  const auto [lowest, highest] = std::minmax_element(
-      corners.begin(), corners.end(), [&](Vec3 p, Vec3 q) { return dot(p, direction) < dot(q, direction); });
-  const double from = dot(*lowest, direction), to = dot(*highest, direction);
-  return cut(piece, direction, from + share * (to - from), least);
+  return {{along.x / length, along.y / length, along.z / length}};
+}
+
+std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::vector<Vec3>& directions, double share,
+                         double least) {
+  double longest = 0, offset = 0;
+  Vec3 along;
+  for (const Vec3 direction : directions) {
+    double from = HUGE_VAL, to = -HUGE_VAL;
+    for (const Vec3 p : hull.mesh().vertices)
+      from = std::min(from, dot(p, direction)), to = std::max(to, dot(p, direction));
+    if (to - from > longest) longest = to - from, offset = from + share * longest, along = direction;
+  }
+  std::vector<Piece> halves;
+  if (longest == 0) return halves;
+  auto [below, above] = cut(piece, along, offset, least);
+  if (!below || !above) return halves;
+  if (above->volume < below->volume) std::swap(below, above);
+  halves.push_back(std::move(*below));
+  halves.push_back(std::move(*above));
+  return halves;
 }
 
 Mesh inside_all(Mesh mesh, const ConvexPlanes& planes) {

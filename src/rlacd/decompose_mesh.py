@@ -89,7 +89,7 @@ def decompose(
     asked = Options.of(options)
     check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(asked.first_policy)  # reports a bad network before any work is done
-    with Run(asked.threads, asked.timeout, progress, asked.seed) as run:
+    with Run(asked.threads, asked.timeout, progress) as run:
         with run.stage("load"):
             source = in_metres(load_mesh(mesh, faces, file_type, _fineness(asked)), asked)
             obstacles = tuple(_obstacle(one).scaled(source.factor) for one in asked.avoid)

@@ -128,7 +128,7 @@ def tradeoff(
     finest = getattr(chosen, name)
     check_callback("progress", progress, "a `rlacd.Progress`")
     choices: list[Choice] = []
-    with Run(chosen.threads, chosen.timeout, progress, chosen.seed) as run:
+    with Run(chosen.threads, chosen.timeout, progress) as run:
         with run.stage("load"):
             source = in_metres(load_mesh(mesh, faces, file_type), chosen)
         for factor, reached in zip(FACTORS, find_parts_under(source, chosen, FACTORS, run), strict=False):

@@ -97,6 +97,21 @@ def test_one_thread_does_what_was_begun_when_it_is_asked_for() -> None:
 PRICES = st.lists(st.floats(0, 50), max_size=40)
 
 
+def test_work_that_is_abandoned_ends_at_its_next_step() -> None:
+    began = threading.Event()
+
+    def work(own: Run) -> None:
+        while own.work.pay(1):
+            began.set()
+
+    with Run(2) as run:
+        apart = run.apart(work)
+        assert began.wait(10)
+        run.abandon([apart])
+        assert apart.account.done > 0
+    assert run.work.done == 0  # nobody paid
+
+
 @given(st.floats(0, 200), PRICES)
 def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> None:
     work = Work(most)
@@ -108,7 +123,8 @@ def test_no_more_is_spent_than_there_is(most: float, prices: list[float]) -> Non
 
 @given(st.floats(0, 200), st.floats(0, 200), PRICES)
 def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: list[float]) -> None:
-    run = Run(1).alone(most)
+    outer = Run(1)
+    run = outer.result(outer.apart(lambda own: own, most).begun)
     with run.limited(units, cuts="cut"):
         for price in prices:
             run.work.pay(price)

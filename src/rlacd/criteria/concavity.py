@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -143,7 +144,7 @@ class Distance(Criterion):
         """Make the criterion; its warnings give lengths in the threshold's unit: the frame's or the input's."""
         return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
-    @property
+    @cached_property
     def early_out(self) -> DistanceEarlyOut:
         """Tests of the solid's corners, and of volumes if they count."""
         return DistanceEarlyOut(2 * self.threshold, self.threshold, self.weight)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -86,9 +87,10 @@ def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
             hulls = run.map(lambda part: in_input(part.hull, solid.frame, limits), parts)
             parts = [as_carried(part, hull, solid.frame) for part, hull in zip(parts, hulls, strict=True)]
     with run.stage("measure"):
+        found = run.start(partial(_bodies, solid, hulls))
         report = make_report(reached, parts, hulls, seams, run)
         unknown: list[int] | list[None] = [None] * len(hulls)
-        bodies = run.if_in_time(lambda: _bodies(solid, hulls), lambda: unknown)
+        bodies = run.if_in_time(lambda: run.result(found), lambda: unknown)
     for hull, body in zip(hulls, bodies, strict=True):
         hull.metadata["body"] = body
     balls = goal.obstacles.in_input(solid.frame) if goal.obstacles is not None else None

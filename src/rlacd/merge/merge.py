@@ -201,8 +201,8 @@ class _Merging:
 
     def _begin(self) -> None:
         """Begin the cheapest pairs whose parts both still exist."""
-        alive, unite = self._alive.parts, self._pairing.unite
-        while self._queue and len(self._next) < self._run.at_once:
+        alive, unite, threads = self._alive.parts, self._pairing.unite, self._run.threads
+        while self._queue and len(self._next) < (threads if threads == 1 else threads + 1):  # none waits for the next
             pair = heapq.heappop(self._queue)
             if pair.first in alive and pair.second in alive:
                 self._next.append(pair)

@@ -11,9 +11,9 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import count
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 from manifold3d import Manifold
 
@@ -67,8 +67,16 @@ Begun: TypeAlias = "Future[_R] | Callable[[], _R]"
 """Some work under way on another thread, or still to do on this one."""
 
 
+@dataclass(frozen=True, eq=False)
+class Apart(Generic[_R]):
+    """Some work under way, and its own account."""
+
+    account: Work
+    begun: Begun[_R]
+
+
 class Run:
-    """Threads, seed, time and work of one decomposition; a context that has to be entered before it is used.
+    """Threads, time and work of one decomposition; a context that has to be entered before it is used.
 
     Work stops in two ways: between steps, `step` returns False; within a step, kernels and all other code that calls
     `rlacd._native.poll_stop` raise `Stopped`. Code that can continue with the result of earlier steps catches it and
@@ -83,8 +91,6 @@ class Run:
     progress : callable, optional
         Called at every step, and several times a second during long ones; when it returns anything false but None,
         `stopped_by` becomes "cancel".
-    seed : int
-        Of all random choices.
 
     Attributes
     ----------
@@ -105,10 +111,8 @@ class Run:
         threads: int | None = None,
         timeout: float | None = None,
         progress: ProgressCallback | None = None,
-        seed: int = 0,
     ) -> None:
         self.threads = threads or available_cpus()
-        self.seed = seed
         self.work = Work()
         self.seconds: dict[str, float] = {}
         self.stopped_by: StoppedBy | None = None
@@ -166,20 +170,10 @@ class Run:
         return time.perf_counter() - self._start
 
     @property
-    def seconds_left(self) -> float:
-        """Seconds left of the innermost time limit; infinite if there is none."""
-        return self._end - time.perf_counter()
-
-    @property
-    def at_once(self) -> int:
-        """How many things to `start` so that no thread waits for the next."""
-        return self.threads if self.threads == 1 else self.threads + 1
-
-    @property
     def is_over(self) -> bool:
         """Whether the work has to end: the run was stopped, or the time or the work allowed for it is used up."""
         stopped = self.stopped_by if self._outer is None else self._outer.stopped_by
-        return stopped is not None or self.work.is_spent or self.seconds_left <= 0
+        return stopped is not None or self.work.is_spent or time.perf_counter() >= self._end
 
     @contextmanager
     def limited(self, units: float = math.inf, seconds: float = math.inf, cuts: str | None = None) -> Iterator[None]:
@@ -212,11 +206,18 @@ class Run:
         finally:
             self._is_quiet = before
 
-    def alone(self, units: float = math.inf) -> Run:
-        """Get a run of a single thread with its own account of `units`, for one of several trials made at a time."""
-        trial = Run(1, seed=self.seed)
-        trial.work, trial._end, trial._outer = Work(units), self._end, self
-        return trial
+    def apart(self, function: Callable[[Run], _R], units: float = math.inf) -> Apart[_R]:
+        """`start` some work with a run of a single thread, and an account of `units` of its own that nobody pays."""
+        own = Run(1)
+        own.work, own._end, own._outer = Work(units), self._end, self
+        return Apart(own.work, self.start(partial(function, own)))
+
+    def abandon(self, apart: Iterable[Apart[Any]]) -> None:
+        """Let work end at its next step, and wait for it."""
+        apart = [*apart]
+        for each in apart:
+            each.account.close()
+        self.drop([each.begun for each in apart])
 
     def step(self, done: int, total: int | None, parts: int) -> bool:
         """Report a step of the current stage; True if the work may continue."""

@@ -25,7 +25,7 @@ import numpy as np
 from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.numbered import NumberedParts
-from rlacd.run import Begun, Run
+from rlacd.run import Apart, Run
 from rlacd.search.operators import Exchange, give, redistribute
 from rlacd.solid.component import Component, Part
 
@@ -74,15 +74,6 @@ class _Trial:
     part: int
 
 
-@dataclass(frozen=True)
-class _UnderWay:
-    """A trial under way: its own run, and what it will find."""
-
-    trial: _Trial
-    run: Run
-    found: Begun[Exchange | None]
-
-
 class Neighbourhood:
     """A decomposition that is being improved.
 
@@ -113,7 +104,7 @@ class Neighbourhood:
         self.steps = self.accepted = 0
         self._near = min(context.criterion.early_out.reach, 2 * context.criterion.outward_deviation)
         self._around: dict[int, tuple[int, ...]] = {}
-        self._begun: deque[_UnderWay] = deque()
+        self._begun: deque[tuple[_Trial, Apart[Exchange | None]]] = deque()
         self._again: deque[_Trial] = deque()  # to be repeated: what they found came too late
         self._tries: dict[tuple[Operator, int, tuple[int, ...]], int] = {}
         self._in_vain = dict.fromkeys(Operator, 0)  # units since each last saved a part
@@ -192,33 +183,32 @@ class Neighbourhood:
                 if trial is None and not self._begun:
                     return
                 if trial is not None and (exchange := self._exchange(trial)) is not None:
-                    alone = run.alone(run.work.left)
-                    self._begun.append(_UnderWay(trial, alone, run.start(partial(exchange, alone))))
+                    self._begun.append((trial, run.apart(exchange, run.work.left)))
                 if trial is None or len(self._begun) == LAG:
                     self._settle()
         except Stopped:  # raised between two exchanges: the best state so far is kept
             run.note_stop()
         finally:
-            run.drop([begun.found for begun in self._begun])
+            run.abandon(apart for _, apart in self._begun)
             self._begun.clear()
 
     def _settle(self) -> None:
         """Apply what the first trial under way has found, or make it again if parts that it changes have gone."""
-        begun = self._begun.popleft()
-        exchange = self._run.result(begun.found)
-        self._run.work.pay(begun.run.work.done)
-        if begun.run.work.is_spent:  # it was given all that was left
+        trial, apart = self._begun.popleft()
+        exchange = self._run.result(apart.begun)
+        self._run.work.pay(apart.account.done)
+        if apart.account.is_spent:  # it was given all that was left
             self._run.work.close()
         self.steps += 1
-        self._in_vain[begun.trial.operator] += begun.run.work.done
+        self._in_vain[trial.operator] += apart.account.done
         if exchange is None:
             return
         if not self._apply(exchange):
-            self._again.append(begun.trial)
+            self._again.append(trial)
             return
         self.accepted += 1
         if exchange.gain > 0:
-            self._in_vain[begun.trial.operator] = 0
+            self._in_vain[trial.operator] = 0
         if cost(self.parts) < cost(self.best):
             if len(self.parts) < len(self.best):
                 self.gained = time.perf_counter()

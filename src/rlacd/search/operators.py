@@ -17,8 +17,7 @@ import numpy as np
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.merge import Uniter
 from rlacd.run import Run, work
-from rlacd.solid.arrays import heights
-from rlacd.solid.component import ClippedPart, Component, Part, Plane, reunite
+from rlacd.solid.component import ClippedPart, Component, Part, reunite
 from rlacd.solid.hull import Hull
 
 
@@ -204,12 +203,5 @@ class _Division:
         """Cut near the middle; the smaller half comes first."""
         share = self._random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
         if not self._again:
-            return component.halved([part.hull for part in self.now], share)
-        axes = np.eye(3) if self._random.random() < 0.5 else component.principal_axes
-        along = heights(component.hull.vertices, axes)
-        lower, upper = along.min(axis=0), along.max(axis=0)
-        longest = int(np.argmax(upper - lower))
-        x, y, z = axes[longest].tolist()
-        sides = component.cut(Plane((x, y, z), float(lower[longest] + share * (upper - lower)[longest])))
-        halves = [side for side in sides if side is not None]
-        return sorted(halves, key=lambda half: half.volume) if len(halves) == 2 else []
+            return component.halved_between(share, [part.hull for part in self.now])
+        return component.halved(share, self._random.random() >= 0.5)

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
@@ -13,7 +14,7 @@ from rlacd.merge import grow_cover
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import Greedy
 from rlacd.report import SearchSummary
-from rlacd.run import Run
+from rlacd.run import Apart, Run
 from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
 from rlacd.solid.component import Part
 
@@ -37,7 +38,7 @@ STARTS = ("excess-norm", "hull-sum")
 """Scores of the greedy policy for further passes over the whole solid, in turn, each among other planes."""
 
 ANOTHER_PASS = 1.5
-"""Another pass is abandoned when it exceeds this multiple of the work of the first."""
+"""Another pass is abandoned when it exceeds this multiple of the work of the first, and not begun with less left."""
 
 HOPELESS = 5
 """Another pass is abandoned when its pieces outnumber the parts by this factor: merging will not make up for that."""
@@ -153,22 +154,28 @@ class _Search:
         self._passes = 1
         self._state: Neighbourhood | None = None
         self._ahead = 0  # number of its parts once each had been offered to others
+        self._next: list[Apart[list[Part] | None]] = []  # the next pass, once it is under way
 
     def go_on(self, most: float) -> None:
         """Search until the run is over, `most` trials are made, or parts are as few as the lower bound."""
         run, enough, in_vain = self._run, self._context.enough, 0
-        while self.steps < most and not run.is_over and len(self.best) > enough() and in_vain < IN_VAIN:
-            before = len(self.best)
-            if self._state is None:
-                self._state = self._begun(self.best)
-                self._ahead = len(self._state.parts)
-                if self._context.criterion.eliminates:
-                    self.early = self._state.parts
-            self._improve(self._state, most)
-            if self.steps < most and not run.is_over:
-                with run.quietly():
-                    self._challenge(self._state, most)
-            in_vain = in_vain + 1 if len(self.best) == before else 0
+        try:
+            while self.steps < most and not run.is_over and len(self.best) > enough() and in_vain < IN_VAIN:
+                self._begin_pass()
+                before = len(self.best)
+                if self._state is None:
+                    self._state = self._begun(self.best)
+                    self._ahead = len(self._state.parts)
+                    if self._context.criterion.eliminates:
+                        self.early = self._state.parts
+                self._improve(self._state, most)
+                if self.steps < most and not run.is_over:
+                    with run.quietly():
+                        self._challenge(self._state, most)
+                in_vain = in_vain + 1 if len(self.best) == before else 0
+        finally:
+            run.abandon(self._next)
+            self._next = []
 
     def _challenge(self, best: Neighbourhood, most: float) -> None:
         """Search from another start unless it is behind already; the better of two goes on."""
@@ -210,12 +217,27 @@ class _Search:
         self._note(state)
         return state
 
+    def _begin_pass(self) -> None:
+        """Begin the next pass beside what goes on, if enough work is left for both."""
+        most = ANOTHER_PASS * self._first_pass
+        if not self._next and self._run.work.left >= 2 * most:
+            self._next = [self._run.apart(partial(self._pass, self._passes), most)]
+
     def _another_pass(self) -> list[Part] | None:
-        """The parts of a pass by another score, among other planes; None if it takes too much work."""
-        run, context = self._run, self._context
-        policy = Greedy(STARTS[self._passes % len(STARTS)], sweeps=SweepCache(seed=(context.seed, self._passes)))
+        """The parts of the next pass; None if it takes too much work."""
+        run, most = self._run, ANOTHER_PASS * self._first_pass
+        if run.work.left < most:
+            return None
+        other = self._next.pop() if self._next else run.apart(partial(self._pass, self._passes), most)
         self._passes += 1
-        with run.limited(ANOTHER_PASS * self._first_pass):
-            tree = CutTree(context.root, policy, run)
-            other = cut_and_merge(tree, context.criterion, run, most=self._most, strict=True)
-            return None if other.unmet or run.is_over else other.parts
+        parts = run.result(other.begun)
+        run.work.pay(other.account.done)
+        return parts
+
+    def _pass(self, number: int, run: Run) -> list[Part] | None:
+        """The parts of a pass by another score, among other planes; None if it takes too much work."""
+        context = self._context
+        policy = Greedy(STARTS[number % len(STARTS)], sweeps=SweepCache(seed=(context.seed, number)))
+        tree = CutTree(context.root, policy, run)
+        other = cut_and_merge(tree, context.criterion, run, most=self._most, strict=True)
+        return None if other.unmet or run.is_over else other.parts
