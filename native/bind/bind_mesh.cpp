@@ -8,6 +8,7 @@
 #include "decompose/simplifier.hpp"
 #include "surface/bvh.hpp"
 #include "surface/crossings.hpp"
+#include "surface/curve.hpp"
 #include "surface/edges.hpp"
 #include "surface/least_bent.hpp"
 #include "surface/near_boxes.hpp"
@@ -174,6 +175,9 @@ void bind_mesh(nb::module_& m) {
         "the body [F] of each face; signed volume [B], area [B] and box [B, 6] of each body; whether the faces around "
         "each vertex are all neighbours; the least height of a face, and the least length of the sum of the unit "
         "normals of neighbours.");
+  m.def("along_a_curve", released([](const AnyMesh& mesh) { return along_a_curve(mesh); }), "vertices"_a, "faces"_a,
+        "The same mesh with vertices [V, 3] and faces [F, 3] along a space-filling curve: neighbours in space are near "
+        "in memory.");
   m.def("mesh_volume", released([](const AnyMesh& mesh) { return mesh_volume(mesh); }), "vertices"_a, "faces"_a,
         "Signed volume of a closed triangle mesh.");
   m.def("mesh_area", released([](const AnyMesh& mesh) { return mesh_area(mesh); }), "vertices"_a, "faces"_a,

@@ -60,7 +60,7 @@ def one_body(vertices: FloatArray, faces: IntArray) -> tuple[tuple[FloatArray, I
     if abs(volume) <= 2 * FLAT * area or least_height * min(least_fold, 1.0) <= _FLAT_MESH:
         return None
     outward = faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
-    return (vertices, outward), volume < 0
+    return _native.along_a_curve(vertices, outward), volume < 0
 
 
 def as_manifold(solid: Shape) -> Manifold:
