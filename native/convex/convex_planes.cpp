@@ -120,26 +120,6 @@ RLACD_WIDE ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
   return best;
 }
 
-RLACD_WIDE bool ConvexPlanes::that_meet(const Box& box, double t, std::vector<std::int32_t>& planes) const {
-  planes.clear();
-  const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
-  for (std::size_t start = 0; start < h_.size(); start += kBlock) {
-    bool is_near = false;
-    for (std::size_t i = start; i < start + kBlock; ++i) {
-      const double reach = std::fabs(x_[i]) * half.x + std::fabs(y_[i]) * half.y + std::fabs(z_[i]) * half.z;
-      is_near |= h_[i] - (x_[i] * middle.x + y_[i] * middle.y + z_[i] * middle.z) - reach < -t;
-    }
-    if (!is_near) continue;
-    for (std::size_t i = start; i < start + kBlock; ++i) {
-      const double reach = std::fabs(x_[i]) * half.x + std::fabs(y_[i]) * half.y + std::fabs(z_[i]) * half.z;
-      const double depth_of_middle = h_[i] - (x_[i] * middle.x + y_[i] * middle.y + z_[i] * middle.z);
-      if (depth_of_middle + reach < -t) return false;
-      if (depth_of_middle - reach < -t) planes.push_back(static_cast<std::int32_t>(i));
-    }
-  }
-  return true;
-}
-
 RLACD_WIDE std::int32_t ConvexPlanes::first_within(Vec3 p, double t) const {
   for (std::size_t start = 0; start < h_.size(); start += kBlock) {
     bool is_within = false;

@@ -49,8 +49,6 @@ class ConvexPlanes {
   };
   // The plane of least depth: for a point inside the hull, the distance to its surface; negative outside.
   Nearest nearest(Vec3 p) const;
-  // Collects the planes that some point of a box is less than -t deep under; false if all of it is, for one plane.
-  bool that_meet(const Box& box, double t, std::vector<std::int32_t>& planes) const;
   // A plane that p is at most t deep under, or -1.
   std::int32_t first_within(Vec3 p, double t) const;
 

@@ -6,7 +6,6 @@
 
 #include "convex/polygon.hpp"
 #include "core/stop.hpp"
-#include "surface/curve.hpp"
 #include "surface/surface_field.hpp"
 #include "surface/weld.hpp"
 
@@ -209,36 +208,6 @@ Greatest HullUnion::over(const Bvh& surface, const Goal& goal, double gap, int t
   return over;
 }
 
-std::vector<char> HullUnion::held_faces(const Mesh& surface, int threads) const {
-  constexpr std::size_t kBlock = 32;  // faces that lie close together, and share what is near them
-  const std::vector<std::int32_t> order = order_of_faces(surface);
-  std::vector<char> is_held(order.size(), 0);
-  parallel_for((order.size() + kBlock - 1) / kBlock, threads, [&](std::size_t block) {
-    const std::size_t begin = block * kBlock, end = std::min(order.size(), begin + kBlock);
-    Box box;
-    for (std::size_t i = begin; i < end; ++i)
-      for (const std::int32_t corner : surface.faces[order[i]]) box.extend(surface.vertices[corner]);
-    std::vector<std::int32_t> near;
-    std::size_t left = end - begin;
-    for (std::size_t m = 0; m < members_.size() && left > 0; ++m) {
-      const ConvexPlanes& planes = members_[m]->planes();
-      if (!box.meets(members_[m]->box(), kInsideSlack) || !planes.that_meet(box, kInsideSlack, near)) continue;
-      const auto holds = [&](std::int32_t vertex) {
-        return std::all_of(near.begin(), near.end(), [&](std::int32_t plane) {
-          return planes.depth(plane, surface.vertices[vertex]) >= -kInsideSlack;
-        });
-      };
-      for (std::size_t i = begin; i < end; ++i) {
-        const Triangle& face = surface.faces[order[i]];
-        if (is_held[order[i]] || !std::all_of(face.begin(), face.end(), holds)) continue;
-        is_held[order[i]] = 1;
-        --left;
-      }
-    }
-  });
-  return is_held;
-}
-
 Greatest HullUnion::under(const Mesh& surface, const Goal& goal, int threads) const {
   if (members_.empty()) return {{kInfinity, kInfinity}, {}};
   std::vector<Offsets> grown;
@@ -252,11 +221,9 @@ Greatest HullUnion::under(const Mesh& surface, const Goal& goal, int threads) co
       for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i, clipper);
     });
   };
-  const std::vector<char> is_held = held_faces(surface, threads);
   std::vector<std::vector<Polygon>> outside(surface.faces.size());
   for_each(outside.size(), [&](std::size_t f, Clipper& clipper) {
     poll_stop();
-    if (is_held[f]) return;
     const Corners corner = corners_of(surface, surface.faces[f]);
     const Box box = Box::of(corner);
     outside[f] = {{corner.begin(), corner.end()}};

@@ -43,9 +43,6 @@ class HullUnion {
  private:
   friend class HullField;
 
-  // Which faces have all their corners in one of the hulls.
-  std::vector<char> held_faces(const Mesh& surface, int threads) const;
-
   std::vector<std::shared_ptr<ConvexBody>> members_;
 };
 

@@ -10,11 +10,7 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kFilm = 1e-13;         // relative to the mesh
-constexpr std::size_t kManyEdges = 24;  // at one vertex; testing all pairs of more would take too long
-constexpr double kFlat = 1e-12;         // sine of an angle that counts as zero
-constexpr std::size_t kFew = 20;        // sorting this few points is fast
-constexpr double kWellInside = 1e-12;   // share of the area of the points' box: far above rounding
+constexpr double kFilm = 1e-13;  // relative to the mesh
 
 int axis_of(Vec3 n) {
   for (int axis = 0; axis < 3; ++axis)
@@ -22,36 +18,11 @@ int axis_of(Vec3 n) {
   return -1;
 }
 
-// Drops most points well inside the octagon of the extreme points in eight directions, so that less is left to sort
-// (Akl and Toussaint, "A Fast Convex Hull Algorithm", 1978).
-template <int drop>
-void drop_inner(std::vector<Vec3>& points) {
-  constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
-  constexpr double direction[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
-  double most[8];
-  Vec3 outermost[8];
-  std::fill(std::begin(most), std::end(most), -std::numeric_limits<double>::infinity());
-  for (const Vec3 p : points)
-    for (int k = 0; k < 8; ++k)
-      if (const double s = direction[k][0] * p[u] + direction[k][1] * p[v]; s > most[k]) most[k] = s, outermost[k] = p;
-  const double well = kWellInside * (most[0] + most[4]) * (most[2] + most[6]);
-  if (!(well > 0)) return;  // the points are collinear or equal: the octagon has no interior
-  const auto is_inside = [&](Vec3 p) {
-    for (int k = 0; k < 8; ++k) {
-      const Vec3 a = outermost[k], b = outermost[(k + 1) % 8];
-      if ((b[u] - a[u]) * (p[v] - a[v]) - (b[v] - a[v]) * (p[u] - a[u]) <= well && !(a == b)) return false;
-    }
-    return true;
-  };
-  points.erase(std::remove_if(points.begin(), points.end(), is_inside), points.end());
-}
-
 // Corners of the convex hull of points on a plane, by Andrew's monotone chain in the coordinates other than `drop`.
 // Rounding may drop a corner that protrudes by about 1e-16, which no volume depends on.
 template <int drop>
 void reduce_to_planar_hull(std::vector<Vec3>& points) {
   if (points.size() < 4) return;
-  if (points.size() > kFew) drop_inner<drop>(points);
   constexpr int u = (drop + 1) % 3, v = (drop + 2) % 3;
   std::sort(points.begin(), points.end(), [](Vec3 a, Vec3 b) {
     return a[u] != b[u] ? a[u] < b[u] : a[v] != b[v] ? a[v] < b[v] : a[drop] < b[drop];
@@ -93,61 +64,9 @@ double mean_below(double s0, double s1, double s2, double d) {
   return (s0 + s1 + s2) / 3 - d - t * (s2 - d) / 3;
 }
 
-bool all_below(const Vec3* begin, const Vec3* end, Vec3 w, double height) {
-  return std::all_of(begin, end, [w, height](Vec3 e) { return dot(w, e) <= height; });
-}
-
-// Whether there is a direction w with w . e < 0 for all edges e. Such directions form a cone, whose rays are normals of
-// two edges each: the sum of these rays is one of them. If all edges lie in a plane, the cone has no rays, but contains
-// the directions away from the two outermost edges.
-bool has_direction_away(const Vec3* begin, const Vec3* end) {
-  Vec3 sum;
-  for (const Vec3* e = begin; e != end; ++e)
-    for (const Vec3* g = begin; g != e; ++g) {
-      const Vec3 ray = cross(*e, *g);
-      const bool below = all_below(begin, end, ray, kFlat), above = all_below(begin, end, -ray, kFlat);
-      if (below && above) {
-        if (all_below(begin, end, -(*e + *g), -kFlat)) return true;
-      } else if (below) {
-        sum = sum + ray;
-      } else if (above) {
-        sum = sum - ray;
-      }
-    }
-  return all_below(begin, end, sum, -kFlat);
-}
-
-// Whether a vertex with these edges may be a corner of the hull of itself and its neighbours.
-bool sticks_out(const Vec3* begin, const Vec3* end) {
-  if (begin == end) return false;
-  // If a neighbour is at the same place, either of the two may be the corner.
-  if (std::any_of(begin, end, [](Vec3 e) { return norm2(e) < 0.5; })) return true;
-  Vec3 away;
-  for (const Vec3* e = begin; e != end; ++e) away = away - *e;
-  if (all_below(begin, end, away, -kFlat)) return true;
-  // With many edges, testing pairs takes longer than keeping the vertex.
-  return static_cast<std::size_t>(end - begin) > kManyEdges || has_direction_away(begin, end);
-}
-
-std::vector<char> vertices_that_stick_out(const Mesh& mesh) {
-  Buckets<Vec3> edges(mesh.vertices.size());  // the directions from each vertex to its neighbours, one per face
-  for (const Triangle& f : mesh.faces)
-    for (const std::int32_t corner : f) edges.count(corner);
-  edges.allocate();
-  for (const Triangle& f : mesh.faces)
-    for (int e = 0; e < 3; ++e) edges.add(f[e], normalized(mesh.vertices[f[(e + 1) % 3]] - mesh.vertices[f[e]]));
-  std::vector<char> result(mesh.vertices.size(), 0);
-  for (std::size_t v = 0; v < result.size(); ++v) {
-    const auto [begin, end] = edges.range(v);
-    result[v] = sticks_out(begin, end);
-  }
-  return result;
-}
-
 }  // namespace
 
-SolidMesh::SolidMesh(const Mesh& solid)
-    : mesh(solid), is_corner(solid.vertices.size(), 0), sticks_out(vertices_that_stick_out(solid)) {
+SolidMesh::SolidMesh(const Mesh& solid) : mesh(solid), is_corner(solid.vertices.size(), 0) {
   area.reserve(mesh.faces.size());
   for (const Triangle& f : mesh.faces) {
     const Vec3 a = mesh.vertices[f[0]], b = mesh.vertices[f[1]], c = mesh.vertices[f[2]];
@@ -234,7 +153,6 @@ void Sections::fill_slabs() {
     if (!solid_.is_corner[i]) continue;
     const auto j = static_cast<std::size_t>(above_[i]);
     const bool on_plane = j > 0 && offsets_[j - 1] == heights_[i];
-    if (!on_plane && !solid_.sticks_out[i]) continue;
     if (!on_plane || (sides[i] & 2) != 0) entries.push_back({j, i});
     if (on_plane && (sides[i] & 1) != 0) entries.push_back({j - 1, i});
   }

@@ -2,7 +2,7 @@
 //
 // Input:  a closed triangle mesh, a unit normal n and M ascending offsets d (planes n.x = d). They divide the mesh into
 //         M + 1 slabs; slab j lies below plane j and above plane j - 1.
-// Output: the vertices of each slab that its convex hull may need, the corners of the convex hull of each plane's
+// Output: the vertices of each slab, the corners of the convex hull of each plane's
 //         section, and the volume of the solid below and above each plane.
 // Algorithm: vertices are sorted into slabs, and every edge is cut by the planes between its ends. Volumes come from
 //         the divergence theorem with the field (n.x - d) n, which vanishes on the cut, so that no cap is needed.
@@ -23,9 +23,6 @@ struct SolidMesh {
   const Mesh& mesh;
   std::vector<Vec3> area;       // of every face, times its normal
   std::vector<char> is_corner;  // of a face, for every vertex
-  // For every vertex, whether it may be a corner of the hull of the solid's share of a half-space that contains it: a
-  // vertex in the hull of its neighbours is none.
-  std::vector<char> sticks_out;
   double volume;
 };
 
@@ -43,7 +40,7 @@ class Sections {
   // are collinear only up to the last bits.
   double film() const { return film_; }
 
-  // Calls task(point) for the vertices of slabs [from, to) that may be corners. A vertex on a plane belongs to a side
+  // Calls task(point) for the vertices of slabs [from, to). A vertex on a plane belongs to a side
   // if the surface continues there: a face that lies in the plane bounds the solid on one side of it only.
   template <class Task>
   void for_each_inside(std::size_t from, std::size_t to, const Task& task) const {

@@ -15,7 +15,9 @@ class DepthField {
  public:
   explicit DepthField(const ConvexBody& hull) : planes_(hull.planes()) {}
 
-  Sample at(Vec3 p, std::int32_t, double) const {
+  Sample at(Vec3 p, std::int32_t hint, double enough) const {
+    if (hint >= 0)
+      if (const double depth = from(hint, p); depth <= enough) return {depth, hint};
     const ConvexPlanes::Nearest nearest = planes_.nearest(p);
     return {std::max(nearest.depth, 0.0), nearest.plane};
   }
@@ -43,9 +45,9 @@ Concavity concavity(const Mesh& part, const ConvexBody& hull, double part_volume
   result.volume_radius = volume_radius(part_volume, hull_volume);
   Goal goal;
   goal.tolerance = tolerance;
-  goal.pass = std::max(floor, kVolumeWeight * result.volume_radius + tolerance);
+  goal.pass = goal.rough = std::max(floor, kVolumeWeight * result.volume_radius + tolerance);
   result.part_to_hull = maximize(DepthField(hull), part, goal, 1);
-  goal.pass = std::max(goal.pass, result.part_to_hull.lower + tolerance);
+  goal.pass = goal.rough = std::max(goal.pass, result.part_to_hull.lower + tolerance);
   result.hull_to_part = maximize(SurfaceField(tree.of(part)), hull.mesh(), goal, 1);
   return result;
 }
@@ -57,8 +59,7 @@ bool meets_concavity(const Mesh& part, const ConvexBody& hull, double part_volum
 
   Goal goal;
   goal.tolerance = kUndecided * threshold;
-  goal.pass = threshold;
-  goal.fail = threshold;
+  goal.pass = goal.rough = goal.fail = threshold;
   return maximize(DepthField(hull), part, goal, 1).upper <= threshold &&
          maximize(SurfaceField(tree.of(part)), hull.mesh(), goal, 1).upper <= threshold;
 }

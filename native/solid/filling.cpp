@@ -7,6 +7,7 @@
 #include "convex/polygon.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
+#include "solid/caps.hpp"
 #include "solid/pieces.hpp"
 
 namespace rlacd {
@@ -171,7 +172,14 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
 
 ClippedSolid Filling::clipped(const ConvexBody& hull) const {
   ClippedSolid out;
-  out.mesh = inside_all(solid_, hull.planes());
+  std::optional<ConvexClip> clip = clip_to_convex(solid_, surface_, hull);
+  if (clip) {
+    CapArea area;
+    for (const ConvexClip::Section& section : clip->sections)
+      add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal, area);
+    if (area.folded > kFolded * area.all) clip.reset();
+  }
+  out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull.mesh());
   out.volume = std::fmax(0, mesh_volume(out.mesh));
   return out;
 }

@@ -10,7 +10,7 @@
 //      that the solid comes too deep, and facets it shares with one of them need not be examined.
 #pragma once
 
-#include "convex/convex_body.hpp"
+#include "solid/convex_clip.hpp"
 #include "surface/surface.hpp"
 
 namespace rlacd {

@@ -16,9 +16,8 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kApart = 1e-10;     // facet planes are moved out by this, so that faces on them stay whole
-constexpr std::size_t kSample = 64;  // vertices
-constexpr double kHalf = 0.5;        // a winding number between inside and outside
+constexpr double kApart = 1e-10;  // facet planes are moved out by this, so that faces on them stay whole
+constexpr double kHalf = 0.5;     // a winding number between inside and outside
 
 // Where a solid crosses itself, each cut may multiply its crossings: one that doubles its faces, and adds so many, is
 // given up.
@@ -91,20 +90,6 @@ double growth(const Mesh& hull, const std::vector<Vec3>& corners) {
   HullBuilder joint;
   joint.add(joined(hull.vertices, corners));
   return joint.volume() - mesh_volume(hull);
-}
-
-// The place in `left` of a plane that cuts off the most, judged by a sample of the vertices: the sooner a mesh is
-// small, the less each further cut takes.
-std::size_t deepest_cut(const std::vector<Vec3>& vertices, const ConvexPlanes& planes,
-                        const std::vector<std::int32_t>& left) {
-  const std::size_t step = 1 + vertices.size() / kSample;
-  std::size_t best = 0, most = 0;
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    std::size_t beyond = 0;
-    for (std::size_t v = 0; v < vertices.size(); v += step) beyond += planes.depth(left[i], vertices[v]) < -kApart;
-    if (beyond > most) most = beyond, best = i;
-  }
-  return best;
 }
 
 Vec3 middle(const std::vector<Vec3>& points) {
@@ -201,19 +186,14 @@ std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::v
   return halves;
 }
 
-Mesh inside_all(Mesh mesh, const ConvexPlanes& planes) {
-  std::vector<std::int32_t> left(planes.size());
-  std::iota(left.begin(), left.end(), 0);
+Mesh inside_all(Mesh mesh, const Mesh& hull) {
   std::size_t fewest = mesh.faces.size();
-  while (!left.empty() && !mesh.faces.empty()) {
-    poll_stop();
-    const auto next = left.begin() + static_cast<std::ptrdiff_t>(deepest_cut(mesh.vertices, planes, left));
-    const Vec3 normal = planes.normal(*next);
-    const double offset = planes.offset(*next) + kApart;
-    left.erase(next);
+  for (const Triangle& f : hull.faces) {
+    const Vec3 normal = normalized(long_normal(hull, f));
+    const double offset = dot(normal, hull.vertices[f[0]]) + kApart;
     if (std::none_of(mesh.vertices.begin(), mesh.vertices.end(), [&](Vec3 p) { return dot(normal, p) > offset; }))
       continue;
-    mesh = capped(below_plane(mesh, normal, offset), normal);
+    mesh = capped(std::move(cut_by_plane(mesh, normal, offset)[0]), normal);
     if (mesh.faces.size() > 2 * fewest + kManyNewFaces) return {};
     fewest = std::min(fewest, mesh.faces.size());
   }

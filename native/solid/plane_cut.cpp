@@ -271,8 +271,6 @@ std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal) {
   return flat;
 }
 
-OpenSide below_plane(const Mesh& mesh, Vec3 normal, double offset) { return Cutter(mesh, normal, offset).side(-1); }
-
 std::array<OpenSide, 2> cut_by_plane(const Mesh& mesh, Vec3 normal, double offset) {
   Cutter cutter(mesh, normal, offset);
   OpenSide below = cutter.side(-1);

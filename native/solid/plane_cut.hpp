@@ -47,8 +47,6 @@ std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal);
 // point 2 i to the next.
 int winding_left_of(const std::vector<PlanePoint>& ends, std::size_t own);
 
-OpenSide below_plane(const Mesh& mesh, Vec3 normal, double offset);
-
 // The sides below and above.
 std::array<OpenSide, 2> cut_by_plane(const Mesh& mesh, Vec3 normal, double offset);
 

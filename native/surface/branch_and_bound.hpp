@@ -44,6 +44,7 @@ struct Cell {
 struct Goal {
   double tolerance;                                       // stop once the interval is this narrow
   double pass = 0;                                        // values certainly no larger than this need not be resolved
+  double rough = 0;                                       // nor values up to this be exact, in the interval's lower end
   double fail = std::numeric_limits<double>::infinity();  // stop once the maximum is certainly larger
 };
 
@@ -121,19 +122,20 @@ Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int th
   const auto learn = [&](const Sample& sample, Vec3 at, double exact_above) {
     if (sample.value > exact_above && sample.value > found.lower) found.lower = sample.value, found.at = at;
   };
-  // Where only a verdict is wanted, values that pass need not be exact.
-  const bool is_verdict = goal.fail < std::numeric_limits<double>::infinity();
-  const auto enough = [&] { return kEnough * std::max(is_verdict ? goal.pass : 0.0, found.lower); };
+  const auto enough = [&] { return kEnough * std::max(goal.rough, found.lower); };
   double dropped = 0;
   std::vector<Sample> at_vertex(mesh.vertices.size());
   std::vector<char> is_corner(mesh.vertices.size(), 0);
   for (const Triangle& face : mesh.faces)
     for (const std::int32_t corner : face) is_corner[corner] = 1;
-  // A few corners first: they show what distance matters, so that most of the others need no exact answer.
+  // A few corners first: they show what distance matters, so that most of the others need no exact answer, and a
+  // witness that may be near.
   for (const std::size_t stride : {std::size_t{kChunk}, std::size_t{1}}) {
     const double exact_above = enough();
     for_each((at_vertex.size() + stride - 1) / stride, [&](std::size_t i) {
-      if (is_corner[i * stride]) at_vertex[i * stride] = field.at(mesh.vertices[i * stride], -1, exact_above);
+      const std::size_t v = i * stride;
+      const std::int32_t hint = stride == 1 ? at_vertex[v - v % kChunk].witness : -1;
+      if (is_corner[v] && (stride > 1 || v % kChunk > 0)) at_vertex[v] = field.at(mesh.vertices[v], hint, exact_above);
     });
     for (std::size_t i = 0; i < at_vertex.size(); ++i) learn(at_vertex[i], mesh.vertices[i], exact_above);
     if (found.lower > goal.fail) return found;

@@ -41,8 +41,7 @@ std::vector<std::int32_t> order_along_a_curve(const std::vector<Vec3>& points, c
   return order;
 }
 
-}  // namespace
-
+// The order of the middles of faces.
 std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
   std::vector<Vec3> middles;
   middles.reserve(mesh.faces.size());
@@ -52,6 +51,8 @@ std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
   }
   return order_along_a_curve(middles, Box::of(mesh.vertices));
 }
+
+}  // namespace
 
 Mesh along_a_curve(const Mesh& mesh) {
   Mesh sorted;
