@@ -103,8 +103,7 @@ Mesh evened_out(Mesh outer, const ConvexBody& body, double enough) {
   const Bvh& surface = body.bvh();
   double least = farthest_out(outer.vertices, surface), least_volume = mesh_volume(outer);
   if (least <= enough) return outer;
-  Vec3 middle;
-  for (const Vec3 p : inner.vertices) middle = middle + 1 / static_cast<double>(inner.vertices.size()) * p;
+  const Vec3 middle = middle_of(inner.vertices);
   std::vector<Vec3> inside, corners, best;
   for (const Vec3 p : inner.vertices) inside.push_back(p - middle);
   for (const Vec3 p : outer.vertices) corners.push_back(p - middle);

@@ -13,9 +13,7 @@ namespace rlacd {
 // The corners of the polytope are the facets of the hull of its planes' dual points.
 std::optional<Polytope> in_general_position(const ConvexBody& hull, double nudge) {
   const ConvexPlanes& planes = hull.planes();
-  Vec3 middle{0, 0, 0};
-  for (const Vec3 p : hull.mesh().vertices)
-    middle = middle + (1.0 / static_cast<double>(hull.mesh().vertices.size())) * p;
+  const Vec3 middle = middle_of(hull.mesh().vertices);
   std::vector<HalfSpace> all;
   std::vector<Vec3> duals;
   for (std::size_t i = 0; i < planes.size(); ++i) {

@@ -32,8 +32,7 @@ constexpr double kThinnest = 1e-9;
 class Whitening {
  public:
   explicit Whitening(const std::vector<Vec3>& points) {
-    const double share = 1.0 / static_cast<double>(points.size());
-    for (const Vec3 p : points) centre_ = centre_ + share * p;
+    centre_ = middle_of(points);
     const auto farthest = [&](const auto& distance) {
       return *std::max_element(points.begin(), points.end(), [&](Vec3 p, Vec3 q) { return distance(p) < distance(q); });
     };

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "core/parallel.hpp"
+#include "core/random.hpp"
 #include "core/stop.hpp"
 
 namespace rlacd {
@@ -174,16 +175,8 @@ Mesh Simplifier::mesh() const {
   return result;
 }
 
-// SplitMix64.
-std::uint64_t Simplifier::draw() {
-  std::uint64_t z = (state_ += 0x9E3779B97F4A7C15u);
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return z ^ (z >> 31);
-}
-
 Simplifier::Candidate Simplifier::random_edge() {
-  const std::uint64_t number = draw();
+  const std::uint64_t number = random_bits(0, drawn_++);
   const Triangle& face = faces_[alive_[static_cast<std::size_t>(number >> 8) % alive_.size()]];
   const auto k = static_cast<std::size_t>(number % 3);
   return priced(face[k], face[(k + 1) % 3]);

@@ -50,7 +50,6 @@ class Simplifier {
   void sweep(std::size_t count, int threads);
   std::vector<std::int32_t> cheap_edges(int threads) const;
   void collapse_drawn(std::size_t count);
-  std::uint64_t draw();
   Candidate random_edge();
   Candidate priced(std::int32_t from, std::int32_t to) const;
   bool collapse(const Candidate& edge);
@@ -67,7 +66,7 @@ class Simplifier {
   std::vector<std::int32_t> around_from_, around_to_, mark_;
   std::vector<Candidate> candidates_;
   std::int32_t stamp_ = 0;
-  std::uint64_t state_ = 0;
+  std::uint64_t drawn_ = 0;
 };
 
 }  // namespace rlacd

@@ -8,6 +8,7 @@
 #include <unordered_set>
 
 #include "core/invariant.hpp"
+#include "core/random.hpp"
 #include "core/stop.hpp"
 #include "solid/triangulate.hpp"
 
@@ -42,14 +43,6 @@ struct UncrossedSide {
 constexpr double kNoise = 1e-10;           // of the greatest coordinate
 constexpr std::size_t kMostCrossings = 4;  // for each corner
 
-// A number in [-1, 1) that looks random and is the same everywhere (the finalizer of splitmix64).
-double noise(std::uint64_t i) {
-  i += 0x9e3779b97f4a7c15u;
-  i = (i ^ (i >> 30)) * 0xbf58476d1ce4e5b9u;
-  i = (i ^ (i >> 27)) * 0x94d049bb133111ebu;
-  return static_cast<double>((i ^ (i >> 31)) >> 11) * 0x1p-52 - 1;
-}
-
 // The edges of the rims, edge i from corner i of the rims to the next, and what becomes of them.
 //
 // Nodes are the corners and after them each crossing twice: node n + 2k is crossing k on the first of its edges, node
@@ -69,7 +62,7 @@ class Tangle {
     double greatest = 0;
     for (const PlanePoint p : point_) greatest = std::max({greatest, std::fabs(p[0]), std::fabs(p[1])});
     for (std::size_t i = 0; i < corners_; ++i)
-      for (const int c : {0, 1}) point_[i][c] += kNoise * greatest * noise(2 * vertex_[i] + c);
+      for (const int c : {0, 1}) point_[i][c] += kNoise * greatest * (2 * uniform(0, 2 * vertex_[i] + c) - 1);
   }
 
   std::optional<UncrossedSide> uncrossed() {
@@ -276,41 +269,40 @@ std::vector<Item> joined(const std::vector<std::vector<Item>>& loops) {
   return all;
 }
 
-void append(std::vector<Triangle>& faces, const Loops& rims, const Outlines& outlines, int times, CapArea* area) {
+CapArea append(std::vector<Triangle>& faces, const Loops& rims, const Outlines& outlines, int times) {
   const std::vector<std::int32_t> vertex = joined(rims);
   const std::vector<PlanePoint> point = joined(outlines);
+  CapArea area;
   for (const Triangle& t : triangulate(outlines, vertex)) {
-    if (area != nullptr) {
-      const double doubled = doubled_area(point[t[0]], point[t[1]], point[t[2]]);
-      area->all += std::fabs(doubled);
-      if (doubled < 0) area->folded -= doubled;
-    }
+    const double doubled = doubled_area(point[t[0]], point[t[1]], point[t[2]]);
+    area.all += std::fabs(doubled);
+    if (doubled < 0) area.folded -= doubled;
     for (int i = 0; i < std::abs(times); ++i)
       faces.push_back(times > 0 ? Triangle{vertex[t[0]], vertex[t[1]], vertex[t[2]]}
                                 : Triangle{vertex[t[0]], vertex[t[2]], vertex[t[1]]});
   }
+  return area;
 }
 
 }  // namespace
 
-void add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward,
-              CapArea& area) {
-  append(faces, rims, outlines_of(vertices, rims, outward), 1, &area);
+CapArea add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward,
+                 int times) {
+  return append(faces, rims, outlines_of(vertices, rims, outward), times);
 }
 
 Mesh capped(OpenSide side, Vec3 outward) {
   if (side.rims.empty()) return std::move(side.mesh);
   const Outlines outlines = outlines_of(side.mesh.vertices, side.rims, outward);
   const std::size_t open = side.mesh.faces.size();
-  CapArea area;
-  append(side.mesh.faces, side.rims, outlines, 1, &area);
+  const CapArea area = append(side.mesh.faces, side.rims, outlines, 1);
   if (area.folded <= kFolded * area.all) return std::move(side.mesh);
   OpenSide again{side.mesh, side.rims};
   again.mesh.faces.resize(open);
   std::optional<UncrossedSide> apart = uncross(std::move(again), outlines);
   if (!apart) return std::move(side.mesh);
   for (const RimRegion& region : apart->regions)
-    append(apart->mesh.faces, region.rims, region.outlines, region.winding, nullptr);
+    append(apart->mesh.faces, region.rims, region.outlines, region.winding);
   return std::move(apart->mesh);
 }
 

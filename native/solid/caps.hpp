@@ -15,12 +15,13 @@ namespace rlacd {
 // pile up there, cut after cut.
 constexpr double kFolded = 1e-2;
 
-// Closes loops of vertices in a plane; adds the areas, all of it and what is upside down.
+// Closes loops of vertices in a plane so many times, upside down if that is negative; returns the area of what it adds,
+// all of it and what is upside down without being asked for.
 struct CapArea {
   double all = 0, folded = 0;
 };
-void add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward,
-              CapArea& area);
+CapArea add_caps(std::vector<Triangle>& faces, const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward,
+                 int times = 1);
 
 // New vertices, one for each crossing of rims that were taken apart, follow the others.
 Mesh capped(OpenSide side, Vec3 outward);

@@ -67,9 +67,7 @@ class Depths {
       }
       if (lies == Lies::kAcross) polygon_.swap(deeper_);
     }
-    Vec3 middle{0, 0, 0};
-    for (const Vec3 corner : polygon_) middle = middle + (1.0 / static_cast<double>(polygon_.size())) * corner;
-    return planes_.nearest(middle).depth > t_;
+    return planes_.nearest(middle_of(polygon_)).depth > t_;
   }
 
  private:
@@ -175,8 +173,10 @@ ClippedSolid Filling::clipped(const ConvexBody& hull) const {
   std::optional<ConvexClip> clip = clip_to_convex(solid_, surface_, hull);
   if (clip) {
     CapArea area;
-    for (const ConvexClip::Section& section : clip->sections)
-      add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal, area);
+    for (const ConvexClip::Section& section : clip->sections) {
+      const CapArea own = add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal);
+      area = {area.all + own.all, area.folded + own.folded};
+    }
     if (area.folded > kFolded * area.all) clip.reset();
   }
   out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull.mesh());

@@ -92,13 +92,6 @@ double growth(const Mesh& hull, const std::vector<Vec3>& corners) {
   return joint.volume() - mesh_volume(hull);
 }
 
-Vec3 middle(const std::vector<Vec3>& points) {
-  Vec3 sum;
-  for (const Vec3 p : points) sum = sum + p;
-  const auto count = static_cast<double>(points.size());
-  return {sum.x / count, sum.y / count, sum.z / count};
-}
-
 }  // namespace
 
 std::optional<Piece> piece_of(Mesh mesh, double least) {
@@ -160,7 +153,7 @@ std::vector<Vec3> between(const ConvexBody& hull, const std::vector<const Convex
   }
   std::partial_sort(by_growth.begin(), by_growth.begin() + 2, by_growth.end());
   const Vec3 along =
-      middle(around[by_growth[1].second]->mesh().vertices) - middle(around[by_growth[0].second]->mesh().vertices);
+      middle_of(around[by_growth[1].second]->mesh().vertices) - middle_of(around[by_growth[0].second]->mesh().vertices);
   const double length = norm(along);
   if (length == 0) return {};
   return {{along.x / length, along.y / length, along.z / length}};

@@ -5,7 +5,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/elementary.hpp"
 #include "core/invariant.hpp"
 #include "core/stop.hpp"
 
@@ -58,7 +57,7 @@ class Cutter {
         faces.push_back({polygon[k], polygon[k + 2], polygon[(k + 3) % 4]});
       }
     }
-    Loops loops = rims(net(std::move(in_plane)), -which);
+    Loops loops = rims(net(std::move(in_plane)));
     straighten(faces, loops);
     return compacted(faces, loops);
   }
@@ -90,21 +89,11 @@ class Cutter {
     return known->second;
   }
 
-  // Loops against the boundary's edges; outside is where the normal times `up` points.
-  Loops rims(std::vector<Edge> boundary, int up) const {
+  // Loops against the boundary's edges. Without loops the surface was not closed: its side stays open, with all its
+  // points.
+  static Loops rims(std::vector<Edge> boundary) {
     for (Edge& e : boundary) std::swap(e[0], e[1]);
-    std::optional<Loops> loops =
-        loops_of(std::move(boundary), [&](const Edge& before, const Edge& e) { return angle_inside(before, e, up); });
-    // Without loops the surface was not closed: its side stays open, with all its points.
-    return loops ? std::move(*loops) : Loops{};
-  }
-
-  // Angle between an edge and the one before it, on the inside of the loop; in (0, 2 pi].
-  double angle_inside(const Edge& before, const Edge& edge, int up) const {
-    const auto at = on_plane({points_[before[0]], points_[edge[0]], points_[edge[1]]}, up > 0 ? normal_ : -normal_);
-    const double bx = at[0][0] - at[1][0], by = at[0][1] - at[1][1], ex = at[2][0] - at[1][0], ey = at[2][1] - at[1][1];
-    const double angle = angle_of(ex * by - ey * bx, ex * bx + ey * by);
-    return angle > 0 ? angle : angle + 2 * kPi;
+    return loops_of(std::move(boundary)).value_or(Loops());
   }
 
   // Removes corners of the rims that lie on a straight line in a flat part of the surface, where its triangles met.
@@ -220,7 +209,7 @@ std::vector<Edge> net(std::vector<Edge> edges) {
   return left;
 }
 
-std::optional<Loops> loops_of(std::vector<Edge> edges, const std::function<double(Edge before, Edge next)>& turn) {
+std::optional<Loops> loops_of(std::vector<Edge> edges) {
   std::sort(edges.begin(), edges.end());
   std::vector<char> is_used(edges.size(), 0);
   Loops loops;
@@ -231,15 +220,12 @@ std::optional<Loops> loops_of(std::vector<Edge> edges, const std::function<doubl
       loop.push_back(edges[edge][0]);
       const std::int32_t at = edges[edge][1];
       if (at == edges[first][0]) break;
-      std::size_t best = edge;
-      for (auto e = std::lower_bound(edges.begin(), edges.end(), Edge{at, -1}); e != edges.end() && (*e)[0] == at;
-           ++e) {
-        const auto i = static_cast<std::size_t>(e - edges.begin());
-        if (is_used[i]) continue;
-        if (best == edge || (turn && turn(edges[edge], *e) < turn(edges[edge], edges[best]))) best = i;
-      }
-      if (best == edge) return std::nullopt;
-      edge = best;
+      std::size_t next = edge;
+      for (auto e = std::lower_bound(edges.begin(), edges.end(), Edge{at, -1});
+           next == edge && e != edges.end() && (*e)[0] == at; ++e)
+        if (const auto i = static_cast<std::size_t>(e - edges.begin()); !is_used[i]) next = i;
+      if (next == edge) return std::nullopt;
+      edge = next;
     }
     if (loop.size() > 2) loops.push_back(std::move(loop));
   }

@@ -5,13 +5,11 @@
 //         clockwise around it as seen from outside. Any triangulation of the loops closes the side.
 // Algorithm: triangles are clipped; an edge is crossed at one point that all its triangles share. Corners within
 // rounding of the plane are on it. A triangle in the plane belongs to the side that it bounds from outside. The edges
-// in the plane, without those that run both ways, form the boundary of the open side, which is walked loop by loop;
-// where loops touch, the next edge is the one nearest the inside.
+// in the plane, without those that run both ways, form the boundary of the open side, which is walked loop by loop.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <vector>
 
@@ -37,8 +35,8 @@ inline std::uint64_t undirected(std::int32_t a, std::int32_t b) { return directe
 // The edges without those that also run the other way, by their ends.
 std::vector<Edge> net(std::vector<Edge> edges);
 
-// Joins edges to loops; nothing if some are open. Where several continue, one is taken with the least turn, the first.
-std::optional<Loops> loops_of(std::vector<Edge> edges, const std::function<double(Edge before, Edge next)>& turn = {});
+// Joins edges to loops, which may run through each other where several meet; nothing if some are open.
+std::optional<Loops> loops_of(std::vector<Edge> edges);
 
 // Coordinates of points on a plane that preserve orientation as seen against the normal.
 std::vector<PlanePoint> on_plane(const std::vector<Vec3>& points, Vec3 normal);

@@ -8,6 +8,7 @@
 
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
+#include "solid/caps.hpp"
 #include "solid/glue.hpp"
 #include "solid/plane_cut.hpp"
 #include "solid/triangulate.hpp"
@@ -167,17 +168,7 @@ class Reunion {
     for (const auto& [times, edges] : sides) {
       const std::optional<Loops> loops = loops_of(edges);
       if (!loops) return false;
-      std::vector<std::int32_t> vertices;
-      std::vector<std::vector<PlanePoint>> outlines;
-      for (const std::vector<std::int32_t>& loop : *loops) {
-        vertices.insert(vertices.end(), loop.begin(), loop.end());
-        std::vector<Vec3> points;
-        for (const std::int32_t v : loop) points.push_back(mesh_.vertices[v]);
-        outlines.push_back(on_plane(points, normal));
-      }
-      for (const Triangle& t : triangulate(outlines, vertices))
-        caps_.push_back(times > 0 ? Triangle{vertices[t[0]], vertices[t[1]], vertices[t[2]]}
-                                  : Triangle{vertices[t[0]], vertices[t[2]], vertices[t[1]]});
+      add_caps(caps_, mesh_.vertices, *loops, normal, times > 0 ? 1 : -1);
     }
     return true;
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/random.hpp"
 #include "core/stop.hpp"
 #include "surface/edges.hpp"
 
@@ -43,15 +44,6 @@ void spread_over(const Mesh& mesh, const Triangle& face, double spacing, bool co
     }
   }
   take(c);
-}
-
-// Uniform in [0, 1), a function of the seed and the counter alone (Steele, Lea, Flood: SplitMix64, 2014).
-double uniform(std::uint64_t seed, std::uint64_t counter) {
-  std::uint64_t z = seed + (counter + 1) * 0x9e3779b97f4a7c15u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  z ^= z >> 31;
-  return static_cast<double>(z >> 11) * 0x1p-53;
 }
 
 double fraction(double x) { return x - std::floor(x); }
