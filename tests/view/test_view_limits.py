@@ -166,7 +166,8 @@ def test_no_leaks_are_printed_when_python_ends(rough: Path, ending: str) -> None
     mesh = rough if "view" in ending else rough.with_name("cube.stl")
     trimesh.creation.box().export(rough.with_name("cube.stl"))
     program = f"import rlacd\nmesh = {os.fspath(mesh)!r}\n{ENDINGS[ending]}"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
+    command = [sys.executable, "-W", "ignore::UserWarning", "-c", program]  # as the command line does
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert "nanobind" not in run.stderr + run.stdout
     if ending == "raised":
         assert "ZeroDivisionError" in run.stderr
