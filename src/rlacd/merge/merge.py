@@ -345,7 +345,7 @@ def united_in_turn(
 
 
 class _BoundedPair(NamedTuple):
-    error: float  # of the union: a lower bound, or the value if `measured`
+    error: float  # of the union: a lower bound, or the value once there is one
     first: int
     second: int
     union: Part | None  # once it is measured
