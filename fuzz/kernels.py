@@ -129,7 +129,7 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
             *mesh, np.ascontiguousarray(directions), offsets, exponent, 1e-9, 1e-11, (0.02, 2e-4), threads
         )
     )
-    _native.candidate_planes(*mesh, hull.vertices, hull.faces, 12, 4)
+    _native.candidate_planes(*mesh, hull.body, 12, 4)
     volume = _native.mesh_volume(*mesh)
     threshold = float(random.choice([0.01, 0.05, 0.3]))
     met = _native.meets_concavity(*mesh, hull.body, volume, hull.volume, threshold)

@@ -179,7 +179,9 @@ class _Decomposer:
         """
         few = len(self.solid.surface[1]) if self.solid.is_sheets else math.inf
         states, settled, found = self._decomposed(goal, PIECES_A_FACE * few)
-        return (states, settled, found) if len(states[-1]) <= few else ([slabs(self.solid, self.run)], goal, None)
+        if len(states[-1]) <= few:
+            return states, settled, found
+        return [self.run.if_in_time(lambda: slabs(self.solid, self.run), lambda: states[-1])], goal, None
 
     def _decomposed(self, goal: Criterion, most: float) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         with self.run.limited():

@@ -30,8 +30,8 @@ SHARE_OF_WORK, LEAST_SHARE = 0.3, 0.4e6
 PIECES = 2
 """Cutting on stops at so many times the parts that may be added: merging leaves half of them."""
 
-HULLS_A_PART = 9
-"""Limited hulls that cutting a part on takes, about: they are most of its price."""
+HULLS_A_PART = 3
+"""Limited hulls that are paid for before a part is cut on: more are made, but of smaller parts."""
 
 NEARLY_EQUAL = 1.02
 """Errors within this factor are equal: they are measured to a fiftieth of the threshold."""
