@@ -27,6 +27,21 @@ class DepthField {
   const ConvexPlanes& planes_;
 };
 
+// The maximum, bounded also by the witness of every triangle's centre alone: exact for a convex part, whose triangles
+// lie on those they are measured to.
+template <class Field>
+Interval measured(const Field& field, const Mesh& mesh, const Goal& goal) {
+  Interval found = maximize(field, mesh, goal, 1);
+  double most = found.lower;
+  for (std::size_t f = 0; f < mesh.faces.size() && most < found.upper; ++f) {
+    const Corners corner = corners_of(mesh, mesh.faces[f]);
+    const std::int32_t witness = field.at((1.0 / 3.0) * (corner[0] + corner[1] + corner[2]), -1, 0).witness;
+    for (const Vec3& point : corner) most = std::max(most, field.from(witness, point));
+  }
+  found.upper = std::min(found.upper, most);
+  return found;
+}
+
 void check(const Mesh& part, const ConvexBody& hull) {
   if (part.faces.empty()) throw std::invalid_argument("the part has no faces");
   if (hull.mesh().faces.empty()) throw std::invalid_argument("the hull has no faces");
@@ -46,9 +61,9 @@ Concavity concavity(const Mesh& part, const ConvexBody& hull, double part_volume
   Goal goal;
   goal.tolerance = tolerance;
   goal.pass = goal.rough = std::max(floor, kVolumeWeight * result.volume_radius + tolerance);
-  result.part_to_hull = maximize(DepthField(hull), part, goal, 1);
+  result.part_to_hull = measured(DepthField(hull), part, goal);
   goal.pass = goal.rough = std::max(goal.pass, result.part_to_hull.lower + tolerance);
-  result.hull_to_part = maximize(SurfaceField(tree.of(part)), hull.mesh(), goal, 1);
+  result.hull_to_part = measured(SurfaceField(tree.of(part)), hull.mesh(), goal);
   return result;
 }
 
