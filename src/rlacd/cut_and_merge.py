@@ -36,12 +36,15 @@ class Pass:
         The merged pieces; the pieces themselves if merging was skipped.
     criterion : Criterion
         The criterion used for merging: the requested one, settled on the pieces.
+    is_too_many : bool
+        Cutting was stopped, or ended, with more parts than asked for, and nothing was merged.
     """
 
     pieces: list[Part]
     unmet: list[Part]
     parts: list[Part]
     criterion: Criterion
+    is_too_many: bool = False
 
 
 def cut_and_merge(
@@ -76,8 +79,8 @@ def cut_and_merge(
         with run.limited(most_work, cuts=None if strict else "cut"):
             done, left = tree.cut_until(criterion, most)
         pieces: list[Part] = [*done, *left]
-        if len(pieces) > most:
-            return Pass(pieces, [*left], pieces, criterion)
+        if len(pieces) + len(left) > most:  # each that is left would become two
+            return Pass(pieces, [*left], pieces, criterion, is_too_many=True)
         try:
             if run.stopped_by is None:
                 criterion = criterion.settled(pieces)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
-from rlacd.cut_and_merge import MOST_CUTTING, cut_and_merge
+from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
 from rlacd.limit import at_most, cut_to_limits
 from rlacd.merge import grow_cover
 from rlacd.options import FAST, Options
@@ -177,16 +177,24 @@ class _Decomposer:
         Returns the parts that the levels up to the one asked for end with, the best last, the goal as settled on them,
         and a summary of the search. Sheets that would take more parts than they have faces get one for each face.
         """
-        few = len(self.solid.surface[1]) if self.solid.is_sheets else math.inf
-        states, settled, found = self._decomposed(goal, PIECES_A_FACE * few)
-        if len(states[-1]) <= few:
+        states, settled, found = self._decomposed(goal)
+        if len(states[-1]) <= self._few:
             return states, settled, found
         return [self.run.if_in_time(lambda: slabs(self.solid, self.run), lambda: states[-1])], goal, None
 
-    def _decomposed(self, goal: Criterion, most: float) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
+    @property
+    def _few(self) -> float:
+        """More parts are too many: the number of faces of sheets."""
+        return len(self.solid.surface[1]) if self.solid.is_sheets else math.inf
+
+    def _cut(self, goal: Criterion) -> Pass:
+        most = PIECES_A_FACE * self._few
+        return cut_and_merge(self.tree, goal, self.run, merge=self.options.merge, most=most)
+
+    def _decomposed(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         with self.run.limited():
-            done = cut_and_merge(self.tree, self.model.tighter(goal), self.run, merge=self.options.merge, most=most)
-            if len(done.pieces) > most:
+            done = self._cut(self.model.tighter(goal))
+            if done.is_too_many:
                 return [done.pieces], goal, None
             states, found = self._searched(done.parts, done.criterion, goal)
             best = states[-1]
@@ -210,8 +218,9 @@ class _Decomposer:
         while self.run.stopped_by is None:
             factor *= COARSER if self.run.work.done - begin < MOST_CUTTING else COARSER**4
             with self.run.limited():
-                done = cut_and_merge(self.tree, self.model.tighter(goal, factor), self.run, merge=self.options.merge)
-            yield self._transferred(done.parts, goal, factor)
+                done = self._cut(self.model.tighter(goal, factor))
+            if not done.is_too_many:
+                yield self._transferred(done.parts, goal, factor)
             if len(done.parts) <= 1:
                 return
 

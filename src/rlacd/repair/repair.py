@@ -68,6 +68,10 @@ def _is_nothing(state: State) -> bool:
     return state.volume == 0
 
 
+def _is_something(state: State) -> bool:
+    return not _is_nothing(state)
+
+
 def _take_hull(state: State) -> None:
     """Take the convex hull of all points."""
     state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
@@ -107,8 +111,8 @@ STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
 """Conditions and actions of a repair, in their order."""
 
 AT_LAST: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
+    (_is_something, _keep_lost),
     (_is_nothing, _take_hull),
-    (_always, _keep_lost),
 )
 """The last ones, also where bodies cross too often to be united."""
 
