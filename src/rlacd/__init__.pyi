@@ -112,7 +112,7 @@ def decompose(
     max_hulls : int | None
         At most this many hulls, even if the threshold must be exceeded; the report says by how much. It has no effect
         if there are no more anyway; otherwise the decomposition with the least concavity among those found under
-        coarser thresholds is returned. A larger limit never leads to a larger concavity.
+        coarser thresholds is returned. Of limits with an effect, a larger one never leads to a larger concavity.
     max_vertices : int | None
         At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls, or
         exceeds the threshold and says so. A limited hull contains its part and sticks out by at most the threshold (by

@@ -26,7 +26,7 @@ from rlacd.options.fields import (
     shown,
     stated,
 )
-from rlacd.options.keywords import unknown_option
+from rlacd.options.keywords import check_names
 from rlacd.options.names import (
     POLICIES,
     PRIMITIVE_KINDS,
@@ -190,7 +190,8 @@ class Options:
     """At most this many hulls, even if the threshold must be exceeded; the report says by how much.
 
     It has no effect if there are no more anyway; otherwise the decomposition with the least concavity among those
-    found under coarser thresholds is returned. A larger limit never leads to a larger concavity.
+    found under coarser thresholds is returned. Of limits with an effect, a larger one never leads to a larger
+    concavity.
     """
     max_vertices: int | None = option(None, LIMITS, _CORNERS)
     """At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls,
@@ -346,9 +347,7 @@ class Options:
             There is no such option.
         """
         given = {name: value for name, value in given.items() if value is not None}
-        for name in given:
-            if name not in OPTION_NAMES:
-                raise unknown_option("decompose", name, OPTION_NAMES, ELSEWHERE)
+        check_names("decompose", given, OPTION_NAMES, ELSEWHERE)
         options = cls(**given)
         for name, rule in options._overridden():
             if name in given:
