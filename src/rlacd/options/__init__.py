@@ -213,7 +213,8 @@ class Options:
     SDF, USD and Unreal, else as meshes.
 
     True allows all. A primitive contains the hull of its part, and is the simplest whose volume is within a quarter
-    of the least; its own hull is a convex polyhedron around it, and ``Decomposition.primitives`` describes it.
+    of the least; its own hull is a convex polyhedron around it, and ``Decomposition.primitives`` describes it. A round
+    one may reach below a side on which the input rests.
     """
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
     """Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them.
