@@ -91,6 +91,8 @@ def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: 
     path = Robot("row", links, joints).write(tmp_path)
     done = rlacd.rewrite_robot(path, tmp_path / "out.urdf", threads=1, samples=20, srdf=tmp_path / "row.srdf")
     assert done.warnings == ["base and tip touch in the input itself wherever the joints are."]
+    still = rlacd.rewrite_robot(path, tmp_path / "still.urdf", threads=1, samples=0)
+    assert still.warnings == ["base and tip touch in the input itself."]
     assert {(pair.first, pair.second): pair.kind for pair in done.pairs} == {
         ("base", "middle"): "adjacent",
         ("base", "tip"): "always",

@@ -107,16 +107,25 @@ def test_the_command_has_the_originals_flags() -> None:
     assert {"-t", "--threshold", "-c", "-mi", "--split"} <= flags[1]
 
 
-def test_the_command_writes_a_hull_an_object_and_says_what_has_no_effect(tmp_path: Path) -> None:
+def test_the_command_writes_a_hull_an_object_and_says_what_has_no_effect(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     table().export(tmp_path / "in.obj")
-    words = ["-i", str(tmp_path / "in.obj"), "-o", str(tmp_path / "out.obj"), "-t", "0.1", "-c", "3", "--split"]
+    place = tmp_path / "new" / "out.obj"
+    words = ["-i", str(tmp_path / "in.obj"), "-o", str(place), "-t", "0.1", "-c", "3", "--split"]
     with pytest.warns(UnusedOptionWarning, match="mcts_iterations"):
         our_coacd.main([*words, "-mi", "200"])
-    parts = sorted((tmp_path / "out_parts").iterdir())
+    parts = sorted((tmp_path / "new" / "out_parts").iterdir())
     assert len(parts) <= 3
-    assert (tmp_path / "out.obj").read_text().count("\no ") == len(parts)
-    with pytest.raises(SystemExit):
-        our_coacd.main([*words[:1], "nowhere.obj", *words[2:]])
+    assert place.read_text().count("\no ") == len(parts)
+    for more, says in (
+        (["-i", "nowhere.obj"], "nowhere.obj does not exist"),
+        (["-o", "x.xyz"], "must end in .obj"),
+        (["-d", "-dt", "3"], "max_ch_vertex is 3"),
+    ):
+        with pytest.raises(SystemExit):
+            our_coacd.main([*words, *more])
+        assert says in capsys.readouterr().err
 
 
 def test_run_coacd_takes_a_trimesh() -> None:

@@ -112,7 +112,7 @@ def decompose(
     max_hulls : int | None
         At most this many hulls, even if the threshold must be exceeded; the report says by how much. It has no effect
         if there are no more anyway; otherwise the decomposition with the least concavity among those found under
-        coarser thresholds is returned. A larger limit never leads to a larger concavity.
+        coarser thresholds is returned. Of limits with an effect, a larger one never leads to a larger concavity.
     max_vertices : int | None
         At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls, or
         exceeds the threshold and says so. A limited hull contains its part and sticks out by at most the threshold (by
@@ -128,7 +128,8 @@ def decompose(
         Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF,
         SDF, USD and Unreal, else as meshes. True allows all. A primitive contains the hull of its part, and is the
         simplest whose volume is within a quarter of the least; its own hull is a convex polyhedron around it, and
-        ``Decomposition.primitives`` describes it. Default: none.
+        ``Decomposition.primitives`` describes it. A round one may reach below a side on which the input rests. Default:
+        none.
     overlap : float
         Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them. One
         takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and a

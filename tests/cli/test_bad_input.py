@@ -162,7 +162,7 @@ class BytesPath:
         pytest.param(b"solid", OptionError, id="bytes of no format"),
         pytest.param(io.StringIO("v 0 0 0"), MeshDataError, id="open as text"),
         pytest.param([], MeshDataError, id="no meshes"),
-        pytest.param([trimesh.Trimesh(), 3], MeshDataError, id="not all meshes"),
+        pytest.param((trimesh.Trimesh(), 3), MeshDataError, id="not all meshes"),
         pytest.param((np.zeros((0, 3)), NO_FACES), EmptyMeshError, id="no points"),
         pytest.param(trimesh.Trimesh(), EmptyMeshError, id="empty mesh"),
         pytest.param(trimesh.Scene(), EmptyMeshError, id="empty scene"),

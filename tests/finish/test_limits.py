@@ -231,6 +231,16 @@ def test_a_limit_is_kept_and_a_larger_one_never_fits_worse(
         last = worst
 
 
+@pytest.mark.promise("max-hulls")
+def test_parts_are_chosen_by_the_limited_hulls_they_end_with() -> None:
+    """Some cannot stay within the sides on which the solid rests."""
+    mesh, last = trimesh_of(cabinet()), np.inf
+    for most in (4, 5, 6):
+        worst = error(rlacd.decompose(mesh, quality="fast", max_hulls=most, max_vertices=8), "concavity")
+        assert worst <= last + ACCURACY
+        last = worst
+
+
 def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() -> None:
     boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(5)]
 

@@ -50,6 +50,8 @@ def cupboard(path: Path) -> Path:
     add_box(stage, "/Cupboard/hidden/box")
     for purpose in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
         add_box(stage, f"/Cupboard/{purpose}").CreatePurposeAttr(purpose)
+    add_box(stage, "/Cupboard/later").CreateVisibilityAttr().Set(UsdGeom.Tokens.invisible, 1.0)
+    UsdGeom.Plane.Define(stage, "/Cupboard/floor")
     stage.Save()
     return path
 
@@ -62,8 +64,11 @@ def test_what_is_rendered_is_read_where_it_stands(tmp_path: Path, ending: str) -
         path = tmp_path / "cupboard.usdz"
     mesh = load_mesh(path)
     assert [node.name for node in mesh.nodes] == ["box", "door"]
-    hidden, others = "hidden nodes were left out, with those below them: 1", "guides and proxies were left out: 2"
-    assert mesh.warnings == (hidden, others)
+    assert set(mesh.warnings) == {
+        "hidden nodes were left out, with those below them: 2",
+        "guides and proxies were left out: 2",
+        "shapes other than meshes and plain primitives were left out: 1",
+    }
     assert (mesh.up, mesh.metres, mesh.unit) == ("y", 0.01, "cm")
     assert len(mesh.faces) == 12 + 2
     box = mesh.of_node(0).vertices

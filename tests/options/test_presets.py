@@ -66,6 +66,12 @@ def test_a_convex_body_is_one_hull_within_any_limits_and_a_warning_tells_how_far
 RING = trimesh.creation.torus(1.0, 0.35, 48, 32)
 
 
+def test_limits_on_corners_are_not_blamed_for_what_one_on_hulls_does() -> None:
+    warnings = rlacd.decompose(RING, threads=1, quality="fast", max_vertices=32, max_hulls=3).report.warnings
+    assert any("3 of 3 parts exceed" in warning for warning in warnings)
+    assert not any("out by up to" in warning for warning in warnings)
+
+
 @pytest.fixture(scope="module", params=[RING, CROSSING_BALLS], ids=["ring", "balls"])
 def unlimited(request: pytest.FixtureRequest) -> tuple[trimesh.Trimesh, rlacd.Decomposition]:
     return request.param, rlacd.decompose(request.param, threads=1, quality="fast")

@@ -86,10 +86,7 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
             f"links collide at least as often themselves, their hulls were not cut finer ({len(earlier)} such pairs)."
         )
     if always:
-        said = (
-            f"{always[0]} touch"
-            if len(always) == 1
-            else f"{always[0]}, and {len(always) - 1} more pairs of links, touch"
-        )
-        sentences.append(f"{said} in the input itself wherever the joints are.")
+        more = "" if len(always) == 1 else f", and {len(always) - 1} more pairs,"
+        moves = any(len(touching.meshes) > 1 for touching in cleared.touching.values())
+        sentences.append(f"{always[0]}{more} touch in the input itself{' wherever the joints are' if moves else ''}.")
     return sentences

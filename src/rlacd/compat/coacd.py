@@ -19,6 +19,7 @@ from rlacd.compat import warn_unused
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
+from rlacd.io.write.target import checked_place
 from rlacd.options import LENGTHS
 from rlacd.options.fields import flag, integer, number, one_of, read
 
@@ -114,7 +115,7 @@ def run_coacd(
         threshold=None if real_metric else max(threshold, LENGTHS["threshold"][0]),
         threshold_abs=threshold if real_metric else None,
         max_hulls=None if most_hulls < 1 else most_hulls,
-        max_vertices=max_ch_vertex if decimate else None,
+        max_vertices=read(integer(4), "max_ch_vertex", max_ch_vertex) if decimate else None,
         overlap=min(margin, LENGTHS["overlap"][1]) if extrude else 0.0,
         merge=merge,
         seed=seed,
@@ -126,6 +127,9 @@ def run_coacd(
 def set_log_level(level: str) -> None:
     """Accept CoACD's log levels; rlacd logs nothing."""
 
+
+ENDINGS = (".obj", ".glb", ".ply", ".stl", ".off")
+"""Of the files that its command writes here."""
 
 FLAGS: dict[str, str] = {
     **{"-t --threshold": "threshold", "-pm --preprocess-mode": "preprocess_mode", "-r --resolution": "resolution"},
@@ -143,7 +147,7 @@ def main(words: list[str] | None = None) -> None:
     """Run CoACD's command line: same flags, same files."""
     parser = argparse.ArgumentParser("python -m rlacd.compat.coacd", description="CoACD's command, done by rlacd.")
     parser.add_argument("-i", "--input", required=True, type=Path, help="any mesh file that rlacd reads")
-    parser.add_argument("-o", "--output", required=True, type=Path, help="any mesh file that trimesh writes")
+    parser.add_argument("-o", "--output", required=True, type=Path, help=f"a file that ends in {', '.join(ENDINGS)}")
     parser.add_argument("--quiet", action="store_true", help="print nothing")
     parser.add_argument("--split", action="store_true", help="each hull in a file of its own too, in OUTPUT_parts")
     usual = inspect.signature(run_coacd).parameters
@@ -156,10 +160,12 @@ def main(words: list[str] | None = None) -> None:
     given = vars(parser.parse_args(words))
     source, output, split, quiet = (given.pop(name) for name in ("input", "output", "split", "quiet"))
     try:
+        checked_place(output, "hulls", ENDINGS)
         mesh = load_mesh(source)
         hulls = [trimesh.Trimesh(v, f, process=False) for v, f in run_coacd(mesh, **given)]
     except RlacdError as error:
         parser.error(str(error))
+    output.parent.mkdir(parents=True, exist_ok=True)
     trimesh.Scene(hulls).export(output)
     if split:
         folder = output.with_name(f"{output.stem}_parts")

@@ -174,8 +174,11 @@ class LimitedCriterion(Criterion):
         return self.finest is None or not self.finest.is_met(exact)
 
     def error(self, part: Part) -> float:
-        """The error of the part with its limited hull."""
-        return self.criterion.error(self._limited(part))
+        """The error of the part with the limited hull it ends with: off the sides, where the one on them fails."""
+        limited = self._limited(part)
+        if len(self.sides) and limited is not part and not self.of_facets.is_met(limited):
+            limited = replace(self, sides=NO_SIDES)._limited(part)
+        return self.criterion.error(limited)
 
     def settled(self, parts: Sequence[Part]) -> LimitedCriterion:
         """Settle it with the limited hulls; balls become as small as parts that cannot be cut leave them."""

@@ -296,11 +296,12 @@ def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) ->
 
 
 def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
-    """How far hulls stick out because of limits on their vertices and triangles, where that is too far."""
+    """How far hulls stick out because of limits on their vertices and triangles, where without them they would not."""
     facets, limits, scale = reached.goal.of_facets, reached.options.hull_limits, reached.solid.frame.scale
     if not math.isfinite(facets.outward_deviation):
         return []
-    beyond = [error for part in parts if part.exact and (error := facets.error(part)) > facets.outward_deviation]
+    tight = [part for part in parts if part.exact and facets.is_met(part.with_hull(part.exact))]
+    beyond = [error for part in tight if (error := facets.error(part)) > facets.outward_deviation]
     if not beyond:
         return []
     counts = zip(limits, ("vertices", "triangles"), strict=True)

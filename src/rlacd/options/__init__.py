@@ -26,7 +26,7 @@ from rlacd.options.fields import (
     shown,
     stated,
 )
-from rlacd.options.keywords import unknown_option
+from rlacd.options.keywords import check_names
 from rlacd.options.names import (
     POLICIES,
     PRIMITIVE_KINDS,
@@ -190,7 +190,8 @@ class Options:
     """At most this many hulls, even if the threshold must be exceeded; the report says by how much.
 
     It has no effect if there are no more anyway; otherwise the decomposition with the least concavity among those
-    found under coarser thresholds is returned. A larger limit never leads to a larger concavity.
+    found under coarser thresholds is returned. Of limits with an effect, a larger one never leads to a larger
+    concavity.
     """
     max_vertices: int | None = option(None, LIMITS, _CORNERS)
     """At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls,
@@ -212,7 +213,8 @@ class Options:
     SDF, USD and Unreal, else as meshes.
 
     True allows all. A primitive contains the hull of its part, and is the simplest whose volume is within a quarter
-    of the least; its own hull is a convex polyhedron around it, and ``Decomposition.primitives`` describes it.
+    of the least; its own hull is a convex polyhedron around it, and ``Decomposition.primitives`` describes it. A round
+    one may reach below a side on which the input rests.
     """
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
     """Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them.
@@ -346,9 +348,7 @@ class Options:
             There is no such option.
         """
         given = {name: value for name, value in given.items() if value is not None}
-        for name in given:
-            if name not in OPTION_NAMES:
-                raise unknown_option("decompose", name, OPTION_NAMES, ELSEWHERE)
+        check_names("decompose", given, OPTION_NAMES, ELSEWHERE)
         options = cls(**given)
         for name, rule in options._overridden():
             if name in given:

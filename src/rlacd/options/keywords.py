@@ -7,7 +7,7 @@ import difflib
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 from rlacd.options.fields import About, stated_in
@@ -22,11 +22,19 @@ def meant(word: str, known: Collection[str]) -> str:
     return f" Did you mean {alike[0]!r}?" if alike else ""
 
 
-def unknown_option(function: str, name: str, known: Collection[str], elsewhere: Sequence[type] = ()) -> TypeError:
-    """The error for an argument that a function does not take; `elsewhere` are options that Python gives otherwise."""
-    places = [place for options in elsewhere if (place := stated_in(options, name))]
-    hint = f" It belongs to {places[0]}." if places else meant(name, known)
-    return TypeError(f"{function}() got an unexpected keyword argument {name!r}.{hint}")
+def check_names(function: str, given: Iterable[str], known: Collection[str], elsewhere: Sequence[type] = ()) -> None:
+    """Refuse an argument that a function does not take; `elsewhere` are options that Python gives otherwise.
+
+    Raises
+    ------
+    TypeError
+        It names the function and what was meant.
+    """
+    for name in given:
+        if name not in known:
+            places = [place for options in elsewhere if (place := stated_in(options, name))]
+            hint = f" It belongs to {places[0]}." if places else meant(name, known)
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}.{hint}")
 
 
 def taking(options: type[Any], *others: type[Any]) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:

@@ -100,10 +100,8 @@ def rebuild_tangles(state: State) -> None:
         state.note(own.body, "slab" if is_few else "wrapped")
         state.parts.append(Piece(solid, body))
     state.unite_parts()
-    bodies = "1 body crosses" if len(tangled) == 1 else f"{len(tangled)} bodies cross"
-    state.warnings.append(
-        f"{bodies} too much of their own surface to be cut, so whatever the faces enclose is taken to be solid."
-    )
+    bodies = "1 body crosses itself" if len(tangled) == 1 else f"{len(tangled)} bodies cross themselves"
+    state.warnings.append(f"{bodies} too often to be cut, so whatever the faces enclose is taken to be solid.")
 
 
 def may_have_voids(state: State) -> bool:

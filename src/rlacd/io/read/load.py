@@ -83,7 +83,7 @@ def load_mesh(
     if isinstance(source, str):
         path = Path(source)
         return without_engine_hulls(_baked(path.name, _read(path, fineness)))
-    if isinstance(source, list) and source and all(isinstance(one, trimesh.Trimesh) for one in source):
+    if isinstance(source, list | tuple) and source and all(isinstance(one, trimesh.Trimesh) for one in source):
         source = trimesh.Scene(source)
     arrays_of, geometry_of = (function_of(f"read.trimesh_scene:{name}") for name in ("arrays_of", "geometry_of"))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
@@ -93,7 +93,8 @@ def load_mesh(
     if isinstance(source, tuple) and len(source) == 2:
         return replace(_baked("arrays", Contents(one_shape("arrays", *arrays_of(*source)))), nodes=(), node_of=None)
     raise MeshDataError(
-        f"cannot take a mesh from {type(source).__name__}: give a path, a trimesh object or vertices and faces"
+        f"cannot take a mesh from {type(source).__name__}: give a path, an open file, vertices and faces, or a trimesh "
+        "object or a list of them"
     )
 
 

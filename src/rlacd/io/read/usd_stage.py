@@ -58,6 +58,7 @@ def read_stage(values: Values, blobs: Blobs) -> Answered:
                 prims.PruneChildren()
             continue
         if not prim.IsA(UsdGeom.Mesh) and str(prim.GetTypeName()) not in PRIMITIVES:
+            left_out["shapes other than meshes and plain primitives were left out"] += prim.IsA(UsdGeom.Gprim)
             continue
         to_world = np.array(cache.GetLocalToWorldTransform(prim), dtype=np.float64).T
         names = prim.GetName(), str(prim.GetPath())
@@ -128,7 +129,7 @@ def _left_out(prim: Any) -> str | None:
     if not prim.IsA(UsdGeom.Imageable):
         return None
     imageable = UsdGeom.Imageable(prim)
-    if imageable.ComputeVisibility() == UsdGeom.Tokens.invisible:
+    if imageable.ComputeVisibility(Usd.TimeCode.EarliestTime()) == UsdGeom.Tokens.invisible:
         return HIDDEN
     shown = imageable.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
     return "guides and proxies were left out" if prim.IsA(UsdGeom.Gprim) and not shown else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import time
 from collections.abc import Mapping, Sequence
@@ -15,9 +16,9 @@ from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
 from rlacd.io.robots.rewritten import Rewritten, rewritten
 from rlacd.io.robots.robot import Robot
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
-from rlacd.options import Options
+from rlacd.options import ELSEWHERE, Options
 from rlacd.options.fields import checked, path_like, read, shown
-from rlacd.options.keywords import taking
+from rlacd.options.keywords import check_names, taking
 from rlacd.options.output import OutputOptions
 from rlacd.options.robots import RobotOptions
 from rlacd.run import ProgressCallback
@@ -70,6 +71,7 @@ def rewrite_robot(
         The place cannot be written to.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
+    check_names("rewrite_robot", options, inspect.signature(rewrite_robot).parameters, ELSEWHERE)
     own = {field.name for field in fields(RobotOptions)}
     asked = RobotOptions(**{name: value for name, value in options.items() if name in own and value is not None})
     options = {name: value for name, value in options.items() if name not in own} | {"progress": progress}
