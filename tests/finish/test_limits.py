@@ -20,6 +20,7 @@ from fuzz.geometry import Polytope, why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.finish.finish import limit_part
+from rlacd.limit import few_enough
 from rlacd.merge.merge import united_in_turn
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run, Work
@@ -239,6 +240,17 @@ def test_parts_are_chosen_by_the_limited_hulls_they_end_with() -> None:
         worst = error(rlacd.decompose(mesh, quality="fast", max_hulls=most, max_vertices=8), "concavity")
         assert worst <= last + ACCURACY
         last = worst
+
+
+@given(st.lists(st.integers(1, 60), min_size=1), st.integers(1, 40), st.integers(0, 20))
+def test_a_larger_number_leaves_no_decomposition_out_that_a_smaller_one_unites(
+    counts: list[int], few: int, more: int
+) -> None:
+    decompositions = [range(count) for count in counts]
+    of_few, of_more = (list(few_enough(decompositions, most)) for most in (few, few + more))
+    assert all(any(one is other for other in of_more) for one in of_few)
+    assert of_few[-1] is decompositions[-1]
+    assert [parts for parts in decompositions if len(parts) <= few] == [parts for parts in of_few if len(parts) <= few]
 
 
 def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() -> None:
