@@ -130,7 +130,7 @@ sanitize-address sanitize-thread: sanitize-%: build/sanitize-%/installed
 build/sanitize-%/installed: $(NATIVE_SOURCES)
 	test -x build/sanitize-$*/bin/python || $(PYTHON) -m venv build/sanitize-$*
 	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt \
-	  scikit-build-core nanobind cmake ninja pytest hypothesis point-cloud-utils
+	  scikit-build-core nanobind cmake ninja pytest hypothesis point-cloud-utils pycollada rtree usd-core
 	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt --no-build-isolation --editable . \
 	  --config-settings=build-dir=build/sanitize-$*/native --config-settings=cmake.build-type=RelWithDebInfo \
 	  --config-settings=cmake.define.RLACD_SANITIZE=$(SANITIZE_$*) --config-settings=cmake.define.RLACD_BUILD_TESTS=ON

@@ -63,14 +63,15 @@ void bind_surface(nb::module_& m) {
            "points"_a, "threads"_a = 0,
            "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
       .def("pushed",
-           released([](const Surface& self, const std::vector<Vec3>& points, const VectorIn<double>& steps, int times,
-                       int threads) {
-             require(steps.size() == points.size(), "one step for each point");
-             return pushed(self.bvh(), points, copied<double>(steps), times, threads);
+           released([](const Surface& self, const std::vector<Vec3>& points, const std::vector<Vec3>& against,
+                       const VectorIn<double>& steps, int times, int threads) {
+             require(steps.size() == points.size() && against.size() == points.size(), "one step for each point");
+             return pushed(self.bvh(), points, against, copied<double>(steps), times, threads);
            }),
-           "points"_a, "steps"_a, "times"_a, "threads"_a = 0,
-           "Points [N, 3] pushed `times` times away from the nearest place of the surface, each by its step [N]: the "
-           "places [N, 3] on their ways that are farthest from the surface, how far [N], and the ends [N, 3].")
+           "points"_a, "against"_a, "steps"_a, "times"_a, "threads"_a = 0,
+           "Points [N, 3] pushed `times` times away from the nearest place of the surface, each by its step [N], but "
+           "towards it along its unit vector `against` [N, 3], unless that is 0: the places [N, 3] on their ways that "
+           "are farthest from the surface, how far [N], and the ends [N, 3].")
       .def(
           "crossing", released([](const Surface& self, const Mesh& mesh, double slack) {
             require(slack >= 0, "the slack must not be negative");

@@ -13,7 +13,8 @@ struct Pushed {
   std::vector<Vec3> ends;
 };
 
-// `times` steps of the given lengths.
-Pushed pushed(const Bvh& surface, std::vector<Vec3> points, const std::vector<double>& steps, int times, int threads);
+// `times` steps of the given lengths, against the push along each point's unit vector `against`; 0 for none.
+Pushed pushed(const Bvh& surface, std::vector<Vec3> points, const std::vector<Vec3>& against,
+              const std::vector<double>& steps, int times, int threads);
 
 }  // namespace rlacd

@@ -182,6 +182,20 @@ def test_each_passage_is_listed_once_however_long_and_holes_on_one_axis_are_two(
 
 
 @pytest.mark.promise("passages")
+@pytest.mark.parametrize("minor", [0.1, 0.3])
+@pytest.mark.parametrize(("around", "across"), [(64, 32), (16, 8), (12, 6), (8, 4)])
+def test_the_hole_of_a_ring_is_a_passage_and_stays_open(around: int, across: int, minor: float) -> None:
+    """Its walls turn away from each other: a ball in it is held across it only."""
+    ring = trimesh.creation.torus(1.0, minor, major_sections=around, minor_sections=across)
+    radius = (1 - minor) * np.cos(np.pi / around)
+    (passage,) = rlacd.decompose(ring, quality="fast", max_hulls=1, threads=1).report.passages
+    assert passage.radius_abs == pytest.approx(radius, rel=0.02)
+    assert passage.left_abs == 0
+    kept = rlacd.decompose(ring, quality="fast", threshold=0.4, keep_open=0.8, threads=1)
+    assert clearance(kept.hulls, np.zeros((1, 3)))[0] > 0.78 * radius
+
+
+@pytest.mark.promise("passages")
 def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     block = box((0, 0, 0), (100, 40, 30)) - box((5, 19.5, 10), (95, 20.5, 40))
     report = rlacd.decompose(trimesh_of(block), quality="fast", threads=1).report

@@ -299,7 +299,7 @@ def test_a_robot_is_rewritten_on_the_command_line(ear: Path) -> None:
 
 
 def test_warnings_of_a_kind_are_one_that_names_the_worst(tmp_path: Path) -> None:
-    """Rings whose holes close, in another number and size each, from files whose y axis points up."""
+    """Rings whose holes and gaps close, in another number and size each, from files whose y axis points up."""
     links = []
     for index, (width, count) in enumerate([(0.02, 1), (0.06, 3), (0.04, 1)]):
         rings = [trimesh.creation.annulus(width, width + 0.05, 0.05, sections=24) for _ in range(count)]
@@ -311,7 +311,7 @@ def test_warnings_of_a_kind_are_one_that_names_the_worst(tmp_path: Path) -> None
     done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.015, max_hulls=1, threads=1)
     said = [warning for warning in done.warnings if "passage" in warning]
     assert len(said) == 1
-    assert said[0].startswith("ring1 and 2 others: 3 passages narrow by over half, 3 to nothing: near")
+    assert said[0].startswith("ring1 and 2 others: 5 passages narrow by over half, 5 to nothing: near")
     assert sum("Y_UP" in warning for warning in done.warnings) == 1
     assert len(done.warnings) == 4, "one more about the threshold, and one about the links, which stand in each other"
 

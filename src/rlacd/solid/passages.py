@@ -2,7 +2,8 @@
 
 A ball with the normal of a wall through its centre shrinks until it touches another wall (Ma, Bae and Choi, "3D medial
 axis point approximation using nearest neighbors and the normal field", 2012). Then it is pushed away from whatever is
-nearest. Between walls it goes to and fro; where they leave it a way out it drifts, and is none of a passage.
+nearest. Between walls it goes to and fro; where they leave it a way out it drifts. If it is held once it goes against
+its drift, it is in the throat of a passage, as in the hole of a ring; else in none.
 """
 
 from __future__ import annotations
@@ -145,22 +146,37 @@ def _shrunk(
 
 
 def _pushed(balls: Balls, spacing: float, surface: _native.Surface, threads: int) -> Balls:
-    """The balls that are held, in the best place near theirs; one of those that meet there."""
+    """The balls that are held, in the best place near theirs, one of those that meet there; and those in throats."""
+    throats = _in_throats(balls, surface, threads)
     for step in STEPS:
-        size = step * balls.radii
-        balls, ways = _pushed_by(size, PUSHES, balls.centres, surface, threads)
-        balls = _one_a_cell(balls.some(np.sqrt(dots(ways, ways)) <= STRAY * PUSHES * size), spacing)
-    size = STEPS[-1] * balls.radii
-    balls, ways = _pushed_by(size, MORE, balls.centres, surface, threads)
-    return balls.some(np.sqrt(dots(ways, ways)) <= LARGEST_DRIFT * MORE * size)
+        balls, _, share = _pushed_by(step, PUSHES, balls, np.zeros_like(balls.centres), surface, threads)
+        balls = _one_a_cell(balls.some(share <= STRAY), spacing)
+    balls, _, share = _pushed_by(STEPS[-1], MORE, balls, np.zeros_like(balls.centres), surface, threads)
+    balls = balls.some(share <= LARGEST_DRIFT)
+    return Balls(np.concatenate([balls.centres, throats.centres]), np.concatenate([balls.radii, throats.radii]))
+
+
+def _in_throats(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
+    """Balls that drift, but are held where they go against their drift: there the way out is narrowest."""
+    _, drifts, share = _pushed_by(STEPS[1], PUSHES, balls, np.zeros_like(balls.centres), surface, threads)
+    balls, drifts = balls.some(share > LARGEST_DRIFT), drifts[share > LARGEST_DRIFT]
+    against = drifts / np.sqrt(dots(drifts, drifts))[:, None]
+    for step, times, most in [*((step, 2 * PUSHES, STRAY) for step in STEPS[1:]), (STEPS[-1], MORE, LARGEST_DRIFT)]:
+        _, ways, share = _pushed_by(step, times, balls, against, surface, threads)
+        balls = Balls(ends := balls.centres + ways, surface.distance(ends, threads))
+        stay = (share <= most) & (balls.radii > 0)
+        balls, against = balls.some(stay), against[stay]
+    return balls
 
 
 def _pushed_by(
-    size: FloatArray, times: int, at: FloatArray, surface: _native.Surface, threads: int
-) -> tuple[Balls, FloatArray]:
-    """The best balls on the ways of points that are pushed, and those ways from begin to end."""
-    best, radii, ends = surface.pushed(at, size, times, threads)
-    return Balls(best, radii), ends - at
+    step: float, times: int, balls: Balls, against: FloatArray, surface: _native.Surface, threads: int
+) -> tuple[Balls, FloatArray, FloatArray]:
+    """The best balls on the ways of pushed ones, the ways from begin to end, and their share of a straight way."""
+    size = step * balls.radii
+    best, radii, ends = surface.pushed(balls.centres, against, size, times, threads)
+    ways = ends - balls.centres
+    return Balls(best, radii), ways, np.sqrt(dots(ways, ways)) / (times * size)
 
 
 def spread(balls: Balls, spacing: float) -> Balls:
