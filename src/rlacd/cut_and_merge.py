@@ -37,7 +37,7 @@ class Pass:
     criterion : Criterion
         The criterion used for merging: the requested one, settled on the pieces.
     is_too_many : bool
-        Cutting was stopped, or ended, with more parts than asked for, and nothing was merged.
+        Cutting left, or was about to leave, more parts than the most allowed; nothing was merged.
     """
 
     pieces: list[Part]

@@ -118,7 +118,7 @@ def at_most(
         A larger number allows more of the same states, so the error is never larger.
     decompositions : iterable of sequence of Part
         Under coarser and coarser goals. Their parts are united two at a time, and every state on the way counts, unless
-        a coarser one has `STILL_MANY` times `most`.
+        a coarser one has more than `STILL_MANY` times `most`.
     unite : callable
         Returns the union of two parts.
     whole : Part
