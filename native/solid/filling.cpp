@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <queue>
+#include <tuple>
 
 #include "convex/hull.hpp"
 #include "convex/polygon.hpp"
@@ -105,10 +106,13 @@ double Filling::feasible_volume(const ConvexBody& first, const ConvexBody& secon
   const ConvexBody body(are_all ? few.mesh() : hull_mesh(joined(all_first, all_second)));
   const Mesh& hull = body.mesh();
   std::vector<char> is_new(hull.faces.size(), 1);
-  for (const std::vector<Vec3>* own : {&all_first, &all_second}) {
+  const auto before = [](Vec3 p, Vec3 q) { return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z); };
+  for (const ConvexBody* one : {&first, &second}) {
+    std::vector<Vec3> own = one->mesh().vertices;
+    std::sort(own.begin(), own.end(), before);
     std::vector<char> is_own(hull.vertices.size());
     std::transform(hull.vertices.begin(), hull.vertices.end(), is_own.begin(),
-                   [own](Vec3 p) { return std::find(own->begin(), own->end(), p) != own->end(); });
+                   [&](Vec3 p) { return std::binary_search(own.begin(), own.end(), p, before); });
     for (std::size_t f = 0; f < hull.faces.size(); ++f) {
       const auto [a, b, c] = hull.faces[f];
       if (is_own[a] && is_own[b] && is_own[c]) is_new[f] = 0;

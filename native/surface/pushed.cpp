@@ -21,7 +21,7 @@ Pushed pushed(const Bvh& surface, std::vector<Vec3> points, const std::vector<Ve
       at = at + (steps[i] / (distance > 0 ? distance : 1)) * (away - 2 * dot(away, against[i]) * against[i]);
     }
   };
-  parallel_for(result.ends.size(), threads, push, 64);
+  parallel_for(result.ends.size(), threads, push, 8);
   return result;
 }
 

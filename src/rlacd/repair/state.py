@@ -171,10 +171,11 @@ class State:
             return
         self.solid, self.cavities = unite_and_fill([part.shape for part in self.parts])
         if bounded is not closed or (rest and self.cavities.count):
-            whole = unite(closed) if rest else self.solid
             filled, self.cavities = unite_and_fill(bounded)
-            if volume_of(whole) - volume_of(filled) > _CREVICES * volume_of(whole):
-                self.cavities = emptied(whole, bounded)
+            if bounded is not closed:
+                whole = unite(closed) if rest else self.solid
+                if volume_of(whole) - volume_of(filled) > _CREVICES * volume_of(whole):
+                    self.cavities = emptied(whole, bounded)
 
     def of_bodies(self, marked: BoolArray) -> Soup:
         """The faces of marked bodies."""

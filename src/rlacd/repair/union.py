@@ -265,8 +265,10 @@ def _united(solids: list[Manifold]) -> Manifold:
     at_once, newest = _MESHES_UNITED, len(solids)
     while len(waiting) > 1:
         group = [heapq.heappop(waiting), heapq.heappop(waiting)]
-        while waiting and sum(triangles for triangles, *_ in group) + waiting[0][0] <= at_once:
+        triangles = group[0][0] + group[1][0]
+        while waiting and triangles + waiting[0][0] <= at_once:
             group.append(heapq.heappop(waiting))
+            triangles += group[-1][0]
         some = [solid for *_, solid in group]
         pairs, corners = _crossings(some, left)
         if len(group) > 2 and (pairs > left or corners > _MOST_CROSSINGS):
@@ -277,7 +279,7 @@ def _united(solids: list[Manifold]) -> Manifold:
         left -= pairs
         if left < 0:
             raise CrossingsError
-        require_time_for(sum(triangles for triangles, *_ in group))
+        require_time_for(triangles)
         union = Manifold.batch_boolean(some, OpType.Add)
         heapq.heappush(waiting, (union.num_tri(), newest, union))
         newest += 1
