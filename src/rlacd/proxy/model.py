@@ -64,12 +64,14 @@ class _Transferred:
         """Take in points, with a `simple` hull if there is time.
 
         A part that was cut on the solid stays what it is, without the slivers that were left out, and its hull is not
-        simplified: there may be no room for it below the threshold.
+        simplified: there may be no room for it below the threshold. The points are in no piece of it, so it has no
+        members any more.
         """
         grown = Hull.of(np.concatenate([self.hull.vertices, points]))
         assert grown is not None, "a hull stays solid when it grows"
         self.hull = limit_hull(grown, tolerance=TOLERANCE if self.cuts else SIMPLE_FIRST / 2) if simple else grown
-        self.part = self.part.with_hull(self.hull) if self.cuts and self.part is not None else None
+        cut = self.part if self.cuts else None
+        self.part = cut and Part(cut.vertices, cut.faces, cut.volume, self.hull, cut.piece_hulls)
         self.is_met = False
 
 

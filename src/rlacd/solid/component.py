@@ -58,7 +58,8 @@ class Part:
     piece_hulls : float, optional
         Sum of the volumes of the hulls of the pieces it was glued from; its own hull's volume by default.
     members : tuple of Component
-        The components it consists of; empty if it was not made from components.
+        The components that it consists of. Empty if it stands for more than they hold, as it does if it or any part in it
+        was not made from components: nothing less than its hull covers it then.
 
     Attributes
     ----------
@@ -140,12 +141,18 @@ class Part:
         return self._surface
 
 
+def _members_of(parts: Sequence[Part]) -> tuple[Component, ...]:
+    """The members of all parts; none if a part has none."""
+    known = all(part.members for part in parts)
+    return tuple(member for part in parts for member in part.members) if known else ()
+
+
 class _Union(Part):
     """The union of two parts. They are glued when the surface is first needed: some criteria look at the hull only."""
 
     def __init__(self, first: Part, second: Part, hull: Hull) -> None:
         volume, piece_hulls = first.volume + second.volume, first.piece_hulls + second.piece_hulls
-        super().__init__(*first._surface, volume, hull, piece_hulls, (*first.members, *second.members))
+        super().__init__(*first._surface, volume, hull, piece_hulls, _members_of((first, second)))
         self.size = first.size + second.size
         self._operands: tuple[Part, Part] | None = (first, second)
 
@@ -193,8 +200,7 @@ class ClippedPart(Part):
     def __init__(self, solid: Component, parts: Sequence[Part], hull: Hull) -> None:
         inside = solid.inside(hull)
         piece_hulls = sum(part.piece_hulls for part in parts)
-        members = tuple(member for part in parts for member in part.members)
-        super().__init__(inside.vertices, inside.faces, inside.volume, hull, piece_hulls, members)
+        super().__init__(inside.vertices, inside.faces, inside.volume, hull, piece_hulls, _members_of(parts))
         self.tree = inside.tree
         self.solid = solid
 
