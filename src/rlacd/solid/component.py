@@ -58,8 +58,8 @@ class Part:
     piece_hulls : float, optional
         Sum of the volumes of the hulls of the pieces it was glued from; its own hull's volume by default.
     members : tuple of Component
-        The components that it consists of. Empty if it stands for more than they hold, as it does if it or any part in it
-        was not made from components: nothing less than its hull covers it then.
+        The components that it consists of. Empty if it, or any part in it, was not made from components: then nothing
+        less than its hull covers what it stands for.
 
     Attributes
     ----------
@@ -121,6 +121,11 @@ class Part:
         other.hull = hull
         other.within = None  # the other hull may be larger
         return other
+
+    @staticmethod
+    def unclipped(hull: Hull) -> Part:
+        """What a solid fills of a hull, before there was time to clip it: without faces."""
+        return Part(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32), 0.0, hull)
 
     @staticmethod
     def glued(first: Part, second: Part, hull: Hull | None = None) -> Part:
@@ -288,6 +293,11 @@ class Component(Part):
         part = Part(vertices, faces, volume, hull)
         part.tree = _native.TreeCache()
         return part
+
+    def filled(self, hull: Hull) -> Part:
+        """The same, but the hull itself if nothing is left."""
+        part = self.inside(hull)
+        return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
