@@ -257,3 +257,14 @@ def test_a_convex_solid_needs_no_search() -> None:
     result = rlacd.decompose(trimesh.creation.icosphere(), quality="best")
     assert len(result) == 1
     assert result.report.search.steps == 0
+
+
+def test_a_part_that_stands_for_more_than_its_members_is_not_divided() -> None:
+    """One clipped from the solid has none, and what is united with it is all that covers it."""
+    left, right = bent_bar()[0], bent_bar()[1]
+    solid = together([left, right])
+    unknown = solid.inside(left.hull)
+    for part in (unknown, Part.glued(unknown, right), Part.glued(right, unknown)):
+        assert part.members == ()
+        assert redistribute(part, [solid], CRITERION, np.random.default_rng(0), solid, Run(1)) is None
+        assert give(part, [solid], CRITERION, np.random.default_rng(0), solid, Run(1)) is None

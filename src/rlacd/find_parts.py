@@ -62,6 +62,8 @@ class Reached(NamedTuple):
         What the search found, if there was one.
     root : Component, optional
         The solid as it was cut; None if the parts cover the solid without cuts.
+    before : tuple of list of Part
+        Earlier states on the solid, the latest last.
     """
 
     solid: Solid
@@ -70,6 +72,7 @@ class Reached(NamedTuple):
     parts: list[Part]
     found: SearchSummary | None = None
     root: Component | None = None
+    before: tuple[list[Part], ...] = ()
 
 
 def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
@@ -89,7 +92,8 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     elif any(options.hull_limits):
         with run.stage("limit"):
             parts = cut_to_limits(parts, limited, root, options, run)
-    return Reached(solid, options, goal, parts, found, root)
+    before = tuple(state for state in states if most is None or len(state) <= most)
+    return Reached(solid, options, goal, parts, found, root, before)
 
 
 def find_parts_under(source: InputMesh, options: Options, factors: Sequence[float], run: Run) -> Iterator[Reached]:

@@ -27,7 +27,7 @@ from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
 from rlacd.report import Report
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import DENSE, Part
 from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
@@ -51,21 +51,30 @@ class Finished(NamedTuple):
 
 def misses_some(reached: Reached, run: Run) -> bool:
     """Whether a stop left parts that miss some of a small solid, as can happen where it crosses itself."""
-    solid = reached.solid
-    if run.stopped_by is None or not 0 < len(solid.faces) <= PLACES:
+    if run.stopped_by is None or not 0 < len(reached.solid.faces) <= PLACES:
         return False
     with run.shielded():
-        inner, _ = _native.sample_surface(solid.vertices, solid.faces, PLACES, 0)
-        hulls = hull_union([part.hull for part in reached.parts], run.threads)
-        away = hulls.distance(np.concatenate([solid.vertices, inner]), run.threads)
-        return bool(away.max() > COVERAGE_TOLERANCE)
+        return not covers(reached.parts, *reached.solid.mesh, run)
+
+
+def covers(parts: Sequence[Part], vertices: FloatArray, faces: IntArray, run: Run) -> bool:
+    """Whether no point of a surface [V, 3], [F, 3] lies farther outside the hulls of parts than tolerated."""
+    union = hull_union([part.hull for part in parts], run.threads)
+    return union.under(vertices, faces, NEARLY, run.threads, COVERAGE_TOLERANCE)[0] <= COVERAGE_TOLERANCE
 
 
 def finish(reached: Reached, run: Run) -> Finished:
-    """Clean the parts, carry them to the input's unit, and measure them; repeat if hulls have to grow."""
+    """Clean the parts, carry them to the input's unit, and measure them; repeat if hulls have to grow.
+
+    What a state covers, every later state covers: a state that misses some of the solid is not the result, the latest
+    one that misses nothing is.
+    """
     done, parts = _finished(reached, run)
     under = done.report.hausdorff.under
-    if under is None or not NEARLY < under <= COVERAGE_TOLERANCE or run.stopped_by is not None:
+    if under is not None and under > COVERAGE_TOLERANCE:
+        earlier = run.if_in_time(lambda: _covering(reached, parts, run), lambda: None)
+        return done if earlier is None else finish(earlier, run)
+    if under is None or under <= NEARLY or run.stopped_by is not None:
         return done
     with run.stage("finish"):
         grown = run.if_in_time(lambda: _taking_in(reached, parts, run), lambda: None)
@@ -73,6 +82,16 @@ def finish(reached: Reached, run: Run) -> Finished:
         return done
     again, _ = _finished(reached._replace(parts=grown), run)
     return again if run.stopped_by is None else done
+
+
+def _covering(reached: Reached, finished: Sequence[Part], run: Run) -> Reached | None:
+    """The latest state that covers the solid; None if the finished parts do, or no state does."""
+    if covers(finished, *reached.solid.mesh, run):
+        return None  # repair dropped what is missed
+    for number, parts in reversed([*enumerate(reached.before)]):
+        if covers(parts, *reached.solid.mesh, run):
+            return reached._replace(parts=parts, before=reached.before[:number])
+    return None
 
 
 def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
@@ -114,12 +133,13 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
 def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]:
     """The parts, overlapping if asked for, as primitives or with simple hulls inside the limits."""
     options, goal, limits = reached.options, reached.goal, reached.options.hull_limits
-    sides = NO_SIDES if reached.root is None else resting_sides(reached.root)
+    root = reached.root
+    sides = NO_SIDES if root is None else resting_sides(root)
     slack = ROUNDING + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
         part.tree = part.tree or _native.TreeCache()
-        shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, reached.root)
+        shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, root)
         if shaped is not part:
             return shaped
         share = SHARE_OF_DEVIATION if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
@@ -130,8 +150,10 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
         )
 
     parts, seams = reached.parts, None
-    if options.overlap > 0 and reached.root is not None:
-        parts, seams = overlap_parts(parts, reached.root, goal, 2 * options.overlap)
+    if root is not None:  # a stop left no time to clip the solid to hulls that cover it
+        parts = run.map(lambda part: part if part.size else root.filled(part.hull), parts)
+    if options.overlap > 0 and root is not None:
+        parts, seams = overlap_parts(parts, root, goal, 2 * options.overlap)
     return run.map(cleaned, parts), seams
 
 

@@ -78,7 +78,8 @@ def make_report(
     """
     solid, options, criterion = reached.solid, reached.options, reached.goal
     is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
-    errors = None if is_cover else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
+    is_unknown = is_cover or not all(part.size for part in parts)  # or there was no time to clip the solid to them
+    errors = None if is_unknown else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     distances = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None

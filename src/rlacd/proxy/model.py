@@ -64,12 +64,14 @@ class _Transferred:
         """Take in points, with a `simple` hull if there is time.
 
         A part that was cut on the solid stays what it is, without the slivers that were left out, and its hull is not
-        simplified: there may be no room for it below the threshold.
+        simplified: there may be no room for it below the threshold. The points are in no piece of it, so it has no
+        members any more.
         """
         grown = Hull.of(np.concatenate([self.hull.vertices, points]))
         assert grown is not None, "a hull stays solid when it grows"
         self.hull = limit_hull(grown, tolerance=TOLERANCE if self.cuts else SIMPLE_FIRST / 2) if simple else grown
-        self.part = self.part.with_hull(self.hull) if self.cuts and self.part is not None else None
+        cut = self.part if self.cuts else None
+        self.part = cut and Part(cut.vertices, cut.faces, cut.volume, self.hull, cut.piece_hulls)
         self.is_met = False
 
 
@@ -86,7 +88,7 @@ class Transfer:
     policy : Policy
         Chooses the planes where parts are cut again.
     run : Run
-        When it stops, the parts stay those of the proxy, with hulls that cover the solid.
+        When it stops, the hulls cover the solid, and their parts have no faces: there was no time to clip it to them.
     """
 
     solid: Component
@@ -95,27 +97,25 @@ class Transfer:
     policy: Policy
     run: Run
 
-    def __call__(self, parts: Sequence[Part], mend: bool = True) -> tuple[list[Part], float]:
-        """Get parts that cover the solid, and the factor of the goal that they meet: 1 if not mended.
+    def __call__(self, parts: Sequence[Part]) -> tuple[list[Part], float]:
+        """Get parts that cover the solid, and the factor of the goal that they meet: 1 if stopped.
 
         Parameters
         ----------
         parts : sequence of Part
-            They cover the proxy.
-        mend : bool
-            Cut parts again if they meet their criterion on the proxy only.
+            They cover the proxy. Those that meet their criterion on it only are cut again.
         """
         covering: list[Hull] = []
         try:
             moved = [_Transferred(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
             self._cover(moved)
             covering = [each.hull for each in moved]
-            return self._tested(moved) if mend else (self.run.map(self._clipped, covering), 1.0)
+            return self._tested(moved)
         except Stopped:
             self.run.note_stop()
         with self.run.shielded():
             hulls = covering or self._covering(parts)
-            return [part.with_hull(hull) for part, hull in zip(parts, hulls, strict=True)], 1.0
+        return [Part.unclipped(hull) for hull in hulls], 1.0
 
     def _covering(self, parts: Sequence[Part]) -> list[Hull]:
         """Get hulls that cover the solid, when there is no time to simplify them."""
@@ -144,7 +144,7 @@ class Transfer:
 
     def confirmed(self, hull: Hull) -> Part | None:
         """Get what the solid fills of a hull; None if it does not meet the goal."""
-        part = self._clipped(hull)
+        part = self.solid.filled(hull)
         return part if self.goal.is_met(part) else None
 
     def _cover(self, moved: Sequence[_Transferred], simple: bool = True) -> None:
@@ -162,13 +162,8 @@ class Transfer:
     def _clip(self, moved: Sequence[_Transferred]) -> None:
         """Get what the solid fills of hulls that have changed."""
         changed = [each for each in moved if each.part is None]
-        for each, part in zip(changed, self.run.map(self._clipped, [each.hull for each in changed]), strict=True):
+        for each, part in zip(changed, self.run.map(self.solid.filled, [each.hull for each in changed]), strict=True):
             each.part = part
-
-    def _clipped(self, hull: Hull) -> Part:
-        """The solid clipped to a hull; the hull itself if nothing is left."""
-        part = self.solid.inside(hull)
-        return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
     def _failing(self, moved: list[_Transferred]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there `MOST_CUTS` times."""
@@ -231,7 +226,7 @@ class Model:
         scaled = goal if factor == 1.0 else goal.scaled(factor)
         with run.stage("transfer"):
             moving = Transfer(self.solid, self.proxy, scaled, policy, run)
-            parts, worst = moving(parts, mend=run.stopped_by is None)
+            parts, worst = moving(parts)
             if merge and run.stopped_by is None:  # the margin may have kept some from merging
                 moving = replace(moving, goal=scaled.scaled(worst))
                 looser = moving.goal.alone.scaled(1 + self.proxy.margin(goal))

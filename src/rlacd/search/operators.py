@@ -86,8 +86,10 @@ def redistribute(
     Returns
     -------
     Exchange or None
-        An exchange that saves one part; None if some piece cannot be taken.
+        An exchange that saves one part; None if some piece cannot be taken, or the part is more than its pieces.
     """
+    if not part.members:
+        return None
     division = _Division(around, Uniter(criterion, solid, run.work), random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
     if not all(division.takers(piece) or division.may_go(piece) for piece in pieces):

@@ -58,7 +58,8 @@ class Part:
     piece_hulls : float, optional
         Sum of the volumes of the hulls of the pieces it was glued from; its own hull's volume by default.
     members : tuple of Component
-        The components it consists of; empty if it was not made from components.
+        The components that it consists of. Empty if it, or any part in it, was not made from components: then nothing
+        less than its hull covers what it stands for.
 
     Attributes
     ----------
@@ -122,6 +123,11 @@ class Part:
         return other
 
     @staticmethod
+    def unclipped(hull: Hull) -> Part:
+        """What a solid fills of a hull, before there was time to clip it: without faces."""
+        return Part(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32), 0.0, hull)
+
+    @staticmethod
     def glued(first: Part, second: Part, hull: Hull | None = None) -> Part:
         """Unite two parts with disjoint interiors; the regions where they touch are not part of the union's surface.
 
@@ -140,12 +146,18 @@ class Part:
         return self._surface
 
 
+def _members_of(parts: Sequence[Part]) -> tuple[Component, ...]:
+    """The members of all parts; none if a part has none."""
+    known = all(part.members for part in parts)
+    return tuple(member for part in parts for member in part.members) if known else ()
+
+
 class _Union(Part):
     """The union of two parts. They are glued when the surface is first needed: some criteria look at the hull only."""
 
     def __init__(self, first: Part, second: Part, hull: Hull) -> None:
         volume, piece_hulls = first.volume + second.volume, first.piece_hulls + second.piece_hulls
-        super().__init__(*first._surface, volume, hull, piece_hulls, (*first.members, *second.members))
+        super().__init__(*first._surface, volume, hull, piece_hulls, _members_of((first, second)))
         self.size = first.size + second.size
         self._operands: tuple[Part, Part] | None = (first, second)
 
@@ -193,8 +205,7 @@ class ClippedPart(Part):
     def __init__(self, solid: Component, parts: Sequence[Part], hull: Hull) -> None:
         inside = solid.inside(hull)
         piece_hulls = sum(part.piece_hulls for part in parts)
-        members = tuple(member for part in parts for member in part.members)
-        super().__init__(inside.vertices, inside.faces, inside.volume, hull, piece_hulls, members)
+        super().__init__(inside.vertices, inside.faces, inside.volume, hull, piece_hulls, _members_of(parts))
         self.tree = inside.tree
         self.solid = solid
 
@@ -282,6 +293,11 @@ class Component(Part):
         part = Part(vertices, faces, volume, hull)
         part.tree = _native.TreeCache()
         return part
+
+    def filled(self, hull: Hull) -> Part:
+        """The same, but the hull itself if nothing is left."""
+        part = self.inside(hull)
+        return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
