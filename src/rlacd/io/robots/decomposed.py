@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from rlacd.clear import (
     CrowdedError,
     LinkPair,
     Motion,
+    Solids,
     Surface,
     at_rest,
     kept_clear,
@@ -103,7 +104,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
             if (key := (collider.key, own.get("threshold_abs"))) not in done:
                 done[key] = decomposed(body, collider, own)
             results[collider] = done[key]
-    if len(bodies) < 2:
+    if robot.is_alone:
         return Checked(results)
     if not all(result.report.complete for result in results.values()):
         return Checked(results, ["Links were not checked against each other: the work was stopped before."])
@@ -118,7 +119,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
 
     try:
         motion, said = _motion(robot, asked.samples, options.get("seed") or 0)
-        cleared = kept_clear([_moving(body, results) for body in bodies], motion, redo)
+        cleared = kept_clear([*_links(bodies, results, motion)], motion, redo)
     except (MissingExtraError, CrowdedError) as error:
         if asked.exclude or asked.srdf:
             raise
@@ -192,6 +193,16 @@ def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> d
             length = max(length, least / unit * (1 + ROUNDING)) if body.is_world else length
             fitting[f"{name}_abs"] = min(length, most / unit * (1 - ROUNDING))
     return fitting
+
+
+def _links(bodies: Sequence[Body], results: Results, motion: Motion) -> Iterator[Moving]:
+    """Those with meshes, and then those that have primitives only."""
+    nothing = Surface(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32))
+    solids = motion.solids or [Solids()] * len(bodies)
+    for i, (name, own) in enumerate(zip(motion.links, solids, strict=True)):
+        moving = _moving(bodies[i], results) if i < len(bodies) else Moving(name, nothing)
+        replaced = sum(len(collider.meshes) for collider in bodies[i].colliders) if i < len(bodies) else 0
+        yield replace(moving, primitives=own.primitives, is_whole=own.meshes == replaced and not own.others)
 
 
 def _moving(body: Body, results: Results) -> Moving:

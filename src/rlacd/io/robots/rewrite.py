@@ -97,7 +97,7 @@ def rewrite(
     check_options(options)
     check_places(robot.source, place, asked, keep_input=keep_input)
     done = decomposed_robot(robot, options, asked)
-    pairs = done.pairs if done.samples or len(robot.bodies) < 2 else None
+    pairs = done.pairs if done.samples or robot.is_alone else None
     written = robot.write(place, done.results, pairs, asked, whole=keep_input)
     return rewritten(robot, done, place, written, began)
 
