@@ -12,7 +12,18 @@ import trimesh
 from lxml import etree
 
 import rlacd
-from rlacd.clear import Body, Surface, at_rest, check, mjcf_motion, urdf_motion
+from rlacd.clear import (
+    Body,
+    Cleared,
+    Offence,
+    Surface,
+    Touching,
+    at_rest,
+    check,
+    mjcf_motion,
+    urdf_motion,
+    warnings_of,
+)
 from rlacd.clear.bodies import Primitive, overlapping, placed_boxes
 from rlacd.errors import OptionError
 from tests.moving import ALL, Joint, Robot, block, drawer, fork_and_lug
@@ -103,6 +114,16 @@ def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: 
     ]
     assert reasons == ["Adjacent", "Default", "Adjacent"]
     assert done.as_dict()["pairs"][1]["contact"] == "always"
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_pairs_that_touch_a_little_earlier_are_told_and_counted(count: int) -> None:
+    offence = Offence(0, np.eye(4), 0.5)
+    touching = Touching(np.array([True, True]), np.array([True, False]), (offence,))
+    bodies = [Body(name, Surface(np.empty((0, 3)), np.empty((0, 3), int))) for name in "abc"]
+    found = {(0, 1): touching, (1, 2): touching} if count == 2 else {(0, 1): touching}
+    (said,) = warnings_of(Cleared(bodies, found), at_rest([*"abc"]), str)
+    assert said.endswith("not cut finer (2 such pairs)." if count == 2 else "not cut finer.")
 
 
 ARM = """<mujoco><asset><mesh name="box" file="box.obj"/></asset><worldbody>
@@ -285,7 +306,7 @@ def test_joints_follow_in_a_chain_whatever_the_order_of_the_lines(arm: Path, ord
     for motion in (mjcf_motion(arm, 30, 0, names), urdf_motion(arm.with_suffix(".urdf"), 30, 0, names)):
         turns = np.arctan2(motion.poses[:, :, 1, 0], motion.poses[:, :, 0, 0])
         assert np.cos(turns - motion.positions * [[1, 2, 3]]) == pytest.approx(1)
-        assert [joint.name for joint in motion.joints] == ["j1", "j2", "j3"]
+        assert {joint.name for joint in motion.joints} == {"j1", "j2", "j3"}
         assert len(set(motion.carrier)) == 1
 
 

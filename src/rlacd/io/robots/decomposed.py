@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import time
+import warnings
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -25,11 +27,12 @@ from rlacd.clear import (
 )
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshError, MissingExtraError, OptionError
+from rlacd.errors import DecompositionWarning, MeshError, MissingExtraError, OptionError
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
 from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import LONGEST_SIDE, shown
 from rlacd.options.robots import RobotOptions
+from rlacd.run import Progress
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.poses import inverse, moved
@@ -38,6 +41,9 @@ from rlacd.solid.topology import used_points
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
+
+LINK = "link "
+"""What the stage of a report of progress begins with that names a link, before the reports of its meshes."""
 
 MOST_SAID = 5
 """Pairs that touch, each with a warning of its own."""
@@ -97,9 +103,16 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         An option is out of range, or a pattern of `links` matches none.
     """
     bodies, each = robot.bodies, options_of_bodies(robot, options, asked)
+    began, follow = time.perf_counter(), options.get("progress")
+
+    def tell(stage: str, done: int) -> None:
+        if follow is not None:
+            follow(Progress(stage, done, len(bodies), 0, time.perf_counter() - began))
+
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
-    for body, own in zip(bodies, each, strict=True):
+    for number, (body, own) in enumerate(zip(bodies, each, strict=True)):
+        tell(LINK + body.name, number)
         for collider in body.colliders:
             if (key := (collider.key, own.get("threshold_abs"))) not in done:
                 done[key] = decomposed(body, collider, own)
@@ -110,6 +123,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         return Checked(results, ["Links were not checked against each other: the work was stopped before."])
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
+        tell(LINK + bodies[number].name, number)
         again = results | _clear_of(obstacles, bodies[number], results, each[number])
         hulls = _moving(bodies[number], again).hulls
         if len(hulls) > most:
@@ -117,6 +131,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         results.update(again)
         return hulls
 
+    tell("clear", 0)
     try:
         motion, said = _motion(robot, asked.samples, options.get("seed") or 0)
         cleared = kept_clear([*_links(bodies, results, motion)], motion, redo)
@@ -174,7 +189,9 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any]) -> De
     """Decompose one collider of a body, with lengths that are larger than it cut to it."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
-        return decompose((mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DecompositionWarning)  # they are told of links, and once for all of a kind
+            return decompose((mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
