@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 import warnings
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -32,7 +32,7 @@ from rlacd.io.robots.robot import Body, Collider, Results, Robot
 from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import LONGEST_SIDE, shown
 from rlacd.options.robots import RobotOptions
-from rlacd.run import Progress
+from rlacd.run import Progress, ProgressCallback
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.poses import inverse, moved
@@ -103,12 +103,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         An option is out of range, or a pattern of `links` matches none.
     """
     bodies, each = robot.bodies, options_of_bodies(robot, options, asked)
-    began, follow = time.perf_counter(), options.get("progress")
-
-    def tell(stage: str, done: int) -> None:
-        if follow is not None:
-            follow(Progress(stage, done, len(bodies), 0, time.perf_counter() - began))
-
+    tell = _teller(len(bodies), options.get("progress"))
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
     for number, (body, own) in enumerate(zip(bodies, each, strict=True)):
@@ -143,6 +138,17 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
     ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in motion.warnings]
     return Checked(results, [*said, *ranges, *found[:MOST_SAID], *more], motion, cleared)
+
+
+def _teller(total: int, progress: ProgressCallback | None) -> Callable[[str, int], None]:
+    """What reports that so many bodies are done, and what comes next."""
+    began = time.perf_counter()
+
+    def tell(stage: str, done: int) -> None:
+        if progress is not None:
+            progress(Progress(stage, done, total, 0, time.perf_counter() - began))
+
+    return tell
 
 
 def _motion(robot: Robot, samples: int, seed: int) -> tuple[Motion, list[str]]:
