@@ -12,8 +12,19 @@ import trimesh
 from lxml import etree
 
 import rlacd
-from rlacd.clear import Body, Surface, at_rest, check, mjcf_motion, urdf_motion
-from rlacd.clear.bodies import overlapping, placed_boxes
+from rlacd.clear import (
+    Body,
+    Cleared,
+    Offence,
+    Surface,
+    Touching,
+    at_rest,
+    check,
+    mjcf_motion,
+    urdf_motion,
+    warnings_of,
+)
+from rlacd.clear.bodies import Primitive, overlapping, placed_boxes
 from rlacd.errors import OptionError
 from tests.moving import ALL, Joint, Robot, block, drawer, fork_and_lug
 
@@ -105,6 +116,16 @@ def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: 
     assert done.as_dict()["pairs"][1]["contact"] == "always"
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_pairs_that_touch_a_little_earlier_are_told_and_counted(count: int) -> None:
+    offence = Offence(0, np.eye(4), 0.5)
+    touching = Touching(np.array([True, True]), np.array([True, False]), (offence,))
+    bodies = [Body(name, Surface(np.empty((0, 3)), np.empty((0, 3), int))) for name in "abc"]
+    found = {(0, 1): touching, (1, 2): touching} if count == 2 else {(0, 1): touching}
+    (said,) = warnings_of(Cleared(bodies, found), at_rest([*"abc"]), str)
+    assert said.endswith("not cut finer (2 such pairs)." if count == 2 else "not cut finer.")
+
+
 ARM = """<mujoco><asset><mesh name="box" file="box.obj"/></asset><worldbody>
   <body name="a"><joint name="j" type="hinge" axis="0 0 1"/><geom type="mesh" mesh="box" mass="1"/>
     <body name="b" pos="3 0 0"><joint name="k" type="hinge" axis="0 0 1" range="-30 30" limited="true"/>
@@ -134,6 +155,123 @@ def test_pairs_of_bodies_are_excluded_from_contacts_where_asked(arm: Path) -> No
     assert mujoco.MjModel.from_xml_path(str(again.path)).nexclude == 3, "what is excluded already stays so once"
 
 
+SWEEP = """<mujoco><asset><mesh name="box" file="box.obj"/><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>
+<worldbody><geom type="plane" size="1 1 1"/><body name="a"><freejoint/><geom type="mesh" mesh="box"/>
+  <body name="b" pos="3 0 0"><joint axis="0 0 1" range="-100 100" limited="true"/>{of_b}
+    <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+    <body name="c" pos="2 0 0"><joint axis="0 0 1" range="-170 170" limited="true"/><geom type="mesh" mesh="box"/>{of_c}
+</body></body></body></worldbody></mujoco>"""
+MESH, LONG = '<geom type="mesh" mesh="box"/>', '<geom type="{}" size="2.5 .1 .1" euler="0 {} 0" pos="-2.5 0 0"/>'
+
+
+def in_contact(path: Path) -> int:
+    """At how many of 400 positions of the sampled joints MuJoCo finds contacts."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data, rng, free, found = mujoco.MjData(model), np.random.default_rng(0), model.jnt_type != 0, 0
+    for _ in range(400):
+        data.qpos[model.jnt_qposadr[free]] = rng.uniform(*model.jnt_range[free].T)
+        mujoco.mj_forward(model, data)
+        found += data.ncon > 0
+    return found
+
+
+@pytest.mark.parametrize(
+    ("of_b", "of_c", "kind"),
+    [
+        (MESH, "", "never"),
+        (MESH, LONG.format("box", 0), "sometimes"),
+        (MESH, LONG.format("ellipsoid", 0), "sometimes"),
+        (MESH, '<geom type="capsule" fromto="-5 0 0 0 0 0" size=".1"/>', "sometimes"),
+        (MESH, '<geom type="cylinder" fromto="-5 0 0 0 0 0" size=".1"/>', "sometimes"),
+        (MESH, LONG.format("box", 0).replace("<geom ", '<geom contype="0" conaffinity="0" '), "never"),
+        (MESH, '<geom type="hfield" hfield="h"/>', "sometimes"),
+        ("", "", "adjacent"),
+        ('<geom type="box" size=".5 .5 .5"/>', "", "never"),
+    ],
+)
+@pytest.mark.promise("links-clear")
+def test_pairs_never_touch_only_if_everything_that_collides_was_compared(
+    arm: Path, of_b: str, of_c: str, kind: str
+) -> None:
+    arm.write_text(SWEEP.format(of_b=of_b, of_c=of_c))
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), exclude="never", samples=200, threads=1)
+    kinds = {(pair.first, pair.second): pair.kind for pair in done.pairs}
+    assert kinds["a", "c"] == kind
+    assert kinds.get(("b", "c"), "adjacent") == kinds.get(("a", "b"), "adjacent") == "adjacent"
+    assert in_contact(done.path) == in_contact(arm)
+
+
+def test_bodies_on_the_world_are_not_adjacent(arm: Path) -> None:
+    door = """<body name="{}" pos="0 {} 0"><joint axis="0 0 1" range="-100 100" limited="true"/>
+    <geom type="mesh" mesh="box" pos=".5 0 0"/></body>"""
+    doors = door.format("left", 0) + door.format("right", 1.5)
+    arm.write_text(f'<mujoco><asset><mesh name="box" file="box.obj"/></asset><worldbody>{doors}</worldbody></mujoco>')
+    done = rlacd.rewrite_robot(arm, arm.with_name("out.xml"), exclude=["adjacent"], samples=50, threads=1)
+    assert [pair.kind for pair in done.pairs] == ["sometimes"]
+    assert in_contact(done.path) == in_contact(arm) > 0
+    link = '<link name="{}"><collision><geometry><mesh filename="box.obj"/></geometry></collision></link>'
+    hinge = """<joint name="{0}_" type="revolute"><parent link="{1}"/><child link="{0}"/><axis xyz="0 0 1"/>
+    <origin xyz="0 {2} 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+    for root, adjacent in (("world", 0), ("frame", 1)):
+        doors = "".join(link.format(name) + hinge.format(name, root, y) for name, y in (("left", 0), ("right", 1.5)))
+        arm.with_suffix(".urdf").write_text(f'<robot name="r"><link name="{root}"/>{doors}</robot>')
+        assert len(urdf_motion(arm.with_suffix(".urdf"), 0, 0, ["left", "right"]).adjacent) == adjacent
+
+
+def test_hulls_are_kept_clear_of_primitives_too(tmp_path: Path) -> None:
+    """A block that slides in a channel, which one hull would fill."""
+    channel = trimesh.boolean.difference([block((-1, -1, 0), (1, 1, 1)), block((-2, -0.5, 0.5), (2, 0.5, 2))])
+    channel.export(tmp_path / "channel.stl")
+    mesh, box = '<mesh filename="channel.stl"/>', '<box size="0.4 0.9 0.4"/>'
+    links = [
+        f'<link name="{name}"><collision><geometry>{shape}</geometry></collision></link>'
+        for name, shape in (("channel", mesh), ("block", box))
+    ]
+    slide = """<joint name="j" type="prismatic"><parent link="channel"/><child link="block"/><origin xyz="0 0 0.75"/>
+    <limit lower="-0.5" upper="0.5" effort="1" velocity="1"/></joint>"""
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{"".join(links)}{slide}</robot>')
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.6, samples=20, threads=1)
+    (pair,) = done.pairs
+    assert (pair.first, pair.second, pair.share, pair.kept_clear) == ("channel", "block", 0, True)
+
+
+def test_primitives_touch_where_mujoco_says(tmp_path: Path) -> None:
+    """Of random kinds, sizes and places, and a mesh; not where they are within a thousandth of touching."""
+    rng, kinds, wrong, close = np.random.default_rng(1), ["box", "sphere", "capsule", "cylinder", "ellipsoid"], [], 0
+    mesh = trimesh.creation.box((0.6, 0.8, 1.0))
+    hull = Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    for _ in range(200):
+        spec, bodies = mujoco.MjSpec(), []
+        spec.add_mesh(name="m", uservert=mesh.vertices.ravel(), userface=mesh.faces.ravel())
+        for name in rng.choice([*kinds, "mesh"], 2):
+            turn, sizes = rng.normal(size=4), rng.uniform(0.2, 0.6, 3)
+            own = spec.worldbody.add_body().add_geom(
+                type=getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}"), pos=rng.uniform(-0.7, 0.7, 3), quat=turn
+            )
+            own.size, own.meshname = sizes, "m" if name == "mesh" else ""
+            place = trimesh.transformations.quaternion_matrix(turn)
+            place[:3, 3] = own.pos
+            if name == "mesh":
+                at = trimesh.transformations.transform_points(mesh.vertices, place)
+                solid = Surface(at, hull.faces)
+                bodies.append(Body("m", solid, [solid]))
+            else:
+                bodies.append(
+                    Body(name, Surface(np.empty((0, 3)), np.empty((0, 3), int)), [], [Primitive(name, sizes, place)])
+                )
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        apart = mujoco.mj_geomDistance(model, data, 0, 1, 1.0, None)
+        if abs(apart) > 1e-3:
+            found = check(bodies, at_rest(["a", "b"]))
+            touches = bool(found and found[0, 1].meshes.all())
+            wrong += [(bodies[0].name, bodies[1].name, apart)] if touches != (apart < 0) else []
+            close += touches
+    assert wrong == []
+    assert 50 < close < 150
+
+
 def test_joints_of_mjcf_are_sampled_in_their_limits_or_told(arm: Path) -> None:
     motion = mjcf_motion(arm, 100, seed=3)
     assert [joint.name for joint in motion.sampled] == ["j"]
@@ -148,6 +286,28 @@ def test_joints_of_mjcf_are_sampled_in_their_limits_or_told(arm: Path) -> None:
     driven = 0.1 + 1.5 * motion.positions[:, 0]
     assert np.cos(turns - driven) == pytest.approx(1), "k follows j by the equality"
     assert motion.poses[0, a] == pytest.approx(np.eye(4))
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_joints_follow_in_a_chain_whatever_the_order_of_the_lines(arm: Path, order: tuple[int, int]) -> None:
+    def body(number: int, inner: str) -> str:
+        joint = f'<joint name="j{number}" axis="0 0 1" range="-1 1" limited="true"/>'
+        return f'<body name="b{number}" pos="1 0 0">{joint}<geom type="mesh" mesh="box"/>{inner}</body>'
+
+    lines = ['<joint joint1="j2" joint2="j1"/>', '<joint joint1="j3" joint2="j2"/>']
+    arm.write_text(f"""<mujoco><compiler angle="radian"/><asset><mesh name="box" file="box.obj"/></asset><worldbody>
+    {body(1, body(2, body(3, "")))}</worldbody><equality>{lines[order[0]]}{lines[order[1]]}</equality></mujoco>""")
+    mimic = '<joint name="j{0}" type="revolute"><parent link="b{1}"/><child link="b{0}"/><axis xyz="0 0 1"/>{2}</joint>'
+    said = '<limit lower="-1" upper="1" effort="1" velocity="1"/>', '<mimic joint="j1"/>', '<mimic joint="j2"/>'
+    joints = [mimic.format(i + 1, i, "".join(text for text in {said[0], said[i]})) for i in range(3)]
+    links = "".join(f'<link name="b{i}"/>' for i in range(4))
+    arm.with_suffix(".urdf").write_text(f'<robot name="r">{links}{"".join(joints[:: 1 - 2 * order[0]])}</robot>')
+    names = ["b1", "b2", "b3"]
+    for motion in (mjcf_motion(arm, 30, 0, names), urdf_motion(arm.with_suffix(".urdf"), 30, 0, names)):
+        turns = np.arctan2(motion.poses[:, :, 1, 0], motion.poses[:, :, 0, 0])
+        assert np.cos(turns - motion.positions * [[1, 2, 3]]) == pytest.approx(1)
+        assert {joint.name for joint in motion.joints} == {"j1", "j2", "j3"}
+        assert len(set(motion.carrier)) == 1
 
 
 MIMIC = """<robot name="r">

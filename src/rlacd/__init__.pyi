@@ -282,7 +282,7 @@ def rewrite_robot(
     keep_input : bool
         Of a USD stage, write one file that holds all of it, instead of a layer over the original.
     progress : callable, optional
-        As for `rlacd.decompose`.
+        As for `rlacd.decompose`; the `stage` ``link NAME`` comes before those of each link, `done` of `total`.
     per : Per
         What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
         Links that fixed joints connect stay apart; so do MJCF geoms with a name, and meshes that belong to no body.
@@ -318,4 +318,9 @@ def rewrite_robot(
         An option is out of range, or `output` is not of the same kind as `robot`.
     OutputError
         The place cannot be written to.
+
+    Warns
+    -----
+    DecompositionWarning
+        What ``warnings`` of the result says, once a call.
     """

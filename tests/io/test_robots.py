@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from lxml import etree
 
 import rlacd
+import rlacd.cli.decompose
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.io.robots import decomposed
@@ -252,7 +253,7 @@ def test_the_unit_of_collada_files_is_applied_as_ros_does(tmp_path: Path) -> Non
     (tmp_path / "table.dae").write_text(text)
     done = rlacd.rewrite_robot(urdf(tmp_path, "filename='table.dae'"), tmp_path / "out.urdf", threads=1)
     assert trimesh.util.concatenate(collisions(done.path)).bounds == pytest.approx(table().bounds, abs=1e-6)
-    assert "Y_UP" in done.warnings[0]
+    assert any("Y_UP" in warning for warning in done.warnings)
 
 
 def test_meshes_of_one_name_in_two_folders_do_not_clash(tmp_path: Path) -> None:
@@ -311,9 +312,54 @@ def test_warnings_of_a_kind_are_one_that_names_the_worst(tmp_path: Path) -> None
     done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threshold_abs=0.015, max_hulls=1, threads=1)
     said = [warning for warning in done.warnings if "passage" in warning]
     assert len(said) == 1
-    assert said[0].startswith("ring1 and 2 others: 5 passages narrow by over half, 5 to nothing: near")
+    assert said[0].startswith("l1 and 2 others: 5 passages narrow by over half, 5 to nothing: near")
     assert sum("Y_UP" in warning for warning in done.warnings) == 1
-    assert len(done.warnings) == 4, "one more about the threshold, and one about the links, which stand in each other"
+    assert len(done.warnings) == 5, "about the threshold, about mass, and about the links, which stand in each other"
+
+
+def test_warnings_in_python_name_the_robot_and_its_links_once(tmp_path: Path) -> None:
+    bowl = trimesh.creation.icosphere(subdivisions=2)
+    trimesh.Trimesh(bowl.vertices, bowl.faces[bowl.triangles_center[:, 2] < 0.2]).export(tmp_path / "bowl.stl")
+    urdf(tmp_path, "filename='bowl.stl'")
+    with pytest.warns(rlacd.DecompositionWarning) as caught:
+        done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", quality="fast", threads=1)
+    assert [str(one.message) for one in caught] == [f"r.urdf: {' '.join(done.warnings)}"]
+    assert caught[0].filename == __file__
+    assert any(warning.startswith("l: 1 open body became a thin shell") for warning in done.warnings)
+
+
+def test_a_mass_that_follows_from_hulls_is_told(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="extra sim")
+    table().export(tmp_path / "table.stl")
+    mesh, mass = '<collision><geometry><mesh filename="table.stl"/></geometry></collision>', '<mass value="1"/>'
+    inertial = f'<inertial>{mass}<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    for number, stated in enumerate(["", inertial]):
+        links = "".join(f'<link name="{name}">{stated}{mesh}</link>' for name in ("base", "tip"))
+        joint = (
+            '<joint name="j" type="continuous"><parent link="base"/><child link="tip"/><origin xyz="2 0 0"/></joint>'
+        )
+        (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joint}</robot>')
+        done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threads=1)
+        before, after = (mujoco.MjModel.from_xml_path(str(path)) for path in (tmp_path / "r.urdf", done.path))
+        said = [warning for warning in done.warnings if warning.startswith("2 links, such as base, have no <inertial>")]
+        assert (len(said), np.allclose(before.body_mass, after.body_mass)) == ((1, False), (0, True))[number]
+
+
+def test_info_shows_the_links_of_a_robot(ear: Path) -> None:
+    run = CliRunner().invoke(app, ["info", str(ear)])
+    assert run.exit_code == 0, run.output
+    assert re.search(r"2 with collision meshes\n +base +1 mesh +\d+ triangles\n +tip +2 meshes", run.stdout)
+    facts = json.loads(CliRunner().invoke(app, ["info", str(ear), "--json"]).stdout)
+    assert [(link["name"], len(link["meshes"])) for link in facts["links"]] == [("base", 1), ("tip", 2)]
+
+
+def test_a_log_tells_which_link_is_under_way(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rlacd.cli.decompose, "LOG_EVERY", 0.0)
+    run = CliRunner().invoke(app, ["decompose", str(ear), "--threads", "1"])
+    assert run.exit_code == 0, run.output
+    assert re.search(r"^link base \(1 of 2\): \w+\n(.*\n)*link tip \(2 of 2\): \w+$", run.stderr, re.MULTILINE)
+    run = CliRunner().invoke(app, ["decompose", str(ear), "-o", str(ear.with_name("o.urdf")), "--quiet"])
+    assert run.stderr == ""
 
 
 def test_going_elsewhere_says_which_files_will_be_missed(ear: Path, tmp_path: Path) -> None:

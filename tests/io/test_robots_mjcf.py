@@ -12,6 +12,8 @@ import trimesh
 
 import rlacd
 from rlacd.errors import MeshFileError
+from rlacd.io.robots.read import read_robot
+from rlacd.io.robots.robot import turned
 from tests.models import fall_in_mujoco, inside, mujoco_model, points_of_geom, table
 
 ARM = """<mujoco model="arm">
@@ -203,6 +205,98 @@ def test_geoms_of_a_body_become_one_solid_where_they_collide_alike(tmp_path: Pat
         assert inside(hulls, corners, 1e-5).all()
     shape = trimesh.util.concatenate(tip.hulls).apply_transform(pose_of_body(after, 2))
     assert shape.bounds == pytest.approx(bounds_of(before, 2), abs=1e-5), "in Python they are in the body's frame"
+
+
+TURNS = {"quat": 4, "euler": 3, "axisangle": 4, "xyaxes": 6, "zaxis": 3}
+
+
+def random_model(rng: np.random.Generator) -> str:
+    """Nested classes, bodies and frames, each placed and turned in some way or none, with geoms of one mesh."""
+
+    def placed() -> str:
+        way = rng.choice([*TURNS, ""])
+        turn = f' {way}="{" ".join(map(str, rng.normal(size=TURNS[way]).round(3)))}"' if way else ""
+        return f'pos="{" ".join(map(str, rng.normal(size=3).round(3)))}"{turn}' if rng.random() < 0.6 else turn
+
+    def said() -> str:
+        flags = [f'{name}="{rng.integers(2)}"' for name in ("contype", "conaffinity") if rng.random() < 0.3]
+        return " ".join([placed(), *flags, "type='mesh'" if rng.random() < 0.5 else ""])
+
+    def content(depth: int) -> str:
+        text = ""
+        for tag in rng.choice(["geom", "geom", "body", "frame"], rng.integers(1, 4)):
+            known = f' childclass="{rng.choice(["a", "b", "c"])}"' if rng.random() < 0.4 and tag != "geom" else ""
+            own = f' class="{rng.choice(["a", "b", "c"])}"' if rng.random() < 0.4 else ""
+            if tag == "geom":
+                text += f'<geom mesh="m" {own} {said()}/>'
+            elif depth < 3:
+                mass = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>' if tag == "body" else ""
+                text += f"<{tag} {placed()}{known}>{mass}{content(depth + 1)}</{tag}>"
+        return text
+
+    angle, order = rng.choice(["radian", "degree"]), "".join(rng.choice([*"xyzXYZ"], 3))
+    classes = f'<default class="a"><geom {said()}/><default class="b"><geom {said()}/></default></default>'
+    return f"""<mujoco><compiler angle="{angle}" eulerseq="{order}"/><default><geom {said()}/>{classes}
+    <default class="c"><geom {said()}/></default></default>
+    <asset><mesh name="m" file="m.obj" refpos="0.1 0 0"/></asset><worldbody>{content(0)}</worldbody></mujoco>"""
+
+
+@pytest.mark.promise("robot-hulls")
+def test_meshes_are_placed_as_mujoco_places_them(tmp_path: Path) -> None:
+    """Of 300 random models: how many collide in each body, and how they are turned."""
+    mujoco = pytest.importorskip("mujoco", reason="extra sim")
+    trimesh.creation.box((0.2, 0.4, 0.8)).export(tmp_path / "m.obj")
+    rng, compared = np.random.default_rng(0), 0
+    for _ in range(300):
+        (tmp_path / "r.xml").write_text(random_model(rng))
+        model = mujoco_model(tmp_path / "r.xml")
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        expected: dict[str, list[Any]] = {}
+        is_mesh = model.geom_type == mujoco.mjtGeom.mjGEOM_MESH
+        for geom in np.flatnonzero(is_mesh & ((model.geom_contype | model.geom_conaffinity) > 0)).tolist():
+            body = int(model.geom_bodyid[geom])
+            name = f"body_{body}" if body else "world"
+            expected.setdefault(name, []).append(np.ptp(points_of_geom(model, data, geom), axis=0))
+        robot = read_robot(tmp_path / "r.xml", apart=True)
+        found = {
+            body.name: [
+                np.ptp(turned(body.pose, turned(each.meshes[0].to_body, each.mesh())).vertices, axis=0)
+                for each in body.colliders
+            ]
+            for body in robot.bodies
+        }
+        assert found.keys() == expected.keys()
+        for name, sizes in expected.items():
+            assert np.sort(found[name], axis=0) == pytest.approx(np.sort(sizes, axis=0), abs=1e-4)
+            compared += len(sizes)
+    assert compared > 500
+
+
+def test_pairs_of_geoms_collide_as_all_their_hulls(tmp_path: Path) -> None:
+    """Geoms of no contact type collide only with those that a pair names."""
+    mujoco = pytest.importorskip("mujoco", reason="extra sim")
+    table().export(tmp_path / "table.stl")
+    ball, off = (
+        '<body name="ball" pos="{} 0.02 0.5"><freejoint/><geom name="ball" size="0.02"{}/></body>',
+        ' contype="0"',
+    )
+    geom = f'<geom name="t" type="mesh" mesh="t"{off} conaffinity="0"/>'
+    (tmp_path / "in.xml").write_text(
+        f"""<mujoco><asset><mesh name="t" file="table.stl"/></asset><worldbody><body name="table">{geom}</body>
+        {ball.format(0.02, f"{off} conaffinity='0'")}</worldbody>
+        <contact><pair name="p" geom1="ball" geom2="t" condim="1"/></contact></mujoco>"""
+    )
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", threshold_abs=0.01, threads=1)
+    before, after = (mujoco_model(path) for path in (tmp_path / "in.xml", done.path))
+    assert (before.npair, after.npair) == (1, len(done.links[0].hulls)) == (1, 5)
+    assert set(after.pair_dim) == {1}
+    assert not [warning for warning in done.warnings if "<pair>" in warning]
+    for model in (before, after):
+        data = mujoco.MjData(model)
+        data.qpos[2] = 0.205
+        mujoco.mj_forward(model, data)
+        assert data.ncon > 0
 
 
 def pose_of_body(model: Any, body: str | int) -> np.ndarray:

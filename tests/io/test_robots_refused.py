@@ -28,6 +28,13 @@ from tests.io.urdf_files import part, urdf, write_ear
         ("r.urdf", "<sdf/>", "is not URDF: it starts with <sdf>"),
         ("r.urdf", '<?xml version="1.0" encoding="klingon"?><robot/>', "klingon|encoding"),
         ("r.urdf", part(""), "no filename"),
+        ("r.urdf", "<!DOCTYPE robot><robot/>", r"^rlacd: \S+ has a document type \(<!DOCTYPE>\)"),
+        ("r.xml", "<!DOCTYPE mujoco><mujoco/>", r"^rlacd: \S+ has a document type \(<!DOCTYPE>\)"),
+        (
+            "r.urdf",
+            '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>',
+            "the joint j of .* names the link b, which is not in the file",
+        ),
         *(
             ("r.urdf", part(f"filename='box.stl' scale='{scale}'"), "not three numbers other than zero")
             for scale in ("0 1 1", "a b c", "1 1", "nan nan nan", "inf 1 1", "1e999 1 1")

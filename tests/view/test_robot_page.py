@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import re
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -183,3 +185,27 @@ def test_a_robot_without_collision_meshes_is_refused(robots: Path) -> None:
     (robots / "bare.urdf").write_text('<robot name="r"><link name="a"/></robot>')
     with pytest.raises(rlacd.MeshError, match=r"has no collision mesh, so there is nothing to show\."):
         read_viewed(robots / "bare.urdf")
+
+
+@pytest.mark.parametrize(
+    "reference", ["../{}", "meshes/../../{}", "/{}", "file:///{}", "package://{}", "package://tmp/{}"]
+)
+@pytest.mark.promise("hostile-robots")
+def test_an_uploaded_robot_names_files_of_its_own_folder_only(
+    press: ViewServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: str
+) -> None:
+    """The folder of all temporary files is named tmp, and holds a package."""
+    folder = tmp_path / "tmp"
+    (folder / "mine").mkdir(parents=True)
+    (folder / "mine" / "package.xml").write_text("<package><name>mine</name></package>")
+    trimesh.creation.box().export(folder / "mine" / "secret.stl")
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    named = reference.format("mine/secret.stl")
+    if reference.startswith(("/", "file")):
+        named = named.replace("mine/", f"{folder}/mine/".lstrip("/"))
+    mesh = f"<mesh filename='{named}'/>"
+    text = f"<robot name='r'><link name='l'><collision><geometry>{mesh}</geometry></collision></link></robot>"
+    headers = {"Content-Type": "application/octet-stream"}
+    answer = ask(press, "POST", "/open?name=r.urdf", text.encode(), **headers)
+    assert answer.status == 400
+    assert re.search("outside of|was not found", answer.json["error"])

@@ -2,7 +2,7 @@
 
 from rlacd.clear.bodies import Body, CrowdedError, Surface, may_touch
 from rlacd.clear.mend import Cleared, kept_clear
-from rlacd.clear.motion import Joint, Motion, at_rest, mjcf_motion, urdf_motion
+from rlacd.clear.motion import Joint, Motion, Solids, at_rest, mjcf_motion, urdf_motion
 from rlacd.clear.pairs import LinkPair, link_pairs, warnings_of
 from rlacd.clear.touching import Offence, Touching, check
 
@@ -14,6 +14,7 @@ __all__ = [
     "LinkPair",
     "Motion",
     "Offence",
+    "Solids",
     "Surface",
     "Touching",
     "at_rest",

@@ -5,18 +5,26 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from rlacd import _native
 from rlacd.errors import RlacdError, import_extra
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray, dots
+from rlacd.solid.hull import Hull
+from rlacd.solid.poses import moved
 from rlacd.solid.topology import used_points
 
 MOST_NEAR = 4_000_000
 """Pairs of boxes that come near each other along the x axis, over all samples; robots of a hundred links have fewer."""
+
+
+PRIMITIVES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3}
+"""Kinds of primitives, and how many sizes each has."""
 
 
 class CrowdedError(RlacdError, ValueError):
@@ -35,6 +43,7 @@ class Surface:
         self.vertices = np.ascontiguousarray(vertices, dtype=np.float64)
         self.faces = np.ascontiguousarray(faces, dtype=np.int32)
         self.met: dict[tuple[Surface, bytes], bool] = {}  # whether it touches others, seen at a pose
+        self.place = np.eye(4)
 
     def __reduce__(self) -> Any:
         return Surface, (self.vertices, self.faces)
@@ -48,6 +57,11 @@ class Surface:
     def box(self) -> FloatArray:
         """Lower and upper corner of the box around it [2, 3]."""
         return np.stack([self.used.min(axis=0), self.used.max(axis=0)])
+
+    @cached_property
+    def where(self) -> Any:
+        """For coal, where its shapes are."""
+        return get_coal().Transform3s(self.place[:3, :3], self.place[:3, 3])
 
     @cached_property
     def as_mesh(self) -> Any:
@@ -85,27 +99,92 @@ class Surface:
         return bool(self._winding.winding(point, accuracy=4.0, threads=1)[0] > 0.5)
 
 
+class Primitive(Surface):
+    """A box, sphere, capsule, cylinder or ellipsoid: exact as coal's shape, and just inside of its triangles.
+
+    Its `sizes` are half the sides of a box, the radius of a sphere, the radius and half the length between the ends of
+    a capsule or cylinder along z, and the radii of an ellipsoid.
+    """
+
+    def __init__(self, kind: str, sizes: Sequence[float], place: FloatArray) -> None:
+        self.kind, self.sizes = kind, np.array(sizes[: PRIMITIVES[kind]], dtype=np.float64)
+        hull = Hull.of(moved(place, _points_around(kind, self.sizes)))
+        if hull is None:
+            raise ValueError(f"a {kind} of the sizes {self.sizes.tolist()} is flat")
+        super().__init__(hull.vertices, hull.faces)
+        self.place = place
+
+    def __reduce__(self) -> Any:
+        return Primitive, (self.kind, self.sizes, self.place)
+
+    @cached_property
+    def as_convex(self) -> Any:
+        """For coal, the solid itself."""
+        sizes = self.sizes * np.array({"box": [2], "capsule": [1, 2], "cylinder": [1, 2]}.get(self.kind, [1]))
+        return getattr(get_coal(), self.kind.capitalize())(*sizes.tolist())
+
+    @cached_property
+    def as_mesh(self) -> Any:
+        """The same."""
+        return self.as_convex
+
+
+@cache
+def _points_around_ball() -> FloatArray:
+    """Corners of a polyhedron around a ball of radius 1."""
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    return np.asarray(ball.vertices / dots(ball.face_normals, ball.triangles[:, 0]).min())
+
+
+def _points_around(kind: str, sizes: FloatArray) -> FloatArray:
+    """Corners of a polyhedron around a primitive."""
+    if kind == "box":
+        return np.array([*product((-1.0, 1.0), repeat=3)]) * sizes
+    if kind in ("sphere", "ellipsoid"):
+        return _points_around_ball() * sizes
+    turns = np.arange(64) * np.pi / 32
+    ring = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1) / np.cos(np.pi / 64)
+    end = sizes[0] * (ring if kind == "cylinder" else _points_around_ball())
+    half = np.array([0, 0, sizes[1]])
+    return np.concatenate([end - half, end + half])
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body, its surface as it was read, and its hulls; in its own frame, and in one unit for all bodies."""
+    """A rigid body, its surface as it was read, its hulls, and its primitives, which stay.
+
+    All are in its own frame, and in one unit for all bodies.
+    """
 
     name: str
     mesh: Surface
     hulls: list[Surface] = field(default_factory=list)
+    primitives: Sequence[Primitive] = ()
+    is_whole: bool = True  # whether nothing else of it collides
 
     def with_hulls(self, hulls: Sequence[Surface]) -> Body:
         """The same body as other hulls."""
         return replace(self, hulls=[*hulls])
 
     @property
-    def is_filled(self) -> bool:
-        """Whether it can touch others."""
-        return bool(self.hulls and len(self.mesh.faces))
+    def solids(self) -> list[Surface]:
+        """What it was read as."""
+        return [*([self.mesh] if len(self.mesh.faces) else []), *self.primitives]
+
+    @property
+    def shapes(self) -> list[Surface]:
+        """What it collides as; hulls of points alone have nothing to be compared with."""
+        return [*(self.hulls if len(self.mesh.faces) else []), *self.primitives]
+
+    @property
+    def is_compared(self) -> bool:
+        """Whether nothing of it collides but its `shapes`."""
+        return self.is_whole and (not self.hulls or len(self.mesh.faces) > 0)
 
     @property
     def box(self) -> FloatArray:
-        """Lower and upper corner of a box around mesh and hulls [2, 3]."""
-        boxes = np.stack([surface.box for surface in (self.mesh, *self.hulls) if len(surface.used)])
+        """Lower and upper corner of a box around all of it [2, 3]."""
+        boxes = np.stack([each.box for each in (self.mesh, *self.hulls, *self.primitives) if len(each.used)])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 

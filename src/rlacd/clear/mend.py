@@ -122,18 +122,19 @@ def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes
     for (i, j), found in sorted(left.items(), key=lambda one: (-one[1].depth, one[0])):
         seen = [place.pose for place in _spread(found.offences)]
         poses = {i: seen, j: [inverse(pose) for pose in seen]}
-        ours, theirs = (any(enters(bodies[a], bodies[b].mesh, pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
+        ours, theirs = (any(enters(bodies[a], bodies[b], pose) for pose in poses[a]) for a, b in ((i, j), (j, i)))
         ways = [_Wish(i, j, False), _Wish(j, i, False)]
         if theirs:
             ways.reverse()
         if ours and theirs:
             ways.insert(0, _Wish(i, j, True))
         for wish in ways:
-            if wish.body not in fixed and wish.other not in again and wishes.add(wish, poses[wish.body]):
+            is_free = bodies[wish.body].hulls and wish.body not in fixed and wish.other not in again
+            if is_free and wishes.add(wish, poses[wish.body]):
                 again.add(wish.body)
                 fixed.add(wish.other)
                 if wish.of_mesh:
-                    least = min(gap(bodies[i].mesh, bodies[j].mesh, pose) for pose in seen)
+                    least = min(gap(bodies[i], bodies[j], pose) for pose in seen)
                     wishes.gaps[wish] = min(least, wishes.gaps.get(wish, least))
                 break
     return again
@@ -153,11 +154,9 @@ def _spread(offences: Sequence[Offence]) -> list[Offence]:
 def _obstacle(bodies: Sequence[Body], wish: _Wish, wishes: _Wishes, motion: Motion) -> Obstacle:
     """The other body at all places, seen from the one that stays out of it, as far as it comes near that."""
     own, other = bodies[wish.body], bodies[wish.other]
-    if wish.of_mesh:
-        vertices, faces, margin = other.mesh.vertices, other.mesh.faces, wishes.gaps[wish] / 2
-    else:
-        vertices, faces = concatenated([(hull.vertices, hull.faces) for hull in other.hulls])
-        margin = OFF_HULLS * size_of(bodies, motion)
+    shapes = other.solids if wish.of_mesh else other.shapes
+    vertices, faces = concatenated([(shape.vertices, shape.faces) for shape in shapes])
+    margin = wishes.gaps[wish] / 2 if wish.of_mesh else OFF_HULLS * size_of(bodies, motion)
     lower, upper = own.box[0] - margin, own.box[1] + margin
     near = []
     for pose in wishes.places[wish].values():

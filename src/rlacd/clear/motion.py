@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from trimesh.transformations import quaternion_matrix
 
+from rlacd.clear.bodies import PRIMITIVES, Primitive
 from rlacd.errors import import_extra
 from rlacd.solid.arrays import FloatArray
 
@@ -54,22 +56,47 @@ class Joint:
     """How far it is then from rest: a polynomial in how far its leader is, from the linear term up."""
 
 
+class Solids(NamedTuple):
+    """What of a link collides."""
+
+    primitives: Sequence[Primitive] = ()
+    meshes: int = 0
+    others: int = 0
+    """Shapes that cannot be compared, such as height fields."""
+
+
+_Shape = tuple[str, Sequence[float], FloatArray]
+"""Its kind, a primitive's sizes, and its pose in the frame of its link."""
+
+
+def _solids(shapes: Iterable[_Shape]) -> Solids:
+    primitives, others = list[Primitive](), list[str]()
+    for kind, sizes, place in shapes:
+        if kind in PRIMITIVES and min(sizes[: PRIMITIVES[kind]]) > 0:
+            primitives.append(Primitive(kind, sizes, place))
+        else:
+            others.append(kind)
+    meshes = others.count("mesh")
+    return Solids(primitives, meshes, len(others) - meshes)
+
+
 @dataclass(frozen=True)
 class Motion:
     """Where links are."""
 
-    links: tuple[str, ...]
+    links: tuple[str, ...]  # those that were asked for, and behind them all others that have primitives
     poses: FloatArray  # [S, L, 4, 4], from each link's frame to one that all share; the first sample is at rest
     joints: tuple[Joint, ...] = ()  # those that move: first those that are sampled, then those that others drive
     positions: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))  # [S, J], of the sampled joints
-    # Links that one joint connects, or several without one of these links between, the lower number first; joints that
-    # were looked at only at rest do not count, since elsewhere links may be far from each other.
+    # Links that one joint connects, or several across links without collision geometry, the lower number first; the
+    # world is no link. Joints looked at only at rest do not count, since elsewhere links may be far from each other.
     adjacent: frozenset[tuple[int, int]] = frozenset()
     warnings: tuple[str, ...] = ()  # what a joint's range was taken to be, where the file does not say
     fixed: frozenset[int] = frozenset()  # links that never move: of two of them, hulls may touch
     carrier: tuple[int, ...] = ()  # the last link below, or itself, whose joint was looked at only at rest; -1: none
     carried: tuple[int, ...] = ()  # the joint that carries it; -1 if none does
     place: Callable[[FloatArray], FloatArray] | None = None  # takes positions [J], returns poses [L, 4, 4]
+    solids: tuple[Solids, ...] = ()  # of each link; empty where that is not known
 
     @property
     def sampled(self) -> tuple[Joint, ...]:
@@ -140,9 +167,13 @@ def mjcf_motion(path: Path, samples: int = SAMPLES, seed: int = 0, links: Sequen
 
 
 def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] | None) -> Motion:
-    chosen = [file.links.index(name) for name in (file.links if links is None else links)]
+    asked = file.links if links is None else links
+    if lost := [name for name in asked if name not in file.links]:
+        raise ValueError(f"it has no link {lost[0]}")
+    chosen = [file.links.index(name) for name in asked]
+    chosen += [i for i, own in file.solids.items() if own.primitives and i not in chosen and i != file.world]
     sampled = {j: joint for j, joint in file.joints.items() if joint.limits is not None}
-    moving = sampled | {j: joint for j, joint in file.joints.items() if joint.leader in sampled}
+    moving = {j: file.joints[j] for j in _led(file.joints, sampled)}
     number = {j: i for i, j in enumerate(moving)}
     positions = _positions([*sampled.values()], samples, seed)
     poses = np.stack([file.place(row) for row in positions[::-1]])[::-1]  # at rest last: there, axes are read
@@ -154,17 +185,18 @@ def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] |
         lower, upper = joint.limits or (joint.rest, joint.rest)
         driven = -1 if joint.leader is None else number[joint.leader], joint.curve
         joints.append(Joint(joint.name, joint.slides, lower, upper, joint.rest, *file.axis(j), parent, *driven))
-    held = {joint.link: joint.link for j, joint in file.joints.items() if joint.limits is None and joint.leader is None}
+    held = {joint.link: joint.link for j, joint in file.joints.items() if j not in moving and joint.leader != -1}
     return Motion(
         tuple(file.links[i] for i in chosen),
         poses[:, chosen],
         tuple(joints),
         positions,
-        _adjacent({link: parent for link, parent in file.parents.items() if link not in held}, chosen),
+        _adjacent(file, [link for link in file.parents if link not in held], chosen),
         tuple(file.said),
         carrier=_last(file.parents, held, chosen),
         carried=_last(file.parents, last, chosen),
         place=partial(_placed, file, chosen),
+        solids=tuple(file.solids.get(i, Solids()) for i in chosen),
     )
 
 
@@ -182,6 +214,14 @@ def _positions(joints: Sequence[_Read], samples: int, seed: int) -> FloatArray:
     spread = sobol.random_base2(math.ceil(math.log2(samples)))[:samples]
     lower, upper = np.array([joint.limits for joint in joints]).T
     return np.concatenate([rest, lower + spread * (upper - lower)])
+
+
+def _led(joints: Mapping[int, _Read], first: Collection[int]) -> list[int]:
+    """The first joints and those that follow them, each behind its leader."""
+    led = [*first]
+    for leader in led:
+        led += [j for j, joint in joints.items() if joint.leader == leader]
+    return led
 
 
 def _limits(kind: str, name: str, given: Limits | None, said: list[str]) -> Limits | None:
@@ -207,12 +247,13 @@ def _last(parents: Mapping[int, int], what: Mapping[int, int], links: Sequence[i
     return tuple(map(last, links))
 
 
-def _adjacent(parents: Mapping[int, int], chosen: Sequence[int]) -> frozenset[tuple[int, int]]:
-    """Places of chosen links that one joint connects, or several across links that are not chosen."""
+def _adjacent(file: _Urdf | _Mjcf, carried: Sequence[int], chosen: Sequence[int]) -> frozenset[tuple[int, int]]:
+    """Places of chosen links that one joint connects, or several across links without collision geometry."""
     import networkx  # only robots need it
 
-    graph, new = networkx.Graph(parents.items()), {link: place for place, link in enumerate(chosen)}
-    between = networkx.connected_components(graph.subgraph([link for link in graph if link not in new]))
+    edges = [(link, file.parents[link]) for link in carried if file.parents[link] != file.world]
+    graph, new = networkx.Graph(edges), {link: place for place, link in enumerate(chosen)}
+    between = networkx.connected_components(graph.subgraph([link for link in graph if link not in file.solids]))
     joined = [*map(set, graph.edges), *({near for link in part for near in graph[link]} for part in between)]
     places = (sorted(new[link] for link in links if link in new) for links in joined)
     return frozenset(pair for near in places for pair in combinations(near, 2))
@@ -230,6 +271,11 @@ class _Urdf:
         self.parents = {self.links.index(joint.child): self.links.index(joint.parent) for joint in self._joints}
         actuated = {joint.name for joint in self._robot.actuated_joints}
         names = [joint.name for joint in self._joints]
+        followers = {joint.name: joint.mimic for joint in self._joints if joint.mimic is not None}
+        for mimic in len(followers) * [*followers.values()]:  # yourdfpy lets a joint follow one that moves by itself
+            if (ahead := followers.get(mimic.joint)) is not None:
+                mimic.joint, mimic.offset = ahead.joint, mimic.offset + mimic.multiplier * ahead.offset
+                mimic.multiplier *= ahead.multiplier
         self.joints = {}
         for number, joint in enumerate(self._joints):
             link, mimic = self.links.index(joint.child), joint.mimic
@@ -240,6 +286,9 @@ class _Urdf:
                 times = 1.0 if mimic.multiplier is None else float(mimic.multiplier)
                 self.joints[number] = read._replace(leader=names.index(mimic.joint), curve=(times,))
         self._sampled = [joint.name for joint in self.joints.values() if joint.limits is not None]
+        self.world = self.links.index("world") if "world" in self.links else None
+        links = enumerate(self._robot.robot.links)
+        self.solids = {i: _solids(map(_urdf_shape, link.collisions)) for i, link in links if link.collisions}
 
     def place(self, positions: FloatArray) -> FloatArray:
         self._robot.update_cfg(dict(zip(self._sampled, positions.tolist(), strict=True)))
@@ -249,6 +298,15 @@ class _Urdf:
         said, pose = self._joints[joint].axis, self._robot.get_transform(self._joints[joint].child)
         axis = np.array([1.0, 0.0, 0.0] if said is None else said, dtype=np.float64)
         return pose[:3, 3], (pose[:3, :3] * axis / np.linalg.norm(axis)).sum(axis=1)
+
+
+def _urdf_shape(collision: Any) -> _Shape:
+    geometry, place = collision.geometry, np.eye(4) if collision.origin is None else collision.origin
+    if (box := geometry.box) is not None:
+        return "box", box.size / 2, place
+    if (cylinder := geometry.cylinder) is not None:
+        return "cylinder", [cylinder.radius, cylinder.length / 2], place
+    return ("mesh", (), place) if geometry.sphere is None else ("sphere", [geometry.sphere.radius], place)
 
 
 def _urdf_limits(joint: Any) -> tuple[str, str, Limits | None]:
@@ -270,6 +328,8 @@ class _Mjcf:
         self._data, self._walk = mujoco.MjData(model), mujoco.mj_kinematics
         self.links, self.said = [model.body(i).name or f"body_{i}" for i in range(model.nbody)], list[str]()
         self.parents = {i: int(parent) for i, parent in enumerate(model.body_parentid) if i}
+        shapes = _mjcf_shapes(mujoco.mjtGeom, model)
+        self.world, self.solids = 0, {body: _solids(own) for body, own in shapes.items()}
         joint_equality = int(mujoco.mjtEq.mjEQ_JOINT)
         self._driven = {
             int(model.eq_obj1id[e]): (int(model.eq_obj2id[e]), model.eq_data[e, :5].tolist())
@@ -278,6 +338,8 @@ class _Mjcf:
         }
         self.joints = {j: self._read(j) for j in range(model.njnt)}
         self._sampled = model.jnt_qposadr[[j for j, joint in self.joints.items() if joint.limits is not None]]
+        leaders = [j for j, joint in self.joints.items() if joint.leader is None or joint.leader < 0]
+        self._follow = [j for j in _led(self.joints, leaders) if j in self._driven]
 
     def _read(self, j: int) -> _Read:
         model = self._model
@@ -294,7 +356,8 @@ class _Mjcf:
         model, data = self._model, self._data
         data.qpos[:] = model.qpos0
         data.qpos[self._sampled] = positions
-        for driven, (leader, curve) in self._driven.items():
+        for driven in self._follow:
+            leader, curve = self._driven[driven]
             start, drives = model.jnt_qposadr[driven], model.jnt_qposadr[leader]
             away = 0.0 if leader < 0 else data.qpos[drives] - model.qpos0[drives]
             data.qpos[start] = model.qpos0[start] + sum(c * away**power for power, c in enumerate(curve))
@@ -305,6 +368,20 @@ class _Mjcf:
 
     def axis(self, joint: int) -> tuple[FloatArray, FloatArray]:
         return self._data.xanchor[joint].copy(), self._data.xaxis[joint].copy()
+
+
+def _mjcf_shapes(kinds: Any, model: Any) -> dict[int, list[_Shape]]:
+    """What of each body collides, by its contact properties or as one of a pair."""
+    names = {int(getattr(kinds, f"mjGEOM_{name.upper()}")): name for name in (*PRIMITIVES, "mesh")}
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    collides[[*model.pair_geom1, *model.pair_geom2]] = True
+    found: dict[int, list[_Shape]] = {}
+    for g in np.flatnonzero(collides).tolist():
+        place = np.asarray(quaternion_matrix(model.geom_quat[g]))
+        place[:3, 3] = model.geom_pos[g]
+        shape = names.get(int(model.geom_type[g]), "other"), model.geom_size[g], place
+        found.setdefault(int(model.geom_bodyid[g]), []).append(shape)
+    return found
 
 
 @contextmanager

@@ -22,9 +22,9 @@ class LinkPair:
     second: str
     """Their names."""
     adjacent: bool
-    """Whether one joint connects them, or several without a link with collision meshes between."""
+    """Whether one joint connects them, or several without a link with collision geometry between."""
     contact: Literal["always", "sometimes", "never"]
-    """When their hulls touch."""
+    """When their hulls or primitives touch."""
     share: float
     """Share of the joint positions at which they do."""
     meshes: float
@@ -34,7 +34,8 @@ class LinkPair:
     kept_clear: bool
     """Whether their hulls were made finer so that they do not."""
     loose: bool
-    """Whether a joint that was looked at only at rest lies between them: at other places they may do otherwise."""
+    """Whether they may do otherwise: a joint that was looked at only at rest lies between them, or one has a shape that
+    was not compared, such as a height field."""
 
     @property
     def kind(self) -> Contact:
@@ -43,13 +44,12 @@ class LinkPair:
 
 
 def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:
-    """All pairs of links with hulls, in their order."""
+    """All pairs of links with collision geometry, in their order."""
     found, bodies = cleared.touching, cleared.bodies
     pairs = []
     for i, first in enumerate(bodies):
         for j in range(i + 1, len(bodies)):
-            if not (first.hulls and bodies[j].hulls):
-                continue
+            second = bodies[j]
             touching = found.get((i, j))
             share = float(touching.hulls.mean()) if touching else 0.0
             contact: Literal["always", "sometimes", "never"] = (
@@ -57,8 +57,9 @@ def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:
             )
             meshes = float(touching.meshes.mean()) if touching else 0.0
             depth = touching.depth if touching else 0.0
-            names, is_kept = (first.name, bodies[j].name), (i, j) in cleared.mended
-            joined, loose = (i, j) in motion.adjacent, motion.carrier[i] != motion.carrier[j]
+            names, is_kept = (first.name, second.name), (i, j) in cleared.mended
+            is_known = first.is_compared and second.is_compared and motion.carrier[i] == motion.carrier[j]
+            joined, loose = (i, j) in motion.adjacent, not is_known
             pairs.append(LinkPair(*names, joined, contact, share, meshes, depth, is_kept, loose))
     return pairs
 
@@ -81,9 +82,10 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
             always.append(names[pair])
     if earlier:
         depth, worst = max(earlier)
+        more = "" if len(earlier) == 1 else f" ({len(earlier)} such pairs)"
         sentences.append(
             f"Hulls of {worst} touch at some places where the links do not, up to {length(depth)} deep; since the "
-            f"links collide at least as often themselves, their hulls were not cut finer ({len(earlier)} such pairs)."
+            f"links collide at least as often themselves, their hulls were not cut finer{more}."
         )
     if always:
         more = "" if len(always) == 1 else f", and {len(always) - 1} more pairs,"

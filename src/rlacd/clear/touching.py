@@ -59,7 +59,7 @@ def check(
     Returns what they do by the numbers of the two, the lower first; raises MissingExtraError without the extra `clear`.
     """
     get_coal()
-    filled = np.array([i for i, body in enumerate(bodies) if body.is_filled])
+    filled = np.array([i for i, body in enumerate(bodies) if body.shapes])
     if len(filled) < 2:
         return {}
     placed, size = _boxes(bodies, motion.poses, filled), size_of(bodies, motion)
@@ -80,7 +80,7 @@ def check(
 
 def size_of(bodies: Sequence[Body], motion: Motion) -> float:
     """The longest side of the box around all bodies at rest."""
-    filled = np.array([i for i, body in enumerate(bodies) if body.is_filled])
+    filled = np.array([i for i, body in enumerate(bodies) if body.shapes])
     return float(np.ptp(_boxes(bodies, motion.poses[:1], filled).reshape(-1, 3), axis=0).max())
 
 
@@ -102,13 +102,16 @@ def _touching(first: Body, second: Body, samples: Int64Array, poses: FloatArray,
     rounded = np.round(poses / (SAME * np.array([1, 1, 1, size])))
     _, chosen, same = np.unique(rounded.reshape(len(poses), 16), axis=0, return_index=True, return_inverse=True)
     touch, meet, offences = np.zeros(len(chosen), dtype=bool), np.zeros(len(chosen), dtype=bool), []
-    near = _near_hulls(first, second, poses[chosen])
+    ours, theirs = first.shapes, second.shapes
+    near = _near(ours, theirs, poses[chosen])
     for rows in np.split(near, np.flatnonzero(np.diff(near[:, 0])) + 1) if len(near) else []:
         place, pose = int(rows[0, 0]), poses[chosen[rows[0, 0]]]
-        depths = (_depth(first.hulls[a], second.hulls[b], pose) for _, a, b in rows.tolist())
+        depths = (_depth(ours[a], theirs[b], pose) for _, a, b in rows.tolist())
         deep = next((depth for depth in depths if depth > TOUCH * size), None)
         touch[place] = deep is not None
-        meet[place] = deep is not None and _meets(first.mesh, second.mesh, pose, TOUCH * size)
+        meet[place] = deep is not None and any(
+            _meets(one, other, pose, TOUCH * size) for one in first.solids for other in second.solids
+        )
         if deep is not None and not meet[place]:
             offences.append(Offence(int(samples[chosen[place]]), pose, max([deep, *depths])))
     hulls, meshes = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
@@ -116,28 +119,33 @@ def _touching(first: Body, second: Body, samples: Int64Array, poses: FloatArray,
     return Touching(hulls, meshes, tuple(sorted(offences, key=lambda one: (-one.depth, one.sample))))
 
 
-def _near_hulls(first: Body, second: Body, poses: FloatArray) -> Int64Array:
-    """Hulls whose boxes overlap: rows of the pose's number and theirs [P, 3]."""
-    ours, boxes = (np.stack([hull.box for hull in body.hulls]) for body in (first, second))
+def _near(first: Sequence[Surface], second: Sequence[Surface], poses: FloatArray) -> Int64Array:
+    """Shapes whose boxes overlap: rows of the pose's number and theirs [P, 3]."""
+    ours, boxes = (np.stack([shape.box for shape in shapes]) for shapes in (first, second))
     theirs, ours = placed_boxes(boxes, poses[:, None])[:, None], ours[None, :, None]
     meets = (ours[..., 0, :] <= theirs[..., 1, :]).all(axis=-1) & (theirs[..., 0, :] <= ours[..., 1, :]).all(axis=-1)
     return np.argwhere(meets)
 
 
-def _collide(first: Any, second: Any, pose: FloatArray, reach: float | None = None) -> Any:
-    """Where coal's shapes touch, the second seen at a pose; with a `reach`, only whether they are within that."""
-    coal = get_coal()
-    request, result = coal.CollisionRequest(), coal.CollisionResult()
-    if reach is not None:
-        request.enable_contact, request.security_margin = False, reach
-    there = coal.Transform3s(pose[:3, :3], pose[:3, 3])
-    return result if coal.collide(first, coal.Transform3s.Identity(), second, there, request, result) else None
+def _seen(second: Surface, pose: FloatArray) -> Any:
+    """Where coal's shapes of a surface are, seen at a pose."""
+    return get_coal().Transform3s(pose[:3, :3], pose[:3, 3]) * second.where
 
 
 def _depth(first: Surface, second: Surface, pose: FloatArray) -> float:
-    """How deep two convex polytopes overlap; 0 if they do not."""
-    found = _collide(first.as_convex, second.as_convex, pose)
-    return 0.0 if found is None else max(0.0, -float(found.getContact(0).penetration_depth))
+    """How deep two convex shapes overlap, the second seen at a pose; 0 if they do not."""
+    coal = get_coal()
+    result, places = coal.CollisionResult(), (first.where, _seen(second, pose))
+    found = coal.collide(first.as_convex, places[0], second.as_convex, places[1], coal.CollisionRequest(), result)
+    return max(0.0, -float(result.getContact(0).penetration_depth)) if found else 0.0
+
+
+def _reaches(first: Surface, as_first: Any, second: Surface, pose: FloatArray, reach: float) -> bool:
+    """Whether the first, as one of coal's shapes, is within reach of the second's surface, seen at a pose."""
+    coal = get_coal()
+    request, there = coal.CollisionRequest(), _seen(second, pose)
+    request.enable_contact, request.security_margin = False, reach
+    return bool(coal.collide(as_first, first.where, second.as_mesh, there, request, coal.CollisionResult()))
 
 
 def _meets(first: Surface, second: Surface, pose: FloatArray, reach: float) -> bool:
@@ -145,20 +153,24 @@ def _meets(first: Surface, second: Surface, pose: FloatArray, reach: float) -> b
     key = second, pose.tobytes()
     if key not in first.met:
         first.met[key] = (
-            _collide(first.as_mesh, second.as_mesh, pose, reach) is not None
+            _reaches(first, first.as_mesh, second, pose, reach)
             or first.holds(moved(pose, second.corner))
             or second.holds(moved(inverse(pose), first.corner))
         )
     return first.met[key]
 
 
-def enters(body: Body, other: Surface, pose: FloatArray) -> bool:
-    """Whether a hull of a body touches another surface, seen at a pose."""
-    return any(_collide(hull.as_convex, other.as_mesh, pose, 0.0) is not None for hull in body.hulls)
+def enters(body: Body, other: Body, pose: FloatArray) -> bool:
+    """Whether a hull of a body touches the solids of another, seen at a pose."""
+    return any(_reaches(hull, hull.as_convex, solid, pose, 0.0) for hull in body.hulls for solid in other.solids)
 
 
-def gap(first: Surface, second: Surface, pose: FloatArray) -> float:
-    """How far surfaces are apart, the second seen at a pose."""
+def gap(first: Body, second: Body, pose: FloatArray) -> float:
+    """How far the solids of bodies are apart, the second seen at a pose."""
     coal = get_coal()
-    there, request, result = coal.Transform3s(pose[:3, :3], pose[:3, 3]), coal.DistanceRequest(), coal.DistanceResult()
-    return float(coal.distance(first.as_mesh, coal.Transform3s.Identity(), second.as_mesh, there, request, result))
+
+    def between(one: Surface, other: Surface) -> float:
+        request, result, there = coal.DistanceRequest(), coal.DistanceResult(), _seen(other, pose)
+        return float(coal.distance(one.as_mesh, one.where, other.as_mesh, there, request, result))
+
+    return min(between(one, other) for one in first.solids for other in second.solids)

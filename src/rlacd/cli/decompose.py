@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
+import time
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -22,6 +23,7 @@ from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.io.read import READERS
 from rlacd.options.output import PAGES, OutputOptions
 from rlacd.options.robots import RobotOptions
+from rlacd.run import Progress, ProgressCallback
 
 ROBOTS = (".urdf", ".xml")
 IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
@@ -31,6 +33,9 @@ MESH = (
     f"The mesh: {', '.join(READERS)}. It need not be closed or clean. Or a robot, .urdf or .xml (MJCF), whose "
     "collision meshes are to be replaced. - reads stdin."
 )
+
+LOG_EVERY = 30.0
+"""Seconds between two lines in a log about a robot that takes long, as between those of a batch."""
 
 REPORTS = (".json", *PAGES)
 """Endings of reports."""
@@ -156,6 +161,7 @@ def _rewrite(
     from rlacd.plain_json import to_json
 
     with watching(quiet=bool(wanted.quiet)) as watch:
+        watch = watch if wanted.quiet else _told_in_logs(watch)
         options, place, flat = {**options, "progress": watch}, str(wanted.output), bool(wanted.keep_input)
         if stage is not None:
             done = rewrite(stage, Path(place), options, how, keep_input=flat)
@@ -170,6 +176,24 @@ def _rewrite(
     else:
         _write_report(wanted, to_json(done.as_dict()))
     return done.complete
+
+
+def _told_in_logs(watch: ProgressCallback) -> ProgressCallback:
+    """Say every `LOG_EVERY` seconds which link of a robot is under way; on a terminal, a bar shows it."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        return watch
+    link, told = "", time.monotonic()
+
+    def told_too(progress: Progress) -> object:
+        nonlocal link, told
+        if progress.stage.startswith("link "):
+            link = f"{progress.stage} ({progress.done + 1} of {progress.total})"
+        elif time.monotonic() - told >= LOG_EVERY:
+            told = time.monotonic()
+            say(f"{link}: {progress.stage}")
+        return watch(progress)
+
+    return told_too
 
 
 def _stage(mesh: Path, wanted: OutputOptions, *, apart: bool) -> Any:

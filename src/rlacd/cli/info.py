@@ -4,38 +4,80 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rlacd.cli.commands import Argument, Command, Option
+from rlacd.cli.commands import Argument, Command, Option, options_of
+from rlacd.cli.decompose import ROBOTS
 from rlacd.cli.exit_codes import give
 from rlacd.cli.lean import import_trimesh
 from rlacd.cli.pipes import refuse_stdin
+from rlacd.cli.terminal import counted
+from rlacd.options.output import OutputOptions
 from rlacd.plain_json import as_plain, printable, to_json
 
 
-def _info(mesh: Path, as_json: bool) -> None:
-    """Show what a file contains and how it would be repaired.
+def _info(mesh: Path, as_json: bool, package_dirs: Sequence[str] | None) -> None:
+    """Show what a file contains and how it would be repaired; of a robot, its links with collision meshes.
 
     \b
     Examples:
       rlacd info chair.glb
       rlacd info chair.glb --json | jq .repair
+      rlacd info robot.urdf
     """
     refuse_stdin(mesh)
     import_trimesh(mesh)
-    facts = describe(mesh)
-    give(to_json(facts) if as_json else printable(describe_text(facts)))
+    if mesh.suffix.lower() in ROBOTS and mesh.is_file():
+        facts = describe_robot(mesh, package_dirs or ())
+        text = robot_text(facts)
+    else:
+        facts = describe(mesh)
+        text = describe_text(facts)
+    give(to_json(facts) if as_json else printable(text))
 
 
 COMMAND = Command(
     "info",
     _info,
     [
-        Argument("mesh", "FILE", "The mesh to look at."),
+        Argument("mesh", "FILE", "The mesh or robot to look at."),
         Option("as_json", "--json", is_flag=True, default=False, help="Print JSON instead of text."),
+        *options_of(OutputOptions, only=("package_dirs",)),
     ],
 )
+
+
+def describe_robot(path: Path, package_dirs: Sequence[str] = ()) -> dict[str, Any]:
+    """Read a robot and describe its links with collision meshes as plain values.
+
+    Returns ``file``, ``metres`` (its unit), ``size_abs`` (the longest side of the box around all of them, at rest),
+    ``links`` (a dict each: ``name``, ``meshes`` by their files, ``triangles``), ``warnings``; raises MeshError.
+    """
+    from rlacd.io.robots.read import read_robot
+
+    robot = read_robot(path, package_dirs)
+    links = []
+    for body in robot.bodies:
+        meshes = [mesh.file for collider in body.colliders for mesh in collider.meshes]
+        files, triangles = [str(mesh.path) for mesh in meshes], sum(len(mesh.faces) for mesh in meshes)
+        links.append({"name": body.name, "meshes": files, "triangles": triangles})
+    named = {"file": os.fspath(path), "metres": robot.metres, "size_abs": robot.size}
+    return {**named, "links": links, "warnings": [*robot.warnings]}
+
+
+def robot_text(facts: dict[str, Any]) -> str:
+    """Format the result of `describe_robot` as a few lines of text."""
+    links = facts["links"]
+    width = max((len(link["name"]) for link in links), default=0)
+    lines = [facts["file"], f"  size     {facts['size_abs'] * facts['metres']:.6g} m along the longest side, at rest"]
+    lines.append(f"  links    {len(links)} with collision meshes")
+    for link in links:
+        held = counted(len(link["meshes"]), "mesh", "meshes")
+        lines.append(f"    {link['name']:{width}}  {held:>9}  {link['triangles']} triangles")
+    lines += [f"  warning: {warning}" for warning in facts["warnings"]]
+    return "\n".join(lines) + "\n"
 
 
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:

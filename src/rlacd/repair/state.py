@@ -229,9 +229,9 @@ class State:
         openings = [hole for hole in self.holes if not hole.is_closed and is_thin[hole.body]]
         shells = len({hole.body for hole in openings})
         if shells:
-            became = "1 open body became a thin shell; --open solid fills it"
-            if shells > 1:
-                became = f"{shells} open bodies became thin shells; --open solid fills them"
+            became = "1 open body became a thin shell" if shells == 1 else f"{shells} open bodies became thin shells"
+            if self.wanted.open_bodies != "solid":
+                became += f"; --open solid fills {'it' if shells == 1 else 'them'}"
             self.warnings.append(f"{became} (open at {self._places(openings)}).")
 
     def _places(self, holes: list[Hole]) -> str:

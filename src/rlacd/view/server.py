@@ -38,6 +38,7 @@ from typing import Any
 from rlacd._version import __version__
 from rlacd.errors import OptionError, RlacdError, sentence_of
 from rlacd.io.read import READERS
+from rlacd.io.read.open_file import UPLOAD
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
@@ -143,7 +144,7 @@ class ViewServer(ThreadingHTTPServer):
     def open_mesh(self, name: str, content: bytes) -> None:
         """Replace the subject by an uploaded file, decomposed with the options accepted last, unless it is unusable."""
         with self._opening:
-            folder = tempfile.TemporaryDirectory(prefix="rlacd-view-", ignore_cleanup_errors=True)
+            folder = tempfile.TemporaryDirectory(prefix=UPLOAD, ignore_cleanup_errors=True)
             try:
                 path = Path(folder.name) / file_name(name)
                 path.write_bytes(content)
@@ -158,7 +159,7 @@ class ViewServer(ThreadingHTTPServer):
 
     def without_folders(self, said: str) -> str:
         """Name the mesh in a message by its file name alone."""
-        uploads = rf"{re.escape(tempfile.gettempdir())}.rlacd-view-\w+[/\\]"
+        uploads = rf"{re.escape(tempfile.gettempdir())}.{UPLOAD}\w+[/\\]"
         return re.sub(uploads, "", said.replace(str(self.subject.path), self.subject.path.name))
 
     def server_close(self) -> None:

@@ -16,6 +16,9 @@ from rlacd.errors import MeshFileError
 LARGEST_FILE = 2**30
 """Bytes of the largest file that is read. A binary STL of this length has 21 million triangles."""
 
+UPLOAD = "rlacd-view-"
+"""What the name of a folder begins with that holds nothing but a file that was uploaded to the viewer."""
+
 # Opening a pipe would wait for a writer; Windows has no such files, and would translate line ends.
 _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 

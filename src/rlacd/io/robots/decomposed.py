@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+import time
+import warnings
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from rlacd.clear import (
     CrowdedError,
     LinkPair,
     Motion,
+    Solids,
     Surface,
     at_rest,
     kept_clear,
@@ -24,11 +27,12 @@ from rlacd.clear import (
 )
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MeshError, MissingExtraError, OptionError
+from rlacd.errors import DecompositionWarning, MeshError, MissingExtraError, OptionError
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
 from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import LONGEST_SIDE, shown
 from rlacd.options.robots import RobotOptions
+from rlacd.run import Progress, ProgressCallback
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.poses import inverse, moved
@@ -37,6 +41,9 @@ from rlacd.solid.topology import used_points
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
+
+LINK = "link "
+"""What the stage of a report of progress begins with that names a link, before the reports of its meshes."""
 
 MOST_SAID = 5
 """Pairs that touch, each with a warning of its own."""
@@ -96,19 +103,22 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         An option is out of range, or a pattern of `links` matches none.
     """
     bodies, each = robot.bodies, options_of_bodies(robot, options, asked)
+    tell = _teller(len(bodies), options.get("progress"))
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
-    for body, own in zip(bodies, each, strict=True):
+    for number, (body, own) in enumerate(zip(bodies, each, strict=True)):
+        tell(LINK + body.name, number)
         for collider in body.colliders:
             if (key := (collider.key, own.get("threshold_abs"))) not in done:
                 done[key] = decomposed(body, collider, own)
             results[collider] = done[key]
-    if len(bodies) < 2:
+    if robot.is_alone:
         return Checked(results)
     if not all(result.report.complete for result in results.values()):
         return Checked(results, ["Links were not checked against each other: the work was stopped before."])
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
+        tell(LINK + bodies[number].name, number)
         again = results | _clear_of(obstacles, bodies[number], results, each[number])
         hulls = _moving(bodies[number], again).hulls
         if len(hulls) > most:
@@ -116,9 +126,10 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         results.update(again)
         return hulls
 
+    tell("clear", 0)
     try:
         motion, said = _motion(robot, asked.samples, options.get("seed") or 0)
-        cleared = kept_clear([_moving(body, results) for body in bodies], motion, redo)
+        cleared = kept_clear([*_links(bodies, results, motion)], motion, redo)
     except (MissingExtraError, CrowdedError) as error:
         if asked.exclude or asked.srdf:
             raise
@@ -127,6 +138,17 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
     ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in motion.warnings]
     return Checked(results, [*said, *ranges, *found[:MOST_SAID], *more], motion, cleared)
+
+
+def _teller(total: int, progress: ProgressCallback | None) -> Callable[[str, int], None]:
+    """What reports that so many bodies are done, and what comes next."""
+    began = time.perf_counter()
+
+    def tell(stage: str, done: int) -> None:
+        if progress is not None:
+            progress(Progress(stage, done, total, 0, time.perf_counter() - began))
+
+    return tell
 
 
 def _motion(robot: Robot, samples: int, seed: int) -> tuple[Motion, list[str]]:
@@ -173,7 +195,9 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any]) -> De
     """Decompose one collider of a body, with lengths that are larger than it cut to it."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
-        return decompose((mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DecompositionWarning)  # they are told of links, and once for all of a kind
+            return decompose((mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
@@ -192,6 +216,16 @@ def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> d
             length = max(length, least / unit * (1 + ROUNDING)) if body.is_world else length
             fitting[f"{name}_abs"] = min(length, most / unit * (1 - ROUNDING))
     return fitting
+
+
+def _links(bodies: Sequence[Body], results: Results, motion: Motion) -> Iterator[Moving]:
+    """Those with meshes, and then those that have primitives only."""
+    nothing = Surface(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32))
+    solids = motion.solids or [Solids()] * len(bodies)
+    for i, (name, own) in enumerate(zip(motion.links, solids, strict=True)):
+        moving = _moving(bodies[i], results) if i < len(bodies) else Moving(name, nothing)
+        replaced = sum(len(collider.meshes) for collider in bodies[i].colliders) if i < len(bodies) else 0
+        yield replace(moving, primitives=own.primitives, is_whole=own.meshes == replaced and not own.others)
 
 
 def _moving(body: Body, results: Results) -> Moving:

@@ -62,6 +62,13 @@ class Document(Robot):
 
     kind = ""
 
+    @property
+    def is_alone(self) -> bool:
+        """See `Robot`; bodies with primitives only count too."""
+        links = (each for each in self.root.walk() if each.tag in ("link", "body"))
+        count = sum(any(link.named("collision", "geom", "frame")) for link in links)
+        return not self.bodies or max(count, len(self.bodies)) < 2
+
     @abstractmethod
     def edits(
         self, place: Path, folder: Path, hulls: HullFiles, copies: Mapping[Path, str], said: list[str]

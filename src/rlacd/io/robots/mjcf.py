@@ -15,8 +15,9 @@ only visible one of its body; unless another geom shows the same mesh there, it 
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ import trimesh
 from rlacd.clear import LinkPair, Motion, mjcf_motion
 from rlacd.io.robots.document import Document, Files, HullFiles, opened, unused_stem
 from rlacd.io.robots.matrix import excludes
-from rlacd.io.robots.mjcf_model import FILES, Compiler, Defaults, mujoco_reads, read_model
+from rlacd.io.robots.mjcf_model import FILES, TURNED, Compiler, Defaults, mujoco_reads, read_model
 from rlacd.io.robots.poses import Angles, read_scale
 from rlacd.io.robots.robot import Body, Collider, MeshFile, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
@@ -41,7 +42,7 @@ NAMED_BY = {"geom1": None, "geom2": None, "objname": "objtype", "refname": "reft
 """Attributes that may name a geom, and those that then say so."""
 
 OWN = ("mesh", "mass", "density", "shellinertia", "rgba", "material")
-PLACED = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+PLACED = ("pos", *TURNED)
 """Attributes in which geoms that collide as one solid may differ."""
 
 LEAST_VOLUME = 1e-14
@@ -126,6 +127,7 @@ class Mjcf(Document):
         target = Path(os.path.relpath(folder.absolute(), there))
         taken = {*self.assets, *(str(e.attributes.get("name")) for e in self.root.walk() if e.tag == "geom")}
         names, edits = _hull_assets(self.found, self.meshes_of, hulls, target, {*taken})
+        of_geom: dict[str, list[str]] = {}
         for mesh in self.meshes_of.values():
             values = {"file": moved} if (moved := self.compiler.relocated(mesh.asset)) is not None else {}
             path = mesh.placed.file.path
@@ -142,7 +144,8 @@ class Mjcf(Document):
                 said.append(f'{path.name} has no volume, so its mesh got inertia="shell".{more}')
             edits += [mesh.asset.replaced(mesh.asset.with_attributes(values))] if values else []
         for collider, together in self.found.items():
-            edits += _geom_edits(together, names[collider], taken)
+            edits += _geom_edits(together, names[collider], taken, of_geom)
+        edits += _pair_edits(self.root, of_geom, {str(pair.attributes.get("name")) for pair in _pairs(self.root)})
         return edits + _relocations(self.compiler, edits, {mesh.asset for mesh in self.meshes_of.values()})
 
 
@@ -153,7 +156,9 @@ def read_mjcf(source: Path, files: Files, *, apart: bool) -> Mjcf:
     defaults = Defaults.of(root)
     assets = {_mesh_name(mesh, defaults): mesh for section in root.named("asset") for mesh in section.named("mesh")}
     warnings: list[str] = []
-    geoms = [geom for body in root.walk() if body.tag in BODIES for geom in _colliding(body, defaults, compiler)]
+    paired = {pair.attributes.get(end) for pair in _pairs(root) for end in ("geom1", "geom2")}
+    bodies_of = [each for each in root.walk() if each.tag in BODIES]
+    geoms = [geom for body in bodies_of for geom in _colliding(body, defaults, compiler, paired)]
     meshes: dict[str, _Mesh] = {}
     for name in dict.fromkeys(geom.mesh for geom in geoms):
         full = defaults.full(assets[name]) if name in assets else {}
@@ -241,12 +246,21 @@ def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) 
     return [element.replaced(element.with_attributes(values)) for element, values in moved.items()]
 
 
-def _geom_edits(geoms: Sequence[_Geom], meshes: Sequence[str], taken: set[str]) -> list[Edit]:
-    """Put a geom for each hull in the place of the first; all that stay no longer collide."""
+def _geom_edits(
+    geoms: Sequence[_Geom], meshes: Sequence[str], taken: set[str], of_geom: dict[str, list[str]]
+) -> list[Edit]:
+    """Put a geom for each hull in the place of the first; all that stay no longer collide.
+
+    The names of the hulls `of_geom`s that have names are added.
+    """
     edits = []
     for geom in geoms:
         pieces = [_kept(geom, taken)] if geom.is_kept else []
-        pieces += _hull_geoms(geom, meshes, taken) if geom is geoms[0] else []
+        if geom.name is not None:
+            of_geom[geom.name] = [
+                _unused(f"{geom.name}_{i:03d}", taken) if i else geom.name for i in range(len(meshes))
+            ]
+        pieces += _hull_geoms(geom, meshes, of_geom) if geom is geoms[0] else []
         element = geom.element
         edits.append(element.replaced(element.indent.join(pieces)) if pieces else element.removed())
     return edits
@@ -261,11 +275,32 @@ def _kept(geom: _Geom, taken: set[str]) -> bytes:
     return geom.element.with_attributes(values)
 
 
-def _hull_geoms(geom: _Geom, meshes: Sequence[str], taken: set[str]) -> Iterator[bytes]:
+def _pairs(root: Element) -> Iterator[Element]:
+    """The pairs of geoms that collide whatever their contact properties say."""
+    return (pair for section in root.named("contact") for pair in section.named("pair"))
+
+
+def _pair_edits(root: Element, of_geom: Mapping[str, Sequence[str]], taken: set[str]) -> list[Edit]:
+    """Put a pair for each hull, or for each two, in the place of one that names a geom."""
+    edits = []
+    for pair in _pairs(root):
+        ends = [pair.attributes.get(end, "") for end in ("geom1", "geom2")]
+        if not of_geom.keys().isdisjoint(ends):
+            copies = []
+            for i, named in enumerate(product(*(of_geom.get(end, [end]) for end in ends))):
+                values = dict(zip(("geom1", "geom2"), named, strict=True))
+                if i and "name" in pair.attributes:
+                    values["name"] = _unused(f"{pair.attributes['name']}_{i:03d}", taken)
+                copies.append(pair.with_attributes(values))
+            edits.append(pair.replaced(pair.indent.join(copies)))
+    return edits
+
+
+def _hull_geoms(geom: _Geom, meshes: Sequence[str], of_geom: Mapping[str, Sequence[str]]) -> Iterator[bytes]:
     for index, mesh in enumerate(meshes):
         values = {"mesh": mesh, "mass": "0"}
-        if geom.name is not None and index:  # the first keeps the name, since other elements may refer to it
-            values["name"] = _unused(f"{geom.name}_{index:03d}", taken)
+        if geom.name is not None:
+            values["name"] = of_geom[geom.name][index]
         if geom.is_seen:
             values["group"] = HIDDEN
         if "fluidshape" in geom.attributes and geom.is_kept:
@@ -295,19 +330,22 @@ def _unused(name: str, taken: set[str]) -> str:
     return name
 
 
-def _colliding(body: Element, defaults: Defaults, compiler: Compiler) -> Iterator[_Geom]:
+def _colliding(
+    body: Element, defaults: Defaults, compiler: Compiler, paired: Collection[str | None]
+) -> Iterator[_Geom]:
     """Yield the geoms of one body that collide as meshes."""
     childclass = next((e.attributes["childclass"] for e in body.up() if "childclass" in e.attributes), None)
     geoms = [(geom, defaults.full(geom, childclass)) for geom in body.named("geom")]
-    seen = {full.get("mesh") for _, full in geoms if not _collides(full)}
+    seen = {full.get("mesh") for _, full in geoms if not _collides(full, paired)}
     for geom, full in geoms:
-        if full.get("type") == "mesh" and "mesh" in full and _collides(full):
+        if full.get("type") == "mesh" and "mesh" in full and _collides(full, paired):
             is_seen = full.get("group", "0").strip() in SHOWN and full["mesh"] not in seen
             yield _Geom(geom, full, full["mesh"], is_seen, compiler.is_weighed(geom, full))
 
 
-def _collides(attributes: Mapping[str, str]) -> bool:
-    return any(attributes.get(name, "1").strip() != "0" for name in ("contype", "conaffinity"))
+def _collides(attributes: Mapping[str, str], paired: Collection[str | None]) -> bool:
+    flags = (attributes.get(name, "1").strip() for name in ("contype", "conaffinity"))
+    return attributes.get("name", "") in paired or any(flag != "0" for flag in flags)
 
 
 def _unplaced(asset: Element, full: Mapping[str, str], compiler: Compiler, files: Files) -> PlacedMesh:
@@ -328,7 +366,7 @@ def _caveats(root: Element, geoms: list[_Geom]) -> Iterator[str]:
         if any(element.tag == tag for element in root.walk()):
             yield f"What <{tag}> brings in is left unchanged: rewrite that file too."
     names = {geom.element.attributes.get("name") for geom in geoms} - {None}
-    for element in root.walk():
+    for element in (each for each in root.walk() if each.tag != "pair"):
         for attribute, kind in NAMED_BY.items():
             name = element.attributes.get(attribute)
             if name in names and (kind is None or element.attributes.get(kind) == "geom"):

@@ -26,6 +26,9 @@ FILES = (*STRIPPED, "include", "model")
 MOST_STL_FACES = 200_000
 """Triangles of the largest STL file that MuJoCo reads."""
 
+TURNED = frozenset(("quat", "axisangle", "xyaxes", "zaxis", "euler"))
+"""Ways to say how an element is turned: its own, or that of the innermost class that has one, replaces all others."""
+
 TOP = "main"
 
 
@@ -62,7 +65,8 @@ class Defaults:
             name = self.parents[name]
         merged: dict[str, str] = {}
         for attributes in (*reversed(chain), element.attributes):
-            merged.update(attributes)
+            kept = () if TURNED.isdisjoint(attributes) else TURNED
+            merged = {name: value for name, value in merged.items() if name not in kept} | attributes
         return merged
 
 

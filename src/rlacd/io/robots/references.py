@@ -2,7 +2,8 @@
 
 A description is untrusted. It may refer only to files in its own package (the nearest folder above it with a
 ``package.xml``, else the parent of its folder, since most keep meshes in ``../meshes``), in the packages it refers to,
-and in the folders the user allows. Links are followed: ROS workspaces consist of them.
+and in the folders the user allows. Links are followed: ROS workspaces consist of them. One that was uploaded to the
+viewer is alone in its folder, and refers to nothing above that.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from rlacd.errors import MeshFileError, OptionError
-from rlacd.io.read.open_file import read_file
+from rlacd.io.read.open_file import UPLOAD, read_file
 from rlacd.io.read.xml import parse_xml
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION
 
@@ -48,9 +49,11 @@ class References:
             self._allowed.append(place)
             if equals:
                 self._named[name] = place
-        self.root = next(
-            (folder for folder in self._robot.parents if (folder / "package.xml").is_file()), self._robot.parent.parent
-        )
+        self._above = [*self._robot.parents]
+        if self._robot.parent.name.startswith(UPLOAD):
+            self._above = [self._robot.parent]
+        package = (folder for folder in self._above if (folder / "package.xml").is_file())
+        self.root = next(package, self._above[:2][-1])
         self._allowed.append(self.root)
 
     def find(self, reference: str, folder: Path) -> Path:
@@ -105,7 +108,7 @@ class References:
 
     def _candidates(self, name: str) -> Iterator[Path]:
         """Candidate folders of a package, likeliest first: above the file, beside those folders, in ROS paths."""
-        for folder in self._robot.parents:
+        for folder in self._above:
             if folder.name == name or _package_name(folder) == name:
                 yield folder
             elif (folder / name / "package.xml").is_file() or folder.is_relative_to(self.root):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import inspect
 import os
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from rlacd.errors import MeshFileError, OptionError
+from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
 from rlacd.io.robots.decomposed import check_options, decomposed_robot
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
 from rlacd.io.robots.rewritten import Rewritten, rewritten
@@ -50,7 +51,7 @@ def rewrite_robot(
     keep_input : bool
         Of a USD stage, write one file that holds all of it, instead of a layer over the original.
     progress : callable, optional
-        As for `rlacd.decompose`.
+        As for `rlacd.decompose`; the `stage` ``link NAME`` comes before those of each link, `done` of `total`.
     **options
         Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
         the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
@@ -69,6 +70,11 @@ def rewrite_robot(
         An option is out of range, or `output` is not of the same kind as `robot`.
     OutputError
         The place cannot be written to.
+
+    Warns
+    -----
+    DecompositionWarning
+        What ``warnings`` of the result says, once a call.
     """
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     check_names("rewrite_robot", options, inspect.signature(rewrite_robot).parameters, ELSEWHERE)
@@ -80,7 +86,10 @@ def rewrite_robot(
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     began = time.perf_counter()
     description = read_robot(source, packages, apart=asked.per == "mesh")
-    return rewrite(description, place, options, asked, keep_input=keep_input, began=began)
+    done = rewrite(description, place, options, asked, keep_input=keep_input, began=began)
+    if done.warnings:
+        warnings.warn(f"{source.name}: {' '.join(done.warnings)}", DecompositionWarning, stacklevel=2)
+    return done
 
 
 def rewrite(
@@ -97,7 +106,7 @@ def rewrite(
     check_options(options)
     check_places(robot.source, place, asked, keep_input=keep_input)
     done = decomposed_robot(robot, options, asked)
-    pairs = done.pairs if done.samples or len(robot.bodies) < 2 else None
+    pairs = done.pairs if done.samples or robot.is_alone else None
     written = robot.write(place, done.results, pairs, asked, whole=keep_input)
     return rewritten(robot, done, place, written, began)
 

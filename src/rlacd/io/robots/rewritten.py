@@ -136,7 +136,10 @@ def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began:
 
 def warnings_of(robot: Robot, results: Results) -> list[str]:
     """What the reports of all solids warn of; the worst lost the widest passage, or has hulls that reach farthest."""
-    solids = {id(result): (collider.name, result) for collider, result in results.items()}
+    solids: dict[int, tuple[str, Decomposition]] = {}
+    for body in robot.bodies:
+        for collider in body.colliders:
+            solids.setdefault(id(results[collider]), (body.name, results[collider]))
     each = [(name, result, said) for name, result in solids.values() for said in result.report.warnings]
     others = [one for one in each if " parts exceed the " not in one[2] or not _too_far(one[1])]
     said = grouped([(name, said, _widest(r) if "passage" in said else _reach(r) or 0.0) for name, r, said in others])

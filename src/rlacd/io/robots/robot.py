@@ -163,6 +163,11 @@ class Robot(ABC):
         `pairs` are what each two bodies do; None if that is not known.
         """
 
+    @property
+    def is_alone(self) -> bool:
+        """Whether at most one of its bodies collides."""
+        return len(self.bodies) < 2
+
     def meshes(self, poses: Sequence[FloatArray] | None = None) -> list[trimesh.Trimesh]:
         """The meshes of its bodies where poses put them, by default at rest."""
         where = [body.pose for body in self.bodies] if poses is None else poses

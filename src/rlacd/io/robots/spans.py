@@ -138,6 +138,8 @@ def parse(path: Path, data: bytes, depth: int = 0) -> Element:
         builder.parser.Parse(data, True)
     except expat.ExpatError as error:
         raise MeshFileError(f"{path} is not well-formed XML ({error}): correct it first.") from error
+    except MeshFileError:
+        raise
     except (LookupError, ValueError) as error:
         raise MeshFileError(f"{path} is in an unknown encoding ({error}): save it as UTF-8.") from error
     return builder.top[0]

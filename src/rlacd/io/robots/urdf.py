@@ -105,7 +105,17 @@ def read_urdf(source: Path, files: Files, *, apart: bool) -> Urdf:
     others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced]
     names = [each.attributes.get("filename", "") for each in others]
     relative = [name for name in names if name and "://" not in name and not name.startswith("/")]
-    return Urdf(source, bodies, [], 1.0, "z", root, files.references, relative, found)
+    return Urdf(source, bodies, _of_mass(root, bodies), 1.0, "z", root, files.references, relative, found)
+
+
+def _of_mass(root: Element, bodies: Sequence[Body]) -> list[str]:
+    """What to say of links whose mass is for a simulator to find from their collision geometry."""
+    stated = {link.attributes.get("name") for link in root.named("link") if any(link.named("inertial"))}
+    light = [body.name for body in bodies if body.name not in stated]
+    if not light:
+        return []
+    some = f"The link {light[0]} has" if len(light) == 1 else f"{len(light)} links, such as {light[0]}, have"
+    return [f"{some} no <inertial>: MuJoCo takes the mass from the hulls, which differs from that of the meshes."]
 
 
 def _collision(element: Element, link: Element, files: Files) -> _Collision | None:
@@ -129,10 +139,13 @@ def _origin(element: Element, where: str) -> FloatArray:
 def _link_poses(root: Element) -> dict[str, FloatArray]:
     """Where links stand with all joints at zero; those that no joint carries stand at the origin."""
     tree = networkx.DiGraph()
+    names = {link.attributes.get("name") for link in root.named("link")}
     for joint in root.named("joint"):
         ends = {end.tag: end.attributes.get("link", "") for end in joint.named("parent", "child")}
+        where = f"joint {joint.attributes.get('name', '?')} of {root.file.path}"
+        if lost := sorted({*ends.values()} - names):
+            raise MeshFileError(f"the {where} names the link {lost[0]}, which is not in the file: correct the name.")
         if len(ends) == 2 and not (ends["child"] in tree and tree.in_degree(ends["child"])):
-            where = f"joint {joint.attributes.get('name', '?')} of {root.file.path}"
             tree.add_edge(ends["parent"], ends["child"], origin=_origin(joint, where))
     if not networkx.is_directed_acyclic_graph(tree):
         (link, _), *_ = networkx.find_cycle(tree)

@@ -67,8 +67,8 @@ def shown(robot: Robot, done: Checked, warnings: Sequence[str], seconds: float) 
     """Show a robot with at least one link that has hulls."""
     names = [body.name for body in robot.bodies]
     motion = done.motion or at_rest(names, (), [body.pose for body in robot.bodies])
-    meshes, hulls, link_of = robot.meshes(motion.poses[0]), list[trimesh.Trimesh](), list[int]()
-    for number, (body, pose) in enumerate(zip(robot.bodies, motion.poses[0], strict=True)):
+    meshes, hulls, link_of = robot.meshes([*motion.poses[0, : len(names)]]), list[trimesh.Trimesh](), list[int]()
+    for number, (body, pose) in enumerate(zip(robot.bodies, motion.poses[0], strict=False)):
         own = [turned(pose, hull) for hull in body.hulls(done.results)]
         hulls += own
         link_of += [number] * len(own)
@@ -80,7 +80,14 @@ def shown(robot: Robot, done: Checked, warnings: Sequence[str], seconds: float) 
     named = replace(report, name=robot.source.stem, up=robot.up, metres=robot.metres, warnings=tuple(warnings))
     report = replace(named, options=options, seconds={"total": seconds})
     touching = None if done.cleared is None else partial(_contacts, robot, done.cleared, motion)
-    moves = motion.joints, len(motion.sampled), motion.carried, _places(robot, done, motion), done.samples, touching
+    moves = (
+        motion.joints,
+        len(motion.sampled),
+        motion.carried[: len(names)],
+        _places(robot, done, motion),
+        done.samples,
+        touching,
+    )
     whole = _whole(robot, meshes, warnings)
     source = trimesh.Trimesh(whole.vertices, whole.faces, process=False)
     return RobotResult(hulls, report, source, None, whole, names, meshes, link_of, *moves)
@@ -96,7 +103,8 @@ def _contacts(robot: Robot, cleared: Cleared, motion: Motion, values: list[float
     """The links that touch at joint positions: all, but those that a joint connects and whose meshes touch."""
     with _ONE:
         found = check(cleared.bodies, motion.at(values))
-    order = sorted(found, key=lambda pair: (-found[pair].depth, pair))
+    shown = (pair for pair in found if max(pair) < len(robot.bodies))
+    order = sorted(shown, key=lambda pair: (-found[pair].depth, pair))
     told = [pair for pair in order if found[pair].depth or pair not in motion.adjacent]
     return [Contact(*pair, _deep(robot, found[pair].depth)) for pair in told]
 
@@ -112,7 +120,7 @@ def _places(robot: Robot, done: Checked, motion: Motion) -> list[Place]:
     worst = []
     for pair, what in done.cleared.touching.items():
         sample = what.offences[0].sample if what.offences else int(what.hulls.argmax())
-        if what.depth or pair not in motion.adjacent:
+        if max(pair) < len(robot.bodies) and (what.depth or pair not in motion.adjacent):
             first, second = (robot.bodies[i].name for i in pair)
             share = f"at {100 * what.hulls.mean():.3g} % of the positions"
             said = f"{first} and {second}: {share}, here {_deep(robot, what.depth)}"
