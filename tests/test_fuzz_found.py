@@ -33,15 +33,36 @@ def test_surfaces_of_any_size_can_be_asked_for_closest_points(unit: float) -> No
     assert ((on >= 0) & (on < 80)).all()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("count", "step"), [(12, "slab"), (60, "wrapped")])
-def test_sheets_that_all_cross_are_wrapped_when_they_are_many(count: int, step: str) -> None:
+@pytest.mark.parametrize(("count", "is_apart"), [(4, False), (60, True)])
+def test_sheets_that_all_cross_are_not_united_when_they_are_many(count: int, is_apart: bool) -> None:
     random = np.random.default_rng(0)
     corners = random.normal(size=(count, 2, 3))
     vertices = np.concatenate([corners, -corners.sum(axis=1, keepdims=True)], axis=1).reshape(-1, 3)  # around 0
     solid = repair(load_mesh((vertices, np.arange(3 * count).reshape(-1, 3))), threads=1)
-    assert {body.step for body in solid.bodies} == {step}
+    assert {body.step for body in solid.bodies} == {"slab"}
+    assert solid.is_apart is is_apart
     assert solid.manifold.volume() > 0
+    assert sum("cross too often" in said for said in solid.warnings) == is_apart
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [50, 200])
+@pytest.mark.promise("covered")
+def test_a_soup_of_triangles_takes_at_most_a_hull_a_face_and_none_is_uncovered(count: int) -> None:
+    """United, 50 of them become 47,000 triangles and 272 hulls."""
+    vertices = np.random.default_rng(0).random((300, 3))
+    faces = np.random.default_rng(1).integers(0, 300, (count, 3))
+    result = rlacd.decompose(vertices, faces, threads=1)
+    assert 0 < len(result) <= count
+    assert any("cross too often" in said for said in result.report.warnings)
+    proper = faces[(np.diff(np.sort(faces), axis=1) > 0).all(axis=1)]
+    points = np.random.default_rng(2).dirichlet(np.ones(3), (len(proper), 20)) @ vertices[proper]
+    outside = np.full(points.shape[:2], np.inf)
+    for hull in result:
+        heights = np.einsum("fpd,kd->fpk", points, hull.face_normals)
+        heights -= (hull.face_normals * hull.triangles[:, 0]).sum(axis=1)
+        outside = np.minimum(outside, heights.max(axis=2))
+    assert outside.max() < 1e-6
 
 
 def test_sheets_narrower_than_they_become_thick_are_not_built_inside_out() -> None:

@@ -35,7 +35,7 @@ struct Sample {
   std::int32_t witness = -1;
 };
 
-struct Cell {
+struct SubTriangle {
   Corners corner;
   std::array<Sample, 3> sample;
   double upper = std::numeric_limits<double>::infinity();
@@ -72,7 +72,7 @@ inline double best_mixture(const std::array<double, 3>& a, const std::array<doub
 }
 
 template <class Field>
-double upper_bound(const Field& field, const Cell& cell) {
+double upper_bound(const Field& field, const SubTriangle& cell) {
   std::array<double, 3> row[3];
   std::int32_t known[3];
   int rows = 0;
@@ -91,11 +91,11 @@ double upper_bound(const Field& field, const Cell& cell) {
 
 // The two halves of a cell, cut at the middle of its longest edge; corner 0 of both is the new point.
 template <class Field>
-std::array<Cell, 2> bisect(const Field& field, const Cell& cell, double enough) {
+std::array<SubTriangle, 2> bisect(const Field& field, const SubTriangle& cell, double enough) {
   const int from = longest_side(cell.corner), to = (from + 1) % 3, across = (from + 2) % 3;
   const Vec3 middle = 0.5 * (cell.corner[from] + cell.corner[to]);
   const Sample sample = field.at(middle, cell.sample[from].witness, enough);
-  std::array<Cell, 2> halves;
+  std::array<SubTriangle, 2> halves;
   for (int side = 0; side < 2; ++side) {
     const int kept = side == 0 ? from : to;
     halves[side].corner = {middle, cell.corner[across], cell.corner[kept]};
@@ -141,15 +141,15 @@ Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int th
     if (found.lower > goal.fail) return found;
   }
 
-  std::vector<Cell> cells(mesh.faces.size()), halves;
+  std::vector<SubTriangle> cells(mesh.faces.size()), halves;
   for_each(cells.size(), [&](std::size_t f) {
     cells[f].corner = corners_of(mesh, mesh.faces[f]);
     for (int i = 0; i < 3; ++i) cells[f].sample[i] = at_vertex[mesh.faces[f][i]];
     cells[f].upper = upper_bound(field, cells[f]);
   });
 
-  const auto drop = [&](std::vector<Cell>& open) {
-    const auto settled = [&](const Cell& cell) {
+  const auto drop = [&](std::vector<SubTriangle>& open) {
+    const auto settled = [&](const SubTriangle& cell) {
       if (cell.upper > std::max(goal.pass, found.lower + goal.tolerance)) return false;
       dropped = std::max(dropped, cell.upper);
       return true;
@@ -171,7 +171,7 @@ Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int th
     drop(cells);
   }
   found.upper = std::max(found.lower, dropped);
-  for (const Cell& cell : cells) found.upper = std::max(found.upper, cell.upper);
+  for (const SubTriangle& cell : cells) found.upper = std::max(found.upper, cell.upper);
   return found;
 }
 

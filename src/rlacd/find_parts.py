@@ -256,7 +256,7 @@ class _Decomposer:
         if run.stopped_by is not None:
             return states, None
         try:
-            if options.quality == FAST or len(parts) > most:
+            if options.quality == FAST or len(parts) > most or self.solid.is_apart:
                 if goes_on:
                     with run.stage("merge"), run.limited(run.work.done):
                         states = [parts := grow_cover(parts, goal, run, root)]

@@ -148,6 +148,29 @@ def test_nodes_apart_share_the_threshold_of_the_scene() -> None:
     assert [hull.metadata["node"] for hull in tight].count("handle") == 2
 
 
+def boxes(*bounds: tuple[tuple[int, ...], tuple[int, ...]]) -> trimesh.Trimesh:
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=box) for box in bounds])
+
+
+@pytest.mark.promise("per-node")
+def test_no_hull_spans_nodes_that_interlock() -> None:
+    """A socket that a tongue fills: each touches the other along five faces, and both together are one block."""
+    socket = [((0, 0, 0), (3, 1, 1)), ((0, 0, 0), (1, 3, 1)), ((2, 0, 0), (3, 3, 1))]
+    tongue = [((1, 1, 0), (2, 4, 1)), ((0, 3, 0), (3, 4, 1))]
+    nodes, scene = {"socket": np.array(socket), "tongue": np.array(tongue)}, trimesh.Scene()
+    scene.add_geometry(boxes(*socket), node_name="socket")
+    scene.add_geometry(boxes(*tongue), node_name="tongue")
+    assert len(rlacd.decompose(scene, threads=1)) == 1
+    result = rlacd.decompose(scene, per_node=True, threads=1)
+    assert sorted(hull.metadata["node"] for hull in result) == ["socket"] * 3 + ["tongue"] * 2
+    random = np.random.default_rng(0)
+    for hull in result:
+        inside = random.dirichlet(np.full(len(hull.vertices), 0.2), 500) @ hull.vertices
+        lower, upper = nodes[hull.metadata["node"]].swapaxes(0, 1)[:, :, None]
+        outside = np.maximum(np.maximum(lower - inside, inside - upper), 0)
+        assert np.linalg.norm(outside, axis=2).min(axis=0).max() < 0.1  # a hull of both reaches 0.5 into the other
+
+
 def test_nodes_apart_cannot_have_a_navigable_space() -> None:
     with pytest.raises(OptionError, match="per_node"):
         rlacd.decompose(trimesh.creation.box(), per_node=True, criterion=rlacd.NavigableSpace(radius=0.1))

@@ -209,10 +209,21 @@ ODD = {
 def test_odd_faces_give_as_many_triangles_as_a_fan(outline) -> None:
     points, polygons = prism(outline)
     counts = np.array([len(p) for p in polygons])
-    found = triangles_of(points, counts, np.concatenate(polygons))
+    with np.errstate(invalid="raise", over="raise"):  # only finite polygons are taken apart
+        found = triangles_of(points, counts, np.concatenate(polygons))
     assert len(found) == (counts - 2).clip(0).sum()
     owner = np.repeat(np.arange(len(polygons)), (counts - 2).clip(0))
     assert all(set(face) <= set(polygons[i]) for face, i in zip(found.tolist(), owner.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("sides", [5, 7, 9])
+def test_a_face_that_crosses_itself_stays_a_fan(sides) -> None:
+    """Any other triangles fold over as well."""
+    turn = 4 * np.pi * np.arange(sides) / sides
+    points = np.c_[np.cos(turn), np.sin(turn), np.zeros(sides)]
+    points[1] *= 1.5
+    fan = [[0, i, i + 1] for i in range(1, sides - 1)]
+    assert triangles_of(points, np.array([sides]), np.arange(sides)).tolist() == fan
 
 
 @pytest.mark.parametrize("order", ["", "<", ">"])

@@ -32,6 +32,8 @@ from rlacd.repair.wraps import (
     fill_voids,
     is_crowd,
     is_inside_out,
+    is_thicket,
+    keep_apart,
     may_have_slits,
     may_have_voids,
     rebuild_tangles,
@@ -68,8 +70,8 @@ def _is_nothing(state: State) -> bool:
     return state.volume == 0
 
 
-def _is_something(state: State) -> bool:
-    return not _is_nothing(state)
+def _may_have_lost(state: State) -> bool:
+    return not (_is_nothing(state) or state.is_apart)
 
 
 def _take_hull(state: State) -> None:
@@ -101,6 +103,7 @@ STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
     (_are_crowded, _sort_out),
     (may_have_holes, close_holes),
     (_always, build_walls),
+    (is_thicket, keep_apart),
     (is_crowd, wrap_sheets),
     (has_sheets, build_slabs),
     (_always, State.unite_parts),
@@ -111,7 +114,7 @@ STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
 """Conditions and actions of a repair, in their order."""
 
 AT_LAST: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
-    (_is_something, _keep_lost),
+    (_may_have_lost, _keep_lost),
     (_is_nothing, _take_hull),
 )
 """The last ones, also where bodies cross too often to be united."""

@@ -104,6 +104,8 @@ class State:
         Filled cavities that windings bound.
     by_hidden_caps, is_tangled : bool [bodies]
         Whether a body was capped only because nothing can reach the caps; whether it was built without its windings.
+    is_apart : bool
+        Whether the sheets were not united.
     holes : list of Hole
     warnings : list of str
     """
@@ -126,6 +128,7 @@ class State:
         self.solid: Shape = Manifold()
         self.cavities = Cavities()
         self.by_hidden_caps, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
+        self.is_apart = False
         self.holes: list[Hole] = []
         self.warnings: list[str] = []
         self._asked: tuple[Shape, SurfaceQuery] | None = None
@@ -199,6 +202,7 @@ class State:
             (*warnings, *self.warnings),
             holes=tuple(self.holes),
             body_of=self.body_of_input,
+            is_apart=self.is_apart,
             index=self.surface.index,
             pieces=[part.shape for part in self.parts] if len(self.parts) > 1 and not self.wanted.keep_cavities else [],
             cavity_walls=self.cavities.walls,

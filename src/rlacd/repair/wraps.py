@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import Manifold
 
+from rlacd import _native
 from rlacd._native import poll_stop
 from rlacd.repair.distance import (
     SurfaceQuery,
@@ -15,12 +16,23 @@ from rlacd.repair.distance import (
 )
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import Cavities, area_of, as_manifold, size_of, slab_of_faces, tunnels_in, unite, volume_of
+from rlacd.repair.union import (
+    Cavities,
+    area_of,
+    as_manifold,
+    hull_of_points,
+    size_of,
+    slab_of_faces,
+    tunnels_in,
+    unite,
+    volume_of,
+)
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import BoolArray, Int64Array
-from rlacd.solid.component import DENSE
+from rlacd.solid.component import DENSE, concatenated
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.solid import surface_of
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
 # Least share of the solid's volume of a void of an outer skin that is filled, and greatest of slits: voids in furniture
@@ -35,9 +47,31 @@ _TUNNELS = 25
 # Where a filled void has twice the triangles, at least 1 - 2 ** -0.05 of the surface has to be gone. Of 30 meshes of
 # the corpus with filled voids, those that meet this have 0.73 of the hulls without filling, the others 1.04.
 _TRIANGLES = 0.05
+# Pairs of faces of different sheets that touch, for each face, above which no two faces are united.
+_PAIRS_A_FACE = 4
 # More sheets than this are not united one by one: that would take seconds, and cutting the result even longer. Neither
 # are fewer sheets that all cross each other: 40 have 780 crossings (a second or two), 80 have 3,160 (ten seconds).
 _CROWD, _CROSSINGS = 300, 1000
+
+
+def is_thicket(state: State) -> bool:
+    """Whether all is sheets that cross so often that their union would be cut into many more pieces than faces."""
+    sheets = state.sheets
+    most = _PAIRS_A_FACE * len(sheets.faces)
+    if most == 0 or state.parts:
+        return False
+    return _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] > most
+
+
+def keep_apart(state: State) -> None:
+    """Make every face of sheets a slab, and unite none."""
+    sheets = state.sheets
+    slabs = [surface_of(hull_of_points(sheets.vertices[face])) for face in sheets.faces]
+    state.parts = [Piece(concatenated(slabs), int(sheets.body.min()), is_slab=True)]
+    state.sheets = no_faces(sheets.vertices)
+    state.is_apart = True
+    state.beyond[:] = HALF_THICKNESS
+    state.warnings.append("The sheets cross too often to be united: each face is a slab of its own.")
 
 
 def is_crowd(state: State) -> bool:
@@ -180,7 +214,7 @@ def fill_slits(state: State) -> None:
 
 def _may_fill(state: State) -> bool:
     """Whether what nothing can reach may become solid."""
-    fills = state.wanted.open_bodies != "thin" and not state.wanted.keep_cavities
+    fills = state.wanted.open_bodies != "thin" and not state.wanted.keep_cavities and not state.is_apart
     return fills and state.volume != 0 and len(state.parts) <= MOST_UNITED  # more of them overlap each other
 
 

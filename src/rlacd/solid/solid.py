@@ -77,6 +77,8 @@ class Solid:
         ``[F]``, the body of each face of the surface; None if the solid did not go through the steps.
     is_as_given
         Whether the shape is the surface, in another order.
+    is_apart
+        Whether the shape is a slab for each face, which overlap: sheets cross too often to be united.
     index
         The surface, ready for queries, if repair made any.
     pieces
@@ -98,6 +100,7 @@ class Solid:
     holes: tuple[Hole, ...] = ()
     body_of: NDArray[np.int64] | None = None
     is_as_given: bool = False
+    is_apart: bool = False
     index: Surface | None = None
     pieces: list[Shape] = field(default_factory=list)
     left_out: FloatArray = field(default_factory=no_points)

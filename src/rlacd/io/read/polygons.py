@@ -64,8 +64,8 @@ def _folded(points: FloatArray, fans: Int64Array, owner: Int64Array, polygons: i
 
 
 def triangles_within(ring: FloatArray) -> Int64Array | None:
-    """Triangles ``[N - 2, 3]`` of one polygon ``[N, 3]`` that do not fold over; None if there are none."""
-    if len(ring) > MOST_CORNERS or not np.isfinite(ring).all():
+    """Triangles ``[N - 2, 3]`` of one polygon ``[N, 3]``, finite, that do not fold over; None if there are none."""
+    if len(ring) > MOST_CORNERS:
         return None
     ring = ring - ring.mean(axis=0)
     normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
