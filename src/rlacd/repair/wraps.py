@@ -58,7 +58,7 @@ def is_thicket(state: State) -> bool:
     """Whether all is sheets that cross so often that their union would be cut into many more pieces than faces."""
     sheets = state.sheets
     most = _PAIRS_A_FACE * len(sheets.faces)
-    if most == 0 or state.parts:
+    if state.parts or not 0 < len(sheets.faces) <= _CROWD:
         return False
     return _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] > most
 
