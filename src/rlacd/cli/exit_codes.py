@@ -13,6 +13,7 @@ from typing import NoReturn
 import click
 
 from rlacd.errors import OutputError, RlacdError, sentence_of
+from rlacd.options.keywords import meant
 
 
 class ExitCode(IntEnum):
@@ -47,8 +48,12 @@ def exit_codes() -> Iterator[None]:
     """Turn every error into one sentence on stderr and an exit code; RLACD_DEBUG=1 lets the traceback through."""
     try:
         yield
-    except (click.ClickException, click.exceptions.Exit):
+    except click.exceptions.Exit:
         raise  # click's own
+    except click.ClickException as error:
+        if isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):  # the help is its message
+            raise
+        _fail(_told(error), ExitCode.BAD_INPUT)
     except KeyboardInterrupt:
         _fail(INTERRUPTED, ExitCode.INTERRUPTED)
     except BrokenPipeError:
@@ -102,6 +107,16 @@ def leave(code: int) -> NoReturn:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             stream.flush()
     os._exit(code)
+
+
+def _told(error: click.ClickException) -> str:
+    """Say in one sentence which word click does not take, and which one was meant."""
+    said, hint = error.format_message().rstrip("."), ""
+    if isinstance(error, click.NoSuchOption):
+        said, hint = f"there is no option {error.option_name}", meant(error.option_name, error.possibilities or ())
+    if not hint and isinstance(error, click.UsageError) and error.ctx is not None:
+        hint = f"; {error.ctx.command_path} --help shows what it takes"
+    return f"{said[0].lower()}{said[1:]}{hint}"
 
 
 def _fail(message: object, code: ExitCode) -> None:
