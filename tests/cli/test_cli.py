@@ -332,18 +332,19 @@ def test_debugging_lets_the_traceback_through(mesh: Path, stand_in: StandIn, mon
     assert isinstance(rlacd("decompose", mesh).exception, RuntimeError)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(("times", "code"), [(1, 4), (2, 130)])
 @pytest.mark.promise("ctrl-c")
 def test_ctrl_c_once_writes_what_is_reached_and_twice_quits_and_writes_nothing(
-    mesh: Path, stand_in: StandIn, times: int, code: int
+    mesh: Path, stand_in: StandIn, times: int, code: int, number: int
 ) -> None:
-    stand_in.during = lambda: list(map(signal.raise_signal, [signal.SIGINT] * times))
-    before = signal.getsignal(signal.SIGINT)
+    stand_in.during = lambda: list(map(signal.raise_signal, [number] * times))
+    before = signal.getsignal(number)
     run = rlacd("decompose", mesh)
     assert run.exit_code == code
     assert ("stopped by Ctrl-C" in run.stderr) == (times == 1)
     assert mesh.with_name("ell_hulls.glb").exists() == (times == 1)
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(number) is before
 
 
 def test_help_names_every_exit_code_and_version_is_printed() -> None:
@@ -396,7 +397,7 @@ import signal, sys
 class Early:
     def find_spec(self, name, *_):
         if name == {name!r}:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.{sent})
 
 sys.meta_path.insert(0, Early())
 from rlacd.__main__ import main
@@ -406,9 +407,10 @@ main()
 
 
 @pytest.mark.parametrize("name", ["rlacd.cli.main", "click", "rlacd.cli.decompose", "trimesh.base"])
+@pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM"])
 @pytest.mark.promise("exit-codes")
-def test_ctrl_c_before_the_work_is_one_sentence(mesh: Path, name: str) -> None:
-    command = [sys.executable, "-c", EARLY.format(name=name), "decompose", str(mesh)]
+def test_ctrl_c_before_the_work_is_one_sentence(mesh: Path, name: str, sent: str) -> None:
+    command = [sys.executable, "-c", EARLY.format(name=name, sent=sent), "decompose", str(mesh)]
     run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert (run.returncode, run.stdout) == (130, "")
     assert run.stderr == "rlacd: interrupted; no file is left half-written.\n"

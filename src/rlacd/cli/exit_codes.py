@@ -22,7 +22,7 @@ class ExitCode(IntEnum):
     1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
     2    bad input or option; no meshes
     3    the output cannot be written
-    4    stopped early by --timeout or Ctrl-C; what was written is valid
+    4    stopped early by --timeout, Ctrl-C or SIGTERM; what was written is valid
     5    batch only: some meshes failed or were given their convex hull
     130  interrupted at once; no file is left half-written
     """
