@@ -119,6 +119,8 @@ def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
         raise SystemExit(ExitCode.STOPPED_EARLY)
     if summary.failures:
         raise SystemExit(ExitCode.SOME_FAILED)
+    if summary.uncovered:
+        raise SystemExit(ExitCode.UNCOVERED)
 
 
 _OWN = [*options_of(BatchOptions), *options_of(PoolOptions), *options_of(OutputOptions, only=(*WRITTEN, "quiet"))]

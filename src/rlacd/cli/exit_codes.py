@@ -24,6 +24,7 @@ class ExitCode(IntEnum):
     3    the output cannot be written
     4    stopped early by --timeout, Ctrl-C or SIGTERM; what was written is valid
     5    batch only: some meshes failed or were given their convex hull
+    6    batch only: hulls of some meshes miss some of the surface
     130  interrupted at once; no file is left half-written
     """
 
@@ -33,6 +34,7 @@ class ExitCode(IntEnum):
     CANNOT_WRITE = 3
     STOPPED_EARLY = 4
     SOME_FAILED = 5
+    UNCOVERED = 6
     INTERRUPTED = 130
 
 
