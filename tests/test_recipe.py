@@ -43,7 +43,7 @@ def test_a_report_is_the_recipe_of_its_run(given: dict[str, Any], tmp_path: Path
     assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "first.ply").read_bytes()
 
 
-def test_options_override_those_of_a_report_and_no_report_is_refused(tmp_path: Path) -> None:
+def test_options_override_those_of_a_report(tmp_path: Path) -> None:
     trimesh.creation.box().export(tmp_path / "box.obj")
     report, words = tmp_path / "report.json", ["decompose", str(tmp_path / "box.obj"), "-o", str(tmp_path / "box.ply")]
     report.write_text(json.dumps({"options": {"threshold_abs": 0.1, "seed": 3}}))
@@ -51,10 +51,34 @@ def test_options_override_those_of_a_report_and_no_report_is_refused(tmp_path: P
     assert run.exit_code == 0, run.stderr
     options = json.loads(run.stdout)["options"]
     assert (options["threshold"], options.get("threshold_abs"), options["seed"]) == (0.2, None, 3)
-    report.write_text("[]")
-    run = CliRunner().invoke(app, [*words, "--like", str(report)])
-    assert run.exit_code == 2
-    assert "is no report of a decomposition" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[]", "is no report of a decomposition"),
+        ("[" * 200_000, "is no report of a decomposition"),
+        ("{}", "is no report of a decomposition"),
+        ('{"options": [[{}, 1]]}', "is no report of a decomposition"),
+        ('{"options": {"threshold": 0.05, "later": 1}}', f"rlacd {rlacd.__version__} does not know: 'later'"),
+        ('{"options": [["a", 1], [2, 3]]}', "does not know: 'a'"),
+        ('{"options": {"mesh": "a.obj"}}', "does not know: 'mesh'"),
+        ('{"version": "99.0.0", "options": {}}', f"of rlacd '99.0.0'; this is {rlacd.__version__}, so install that"),
+        ('{"version": "two", "options": {}}', "of rlacd 'two'"),
+        ('{"version": null, "options": {}}', "of rlacd 'None'"),
+        ('{"options": {"threshold": [[[]]]}}', "threshold is [[[]]]; it has to be a number"),
+        ('{"options": {"criterion": {"depth": 1}}}', "criterion is {'depth': 1}; it has to be"),
+    ],
+)
+@pytest.mark.parametrize("command", ["decompose", "batch"])
+def test_json_of_others_is_told_in_one_sentence(command: str, text: str, says: str, tmp_path: Path) -> None:
+    trimesh.creation.box().export(tmp_path / "box.obj")
+    (tmp_path / "other.json").write_text(text)
+    mesh, out = (tmp_path / "box.obj", "box.ply") if command == "decompose" else (tmp_path, "out")
+    words = [command, str(mesh), "-o", str(tmp_path / out), "--like", str(tmp_path / "other.json")]
+    run = CliRunner().invoke(app, words)
+    assert (run.exit_code, len(run.stderr.splitlines())) == (2, 1), run.stderr
+    assert says in run.stderr
 
 
 def test_what_the_report_warns_of_is_a_python_warning_too(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 #include "core/interrupts.hpp"
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -16,12 +17,14 @@ constexpr int kQuit = 2;  // the first interrupt asks for the result so far
 
 std::atomic<int> interrupts{0};  // written by the handler, so it must not need a lock
 static_assert(std::atomic<int>::is_always_lock_free);
-Handler others = SIG_DFL;
+constexpr std::array<int, 2> kSignals{SIGINT, SIGTERM};
+std::array<Handler, 2> others{SIG_DFL, SIG_DFL};
 
 void count(int number) {
-  std::signal(SIGINT, count);  // some systems forget it
+  std::signal(number, count);  // some systems forget it
   if (interrupts < kQuit) ++interrupts;
-  if (others != SIG_DFL && others != SIG_IGN) others(number);
+  const Handler other = others[number == SIGINT ? 0 : 1];
+  if (other != SIG_DFL && other != SIG_IGN) other(number);
 }
 
 std::atomic<int> latest{0};  // of the watchers, which end once there is another number
@@ -40,12 +43,14 @@ void count_interrupts(int code, double grace) {
   forget_interrupts();
   interrupts = 0;
   std::thread(watch, ++latest, code, grace).detach();
-  others = std::signal(SIGINT, count);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) others[i] = std::signal(kSignals[i], count);
 }
 
 void forget_interrupts() {
-  if (others != SIG_DFL) std::signal(SIGINT, others);
-  others = SIG_DFL;
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    if (others[i] != SIG_DFL) std::signal(kSignals[i], others[i]);
+    others[i] = SIG_DFL;
+  }
   ++latest;
 }
 

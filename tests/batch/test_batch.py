@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ import pytest
 import trimesh
 from click.testing import CliRunner, Result
 
-from rlacd.batch import find_assets
+from rlacd.batch import Summary, find_assets
+from rlacd.batch.mesh import _status
+from rlacd.cli.batch_screen import summary_lines
 from rlacd.cli.main import app
 from rlacd.io.read import READERS as FORMATS
 from tests.batch.trouble import make_trouble, tree, write_ell
@@ -255,6 +258,20 @@ def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[s
 
 
 # --- trouble ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
+    missing = {"hausdorff": {"under": 0.37}, "warnings": ["Some lies 0.37 outside: repair dropped it."]}
+    assert [_status(report) for report in ({"warnings": ["a"]}, missing, {"warnings": []})] == [
+        *("warned", "uncovered", "done")
+    ]
+    row = {"mesh": "spoon.obj", "status": "uncovered", **missing}
+    status = Counter({"done": 27, "warned": 12, "uncovered": 1})
+    summary = Summary(40, status=status, uncovered=[row], warnings=Counter({"Some lies … outside": 13}))
+    said = "\n".join(summary_lines(summary, "out"))
+    assert "out: 40 of 40 meshes are done, 12 warned, 1 uncovered\n" in said
+    assert "spoon.obj: hulls miss its surface by up to 0.37 (longest side = 2)" in said
+    assert "13 x warning: Some lies … outside" in said
 
 
 @pytest.mark.slow

@@ -183,17 +183,21 @@ def test_a_failing_disk_or_an_interrupt_leaves_the_old_file(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_link_is_followed_and_the_umask_kept(tmp_path: Path) -> None:
+def test_a_link_is_refused_and_the_umask_kept(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir()
-    link = tmp_path / "out.glb"
-    link.symlink_to(tmp_path / "real" / "file.glb")
+    real, link = tmp_path / "real" / "file.glb", tmp_path / "out.glb"
+    real.write_bytes(b"precious")
+    link.symlink_to(real)
+    with pytest.raises(OutputError, match="it is a link; remove it, or give the name of the file"):
+        save_hulls(THREE, link)
+    assert link.is_symlink()
+    assert real.read_bytes() == b"precious"
     before = os.umask(0o027)
     try:
-        save_hulls(THREE, link)
+        save_hulls(THREE, real)
     finally:
         os.umask(before)
-    assert link.is_symlink()
-    assert (tmp_path / "real" / "file.glb").stat().st_mode & 0o777 == 0o640
+    assert real.stat().st_mode & 0o777 == 0o640
 
 
 # --- folders ----------------------------------------------------------------------------------------------------------

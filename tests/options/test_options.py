@@ -221,18 +221,18 @@ def test_none_is_as_good_as_not_given() -> None:
 @pytest.mark.parametrize(
     ("call", "name", "says"),
     [
-        (rlacd.decompose, "treshold", "Did you mean 'threshold'?"),
-        (rlacd.decompose, "max_convex_hull", "Did you mean 'max_hulls'?"),
-        (rlacd.decompose, "radius_abs", "It belongs to NavigableSpace(radius_abs=)."),
-        (rlacd.decompose, "density", "It belongs to .save(density=)."),
-        (rlacd.decompose, "qwx", "'qwx'."),
+        (rlacd.decompose, "treshold", "; did you mean threshold?"),
+        (rlacd.decompose, "max_convex_hull", "; did you mean max_hulls?"),
+        (rlacd.decompose, "radius_abs", "it belongs to NavigableSpace(radius_abs=)."),
+        (rlacd.decompose, "density", "it belongs to .save(density=)."),
+        (rlacd.decompose, "qwx", "'qwx'"),
     ],
 )
 def test_an_option_that_is_unknown_is_told_with_the_one_that_was_meant(call: Any, name: str, says: str) -> None:
-    with pytest.raises(TypeError, match=rf"unexpected keyword argument '{name}'\. ?.*") as caught:
+    with pytest.raises(TypeError, match=rf"unexpected keyword argument '{name}'") as caught:
         call("no such file.obj", **{name: 1})
     assert str(caught.value).endswith(says)
-    with pytest.raises(TypeError, match=r"rewrite_robot\(\) .* Did you mean 'samples'"):
+    with pytest.raises(TypeError, match=r"rewrite_robot\(\) .* did you mean samples"):
         rlacd.rewrite_robot("no such file.urdf", "out.urdf", sample=9)
 
 

@@ -266,7 +266,8 @@ def test_ctrl_c_twice_ends_the_command_at_any_moment(begun: float, tmp_path: Pat
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
-def test_ctrl_c_twice_ends_a_command_that_no_handler_of_python_can_interrupt() -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_twice_ends_a_command_that_no_handler_of_python_can_interrupt(number: int) -> None:
     code = """if True:
         import signal
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -279,10 +280,10 @@ def test_ctrl_c_twice_ends_a_command_that_no_handler_of_python_can_interrupt() -
     try:
         assert run.stdout.readline() == "busy\n"
         time.sleep(0.2)
-        run.send_signal(signal.SIGINT)
+        run.send_signal(number)
         with pytest.raises(subprocess.TimeoutExpired):
             run.wait(2)
-        run.send_signal(signal.SIGINT)
+        run.send_signal(number)
         assert run.wait(PATIENCE) == 130
     finally:
         run.kill()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections import Counter, deque
@@ -15,7 +16,7 @@ from typing import Literal, Protocol
 from rlacd.batch.assets import EVERYTHING, Asset, content_hash, find_assets, other_files
 from rlacd.batch.job_spec import JobSpec
 from rlacd.batch.manifest import Ledger, Row
-from rlacd.batch.mesh import Outcome, Task, Work, process
+from rlacd.batch.mesh import FAILED, Outcome, Task, Work, process
 from rlacd.batch.store import FolderStore, ResultStore, open_store
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.pool import Pool, ProcessLimits, WorkerDiedError
@@ -24,6 +25,8 @@ MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 
 Redo = Literal["none", "failed", "all"]
 
+
+_NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?")
 
 WRITERS = 4
 """Results written concurrently; each waits for the disk, not for a processor."""
@@ -63,6 +66,10 @@ class Summary:
     """Wall time."""
     failures: list[Row] = field(default_factory=list)
     """Rows of the meshes found that failed or fell back to their convex hull."""
+    uncovered: list[Row] = field(default_factory=list)
+    """Rows of the meshes whose hulls miss some of the surface."""
+    warnings: Counter[str] = field(default_factory=Counter)
+    """How many meshes have each kind of warning: its first clause, with numbers left out."""
     slowest: list[tuple[str, float]] = field(default_factory=list)
     """Names and seconds of the slowest meshes of this run."""
     others: Counter[str] = field(default_factory=Counter)
@@ -184,7 +191,10 @@ class Batch:
             store.close()
         rows = [found for name in sorted(summary.seen) if (found := manifest.get(name)) is not None]
         summary.status = Counter(row["status"] for row in rows)
-        summary.failures = [row for row in rows if row["status"] != "done"]
+        summary.failures = [row for row in rows if row["status"] in FAILED]
+        summary.uncovered = [row for row in rows if row["status"] == "uncovered"]
+        kinds = [{_NUMBER.sub("…", said.partition(": ")[0]) for said in row.get("warnings", ())} for row in rows]
+        summary.warnings = Counter(kind for each in kinds for kind in each)
         summary.stopped = len(summary.seen) < len(assets)
         summary.others = other_files(self.assets, self.glob, Path(self.out))
         summary.seconds = time.monotonic() - start
@@ -240,7 +250,7 @@ class Batch:
         if row is None or row.get("key") != task.key or row.get("place") != task.asset.place:
             return False  # the place of a result depends on the neighbouring meshes
         status = row.get("status")
-        if status != "done" and (self.redo == "failed" or row.get("limits") != self._refusal()):
+        if status in FAILED and (self.redo == "failed" or row.get("limits") != self._refusal()):
             return False
         return status is not None and all(store.size(name) == size for name, size in row.get("outputs", {}).items())
 

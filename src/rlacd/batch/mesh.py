@@ -16,7 +16,13 @@ from rlacd.batch.store import ResultStore, put_files
 from rlacd.errors import MeshFileError, OutputNameError
 from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError
 
-Status = Literal["done", "fallback", "failed"]
+Status = Literal["done", "warned", "uncovered", "fallback", "failed"]
+
+FAILED = ("fallback", "failed")
+"""Statuses of meshes without a decomposition."""
+
+COVERED = 0.005
+"""Hulls that miss more of the input, where its longest side is 2, leave it uncovered."""
 
 HULL_SECONDS = 60.0
 """A hull takes milliseconds; a time limit meant for decompositions must not prevent it."""
@@ -59,7 +65,8 @@ class Outcome:
     """Outcome of a mesh."""
 
     status: Status
-    """``fallback``: its convex hull replaces the decomposition."""
+    """``warned``: with warnings; ``uncovered``: hulls miss some of the surface;
+    ``fallback``: its convex hull replaces the decomposition."""
     report: dict[str, Any] = field(default_factory=dict)
     """Facts about the hulls."""
     error: str | None = None
@@ -140,7 +147,13 @@ def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerD
         return Outcome("failed", error=values["error"], unusable=values["unusable"], timing=timing), None
     parent = PurePosixPath(task.asset.place).parent
     files = {str(parent / name): data for name, data in answer.blobs.items()}
-    return Outcome("done", values["report"], files=files, timing=timing), None
+    return Outcome(_status(values["report"]), values["report"], files=files, timing=timing), None
+
+
+def _status(report: dict[str, Any]) -> Status:
+    if (report.get("hausdorff", {}).get("under") or 0.0) > COVERED:
+        return "uncovered"
+    return "warned" if report["warnings"] else "done"
 
 
 def _as_hull(failed: Outcome, request: Request, task: Task, work: Work, lost_time: bool) -> Outcome:
@@ -148,6 +161,6 @@ def _as_hull(failed: Outcome, request: Request, task: Task, work: Work, lost_tim
     seconds = HULL_SECONDS if lost_time else max(work.limits.seconds, HULL_SECONDS)
     limits, values = replace(work.limits, seconds=seconds), {**request.values, "hull_only": True}
     hull, _ = _attempt(replace(request, values=values, limits=limits), task, work)
-    if hull.status != "done":
+    if hull.status == "failed":
         return failed
     return replace(hull, status="fallback", error=failed.error, timing={**hull.timing, **failed.timing})

@@ -101,11 +101,17 @@ def _robot(spec: JobSpec, robot: Path | Robot, place: Path, hull_only: bool) -> 
             warning = warning.replace(path, name)
         warnings.append(warning)
     reports = [result.report for link in done.links for result in link.results]
+    missed = [report.hausdorff.under for report in reports if report.hausdorff.under is not None]
     facts = {what: sum(getattr(report, what) for report in reports) for what in ("parts", "faces", "vertices")}
     fits = [fit for report in reports if (fit := report.fit) is not None and fit.is_length]
     if fits and all(fit.worst is not None for fit in fits):
         facts[fits[0].name] = max(fit.worst for fit in fits if fit.worst is not None)
-    return {**facts, "complete": done.complete and not hull_only, "warnings": warnings}
+    return {
+        **facts,
+        "hausdorff": {"under": max(missed, default=None)},
+        "complete": done.complete and not hull_only,
+        "warnings": warnings,
+    }
 
 
 def _limits(spec: JobSpec) -> dict[str, Any]:

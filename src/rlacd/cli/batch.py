@@ -68,7 +68,7 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
 
     A mesh whose process dies or needs too much memory is tried once more. If that fails too, or the mesh takes longer
     than --limit, it is given its convex hull. OUT/manifest.jsonl records the outcome of each mesh. To resume after an
-    interruption, run the same command again. Ctrl-C once finishes what is running; twice quits at once.
+    interruption, run the same command again. Ctrl-C or SIGTERM finishes what is running; twice quits.
     """
     with ctrl_c_at_once():
         from rlacd.batch import Batch, JobSpec
@@ -119,6 +119,8 @@ def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
         raise SystemExit(ExitCode.STOPPED_EARLY)
     if summary.failures:
         raise SystemExit(ExitCode.SOME_FAILED)
+    if summary.uncovered:
+        raise SystemExit(ExitCode.UNCOVERED)
 
 
 _OWN = [*options_of(BatchOptions), *options_of(PoolOptions), *options_of(OutputOptions, only=(*WRITTEN, "quiet"))]

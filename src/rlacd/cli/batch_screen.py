@@ -61,7 +61,7 @@ class Screen:
         self._status[row["status"]] += 1
         self._running.pop(row["mesh"], None)
         self._update(advance=1, state=self._state(), running=self._names())
-        if row["status"] != "done":
+        if row["status"] not in ("done", "warned"):
             line = failure_line(row)
             say(line) if self._bar is None else self._bar.console.print(line, markup=False, highlight=False)
         elif self._bar is None and not self._quiet and time.monotonic() - self._reported > 30:
@@ -83,12 +83,17 @@ class Screen:
         rate = self._made / max(time.monotonic() - self._start, 1e-9)
         left = (self._total - self._made - self._passed_over) / rate
         words = [f"{60 * rate:.0f}/min", f"{duration(left)} left"]
-        words += [f"{self._status[status]} {status}" for status in ("failed", "fallback") if self._status[status]]
+        words += [
+            f"{self._status[status]} {status}" for status in ("uncovered", "failed", "fallback") if self._status[status]
+        ]
         return ", ".join(words)
 
 
 def failure_line(row: Row) -> str:
-    """Describe the failure of a mesh in one line."""
+    """Describe what is wrong with a mesh in one line."""
+    if row["status"] == "uncovered":
+        missed = row["hausdorff"]["under"]
+        return printable(f"  {row['mesh']}: hulls miss its surface by up to {missed:.2g} (longest side = 2)")
     instead = " (given its convex hull)" if row["status"] == "fallback" else ""
     return printable(f"  {row['mesh']}: {row['error']}{instead}")
 
@@ -97,13 +102,20 @@ def summary_lines(summary: Summary, out: str) -> list[str]:
     """Summarise a run: what was done, what failed, and what took longest."""
     made = sum(summary.status.values()) - summary.passed_over
     meshes = counted(summary.meshes, "mesh", "meshes")
-    words = [f"{summary.status['done']} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
-    words += [f"{summary.status[status]} {status}" for status in ("fallback", "failed") if summary.status[status]]
+    hulls = sum(summary.status[status] for status in ("done", "warned", "uncovered"))
+    words = [f"{hulls} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
+    words += [
+        f"{summary.status[status]} {status}"
+        for status in ("warned", "uncovered", "fallback", "failed")
+        if summary.status[status]
+    ]
     rate = f", {60 * made / summary.seconds:.0f} a minute" if made and summary.seconds > 0 else ""
+    told = [*summary.uncovered, *summary.failures]
     now = f"  {made} now in {duration(summary.seconds)}{rate}; {summary.passed_over} were done before"
-    lines = [f"{out}: {', '.join(words)}", now, *map(failure_line, summary.failures[:LISTED])]
-    if len(summary.failures) > LISTED:
-        lines.append(f"  ... and {len(summary.failures) - LISTED} more: see manifest.jsonl")
+    lines = [f"{out}: {', '.join(words)}", now, *map(failure_line, told[:LISTED])]
+    if len(told) > LISTED:
+        lines.append(f"  ... and {len(told) - LISTED} more: see manifest.jsonl")
+    lines += [printable(f"  {count} x warning: {kind}") for kind, count in summary.warnings.most_common(LISTED)]
     if summary.others:
         kinds = ", ".join(f"{count} {ending}" for ending, count in summary.others.most_common())
         files = counted(summary.others.total(), "file", "files")

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from rlacd.cli.exit_codes import EPILOG, give
-from rlacd.options.fields import About
+from rlacd.options.fields import About, shown
 
 ARGUMENTS, OPTIONS = "Arguments", "Options"
 """Headings of the help."""
@@ -22,7 +22,7 @@ class Argument(click.Argument):
     panel = ARGUMENTS
 
     def __init__(self, name: str, metavar: str, text: str) -> None:
-        super().__init__([name], metavar=metavar, type=_typed(Path))
+        super().__init__([name], metavar=metavar, type=_PATH)
         self.text = text
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str]:
@@ -132,7 +132,7 @@ def options_of(options: type[Any], *, only: Collection[str] | None = None, note:
                     field.name,
                     *known.flags,
                     panel=known.panel or OPTIONS,
-                    type=_typed(known.kind.typed),
+                    type=_typed(known),
                     is_flag=known.kind.typed is bool,
                     multiple=known.repeated,
                     metavar=known.metavar,
@@ -153,8 +153,23 @@ def taken(given: dict[str, Any], options: type[Any]) -> dict[str, Any]:
     return chosen({name: given.pop(name) for name in sorted(names)})
 
 
-def _typed(kind: type) -> Any:
-    return click.Path(path_type=Path) if kind is Path else kind
+_PATH = click.Path(path_type=Path)
+
+
+def _typed(known: About) -> Any:
+    """What click turns words into; a word that is no number is told what it has to be."""
+    kind = known.kind
+    if kind.typed not in (int, float):
+        return _PATH if kind.typed is Path else kind.typed
+
+    def number(word: str) -> Any:
+        try:
+            return kind.typed(word)
+        except ValueError:
+            raise click.ClickException(f"{known.flags[0]} is {shown(word)}; it has to be {kind.rule}.") from None
+
+    number.__name__ = {int: "integer", float: "float"}[kind.typed]  # as the help calls it
+    return number
 
 
 def _help(known: About, note: str) -> str:

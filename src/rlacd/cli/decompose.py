@@ -63,7 +63,7 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
       cat chair.obj | rlacd decompose - --from obj -o - --format stl > hulls.stl
       rlacd decompose house.glb --criterion navigable --radius-abs 0.3 --tolerance-abs 0.05
 
-    Ctrl-C once stops and writes the result so far; twice quits at once.
+    Ctrl-C or SIGTERM once stops and writes the result so far; twice quits at once.
     """
     asked, robots = OutputOptions(**taken(how, OutputOptions)), taken(how, RobotOptions)
     if more := click.get_current_context().args:

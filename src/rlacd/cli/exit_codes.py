@@ -13,6 +13,7 @@ from typing import NoReturn
 import click
 
 from rlacd.errors import OutputError, RlacdError, sentence_of
+from rlacd.options.keywords import meant
 
 
 class ExitCode(IntEnum):
@@ -21,8 +22,9 @@ class ExitCode(IntEnum):
     1    a bug in rlacd (RLACD_DEBUG=1 shows the traceback)
     2    bad input or option; no meshes
     3    the output cannot be written
-    4    stopped early by --timeout or Ctrl-C; what was written is valid
+    4    stopped early by --timeout, Ctrl-C or SIGTERM; what was written is valid
     5    batch only: some meshes failed or were given their convex hull
+    6    batch only: hulls of some meshes miss some of the surface
     130  interrupted at once; no file is left half-written
     """
 
@@ -32,6 +34,7 @@ class ExitCode(IntEnum):
     CANNOT_WRITE = 3
     STOPPED_EARLY = 4
     SOME_FAILED = 5
+    UNCOVERED = 6
     INTERRUPTED = 130
 
 
@@ -47,8 +50,12 @@ def exit_codes() -> Iterator[None]:
     """Turn every error into one sentence on stderr and an exit code; RLACD_DEBUG=1 lets the traceback through."""
     try:
         yield
-    except (click.ClickException, click.exceptions.Exit):
+    except click.exceptions.Exit:
         raise  # click's own
+    except click.ClickException as error:
+        if isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):  # the help is its message
+            raise
+        _fail(_told(error), ExitCode.BAD_INPUT)
     except KeyboardInterrupt:
         _fail(INTERRUPTED, ExitCode.INTERRUPTED)
     except BrokenPipeError:
@@ -102,6 +109,16 @@ def leave(code: int) -> NoReturn:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             stream.flush()
     os._exit(code)
+
+
+def _told(error: click.ClickException) -> str:
+    """Say in one sentence which word click does not take, and which one was meant."""
+    said, hint = error.format_message().rstrip("."), ""
+    if isinstance(error, click.NoSuchOption):
+        said, hint = f"there is no option {error.option_name}", meant(error.option_name, error.possibilities or ())
+    if not hint and isinstance(error, click.UsageError) and error.ctx is not None:
+        hint = f"; {error.ctx.command_path} --help shows what it takes"
+    return f"{said[0].lower()}{said[1:]}{hint}"
 
 
 def _fail(message: object, code: ExitCode) -> None:

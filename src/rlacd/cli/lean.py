@@ -6,9 +6,10 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn
 
 from rlacd.cli.exit_codes import INTERRUPTED, ExitCode, leave, say
@@ -38,18 +39,26 @@ def import_trimesh(mesh: Path) -> None:
 
 @contextmanager
 def ctrl_c_at_once() -> Iterator[None]:
-    """End the process at Ctrl-C, before there is anything to write: libraries catch whatever is raised in an import."""
+    """End the process at Ctrl-C or SIGTERM, with nothing to write yet: libraries catch what is raised in an import."""
 
     def end(*_: object) -> NoReturn:
         say(f"rlacd: {INTERRUPTED}")
         leave(ExitCode.INTERRUPTED)
 
-    previous = signal.getsignal(signal.SIGINT)
-    if previous is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
-    signal.signal(signal.SIGINT, end)
+    with handling(end):
+        yield
+
+
+@contextmanager
+def handling(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """Handle Ctrl-C and SIGTERM, by which clusters and containers end a process; only the main thread can."""
+    main = threading.current_thread() is threading.main_thread()
+    previous = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM) if main}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, before in previous.items():
+            signal.signal(number, before)

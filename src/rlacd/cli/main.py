@@ -19,7 +19,7 @@ from click.shell_completion import get_completion_class
 from rlacd._version import __version__
 from rlacd.cli.commands import help_option
 from rlacd.cli.exit_codes import EPILOG, ExitCode, exit_codes, give, leave, say
-from rlacd.errors import DecompositionWarning
+from rlacd.errors import DecompositionWarning, OptionError
 from rlacd.options.keywords import meant
 from rlacd.plain_json import printable
 
@@ -67,7 +67,8 @@ class Commands(click.Group):
             say(f"rlacd: {printable(word)} is not a command; did you mean  {printable(typed)}")
             raise SystemExit(ExitCode.BAD_INPUT)
         if word not in COMMANDS and not word.startswith("-"):
-            ctx.fail(f"No such command {word!r}.{meant(word, COMMANDS)}")
+            others = f"; use one of {', '.join(COMMANDS)}"
+            raise OptionError(f"there is no command {word!r}{meant(word, COMMANDS) or others}")
         return super().resolve_command(ctx, args)
 
 

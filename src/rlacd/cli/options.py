@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rlacd._version import __version__
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
 from rlacd.options import LENGTHS, OPTION_NAMES, RUN, Options, with_criterion
-from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, stated
+from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, shown, stated
 from rlacd.options.names import UNITS
 from rlacd.options.navigable import NavigableSpace
 
@@ -102,10 +103,21 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
 def _of_report(path: Path) -> dict[str, Any]:
     """Read the options that a report lists."""
     try:
-        options = json.loads(path.read_text(encoding="utf-8"))["options"]
-        return {name: value for name, value in dict(options).items() if value is not None}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        report = json.loads(path.read_text(encoding="utf-8"))
+        version, options = str(report.get("version", __version__)), dict(report["options"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise OptionError(f"--like {path} is no report of a decomposition as JSON ({type(error).__name__}).") from error
+    if not re.fullmatch(r"\d{1,9}(\.\d{1,9}){2}", version) or _numbered(version) > _numbered(__version__):
+        raise OptionError(
+            f"--like {path} says it is of rlacd {shown(version)}; this is {__version__}, so install that."
+        )
+    if unknown := [name for name in options if name not in OPTION_NAMES]:
+        raise OptionError(f"--like {path} has an option that rlacd {__version__} does not know: {shown(unknown[0])}.")
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def _numbered(version: str) -> list[int]:
+    return [int(number) for number in version.split(".")]
 
 
 def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:

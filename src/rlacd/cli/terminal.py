@@ -1,8 +1,7 @@
-"""Output of the command line during and after the work, and graceful stopping by Ctrl-C."""
+"""Output of the command line during and after the work, and graceful stopping by Ctrl-C and SIGTERM."""
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
 from collections import Counter
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
+from rlacd.cli.lean import handling
 from rlacd.fit import length_unit
 from rlacd.options.names import UNITS
 from rlacd.run import Progress, ProgressCallback
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def watching(*, quiet: bool) -> Iterator[ProgressCallback]:
-    """Show progress on a terminal and turn Ctrl-C into a graceful stop.
+    """Show progress on a terminal and turn Ctrl-C and SIGTERM into a graceful stop.
 
-    The first Ctrl-C makes the decomposition stop at its next step and keep its result so far; the second interrupts at
+    The first one makes the decomposition stop at its next step and keep its result so far; the second interrupts at
     once. The bar is drawn only if stderr is a terminal.
     """
     bar = None if quiet else open_bar("{task.description:<12}", None, "{task.fields[parts]} parts", parts=0)
@@ -49,7 +49,7 @@ def watching(*, quiet: bool) -> Iterator[ProgressCallback]:
 
 @contextmanager
 def graceful_stop(said: str, *, in_kernels: bool = False) -> Iterator[threading.Event]:
-    """Set an event at the first Ctrl-C, and say what happens then; the second interrupts at once, also kernels."""
+    """Set an event at the first Ctrl-C or SIGTERM, and say so; the second interrupts at once, also kernels."""
     wanted = threading.Event()
 
     def on_interrupt(number: int, frame: FrameType | None) -> None:
@@ -58,17 +58,13 @@ def graceful_stop(said: str, *, in_kernels: bool = False) -> Iterator[threading.
         wanted.set()
         say(f"stopping; {said} (Ctrl-C again to quit at once)")
 
-    if threading.current_thread() is not threading.main_thread():  # which alone receives Ctrl-C
-        yield wanted
-        return
-    previous = signal.signal(signal.SIGINT, on_interrupt)
-    if in_kernels:
-        count_interrupts(ExitCode.INTERRUPTED, 1.0)  # the second one leaves a second to end in good order
-    try:
-        yield wanted
-    finally:
-        forget_interrupts()
-        signal.signal(signal.SIGINT, previous)
+    with handling(on_interrupt):
+        if in_kernels:
+            count_interrupts(ExitCode.INTERRUPTED, 1.0)  # the second one leaves a second to end in good order
+        try:
+            yield wanted
+        finally:
+            forget_interrupts()
 
 
 def open_bar(*columns: str | None, **fields: Any) -> Bars | None:
@@ -164,4 +160,4 @@ def counted(count: int, one: str, many: str) -> str:
     return f"{count} {one if count == 1 else many}"
 
 
-STOPPED = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C"}
+STOPPED = {None: "", "timeout": ", stopped by the timeout", "cancel": ", stopped by Ctrl-C or SIGTERM"}

@@ -17,9 +17,9 @@ Returned = TypeVar("Returned")
 
 
 def meant(word: str, known: Collection[str]) -> str:
-    """A question that names the known word that looks most like another one; empty if none does."""
+    """The end of a sentence, which names the known word most like another one; empty if none is like it."""
     alike = difflib.get_close_matches(word, known, 1)
-    return f" Did you mean {alike[0]!r}?" if alike else ""
+    return f"; did you mean {alike[0]}?" if alike else ""
 
 
 def check_names(function: str, given: Iterable[str], known: Collection[str], elsewhere: Sequence[type] = ()) -> None:
@@ -33,8 +33,8 @@ def check_names(function: str, given: Iterable[str], known: Collection[str], els
     for name in given:
         if name not in known:
             places = [place for options in elsewhere if (place := stated_in(options, name))]
-            hint = f" It belongs to {places[0]}." if places else meant(name, known)
-            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}.{hint}")
+            hint = f"; it belongs to {places[0]}." if places else meant(name, known)
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}{hint}")
 
 
 def taking(options: type[Any], *others: type[Any]) -> Callable[[Callable[Given, Returned]], Callable[Given, Returned]]:

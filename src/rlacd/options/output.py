@@ -50,7 +50,7 @@ class OutputOptions:
     )
     """Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid per hull; .xml (MJCF),
     .urdf, .sdf, .usd, .usda or .usdc for a body with mass, visual mesh and hulls; an existing folder, or a name ending
-    in /, for one file per hull. An existing file is replaced. - writes to stdout what --format says."""
+    in /, for one file per hull. An existing file is replaced, a link refused. - writes to stdout what --format says."""
     file_format: str | None = option(None, kind=_FORMAT, flags=("--format",), metavar="EXT", usual="obj")
     """The format of the files in a folder: obj, glb, ply or stl; or unreal or godot, for a .glb with the mesh and hulls
     named for that engine."""

@@ -81,7 +81,8 @@ def find_server(name: str) -> MakeServer:
 def main() -> None:
     """Answer requests until the other end is closed."""
     warnings.simplefilter("ignore", DecompositionWarning)  # answers hold them
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C stops
+    for number in (signal.SIGINT, signal.SIGTERM):  # the parent decides what these stop
+        signal.signal(number, signal.SIG_IGN)
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
     with open(os.devnull, "rb") as nothing:

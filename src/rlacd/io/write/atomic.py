@@ -19,18 +19,16 @@ def write_file(path: Path, data: bytes) -> None:
     """Write `data` to `path`, completely or not at all.
 
     The bytes go to a hidden file in the same folder, are flushed to disk, and only then renamed to `path`, which
-    replaces an older file in one step. A link is followed: the file it points to is replaced. Missing folders are
-    created.
+    replaces an older file in one step. Missing folders are created.
 
     Raises
     ------
     OutputError
-        The folder is read-only, the disk is full, ...; what was at `path` is untouched.
+        The path is a link, the folder is read-only, the disk is full, ...; what was at `path` is untouched.
     """
     with output_errors(path):
+        refuse_link(path)
         final = path.resolve()
-        if final.is_symlink():  # still: it leads to itself, which Python reports only up to version 3.12
-            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         # Not derived from the final name, which may already have the maximum length.
         temporary = final.with_name(f".rlacd-{secrets.token_hex(8)}.tmp")
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -41,6 +39,14 @@ def write_file(path: Path, data: bytes) -> None:
             temporary.unlink(missing_ok=True)
             raise
         sync_folder(final.parent)
+
+
+def refuse_link(path: Path) -> None:
+    """Raise OutputNameError if `path` is a link: what it leads to may be somebody else's, anywhere on the disk."""
+    if path.is_symlink():
+        raise OutputNameError(
+            f"cannot write {path}: it is a link; remove it, or give the name of the file it leads to."
+        )
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from rlacd.errors import OptionError, OutputError
 from rlacd.io.read import function_of
-from rlacd.io.write.atomic import output_errors
+from rlacd.io.write.atomic import output_errors, refuse_link
 from rlacd.options.fields import path_like, read, shown
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.output import OutputOptions
@@ -163,6 +163,7 @@ def _model_target(text: str, file_format: str) -> Target:
 def check_file(path: Path) -> None:
     """Raise `OutputError` if `path` cannot become a file, without touching the disk."""
     with output_errors(path):
+        refuse_link(path)
         if path.is_dir():
             raise OutputError(f"cannot write {path}: it is a folder; end the name with / to fill it.")
         if path.exists() and not path.is_file():
