@@ -16,7 +16,7 @@ from trimesh import creation
 
 import rlacd
 from rlacd.cli.main import app
-from rlacd.errors import EmptyMeshError, MeshDataError, OptionError, RlacdError
+from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError, OptionError, RlacdError
 from rlacd.repair import repair as repairing
 from tests.hulls import assert_convex_hull, strict_json
 from tests.shapes_bad import arrays, ell
@@ -179,8 +179,17 @@ def test_what_is_no_mesh_is_one_sentence(mesh: Any, error: type[RlacdError]) -> 
 
 
 def test_what_is_given_beside_a_mesh_is_told_how_to_give_it() -> None:
-    with pytest.raises(MeshDataError, match="give options by their names"):
-        rlacd.decompose(creation.box(), 0.02)  # a threshold
+    with pytest.raises(
+        MeshDataError, match=r"0\.02 is given where faces go.*options by their names, such as threshold"
+    ):
+        rlacd.decompose(creation.box(), 0.02)
+    with pytest.raises(MeshFileError, match="is an address, and nothing is fetched: download the file"):
+        rlacd.decompose("https://example.com/chair.stl")
+    box = creation.box()
+    with pytest.raises(MeshDataError, match=r"vertex 8, but there are 8 .*: count them from 0, not 1"):
+        rlacd.decompose((box.vertices, box.faces + 1))
+    with pytest.raises(MeshDataError, match=r"vertex -1, but there are 8 .*: the mesh is damaged"):
+        rlacd.decompose((box.vertices, box.faces - 1))
     with pytest.raises(OptionError, match="file_type is 'obj'; it has to be left out"):
         rlacd.decompose(creation.box(), file_type="obj")
 

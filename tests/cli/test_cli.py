@@ -303,6 +303,8 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
         ("info -", "only rlacd decompose reads stdin"),
         ("view {dir}/ell.stl --threshold 2mm", "it has to be a number or a share such as 2%"),
         ("decompose {dir}/no/chair.glb", "{dir}/no/chair.glb does not exist: check the spelling and the folder"),
+        ("decompose https://example.com/chair.glb", "is an address, and nothing is fetched: download the file"),
+        ("info https://example.com/chair.glb", "is an address, and nothing is fetched: download the file"),
         ("decompose {dir}/ell.stl {dir}/ell.stl", "rlacd batch {dir} -o hulls/ --glob '*.stl'"),
         ("decompose {dir}", "rlacd batch {dir} -o hulls/"),
         ("decompose {dir}/ell.stl {dir}/out.obj", "rlacd decompose {dir}/ell.stl -o {dir}/out.obj"),

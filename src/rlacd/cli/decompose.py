@@ -21,6 +21,7 @@ from rlacd.cli.options import decompose_options, how, link_lengths, unit_given
 from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.io.read import READERS
+from rlacd.io.read.open_file import missing
 from rlacd.options.output import PAGES, OutputOptions
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Progress, ProgressCallback
@@ -255,7 +256,7 @@ def _check_input(mesh: Path) -> None:
     if os.path.isdir(mesh):
         raise MeshFileError(f"{mesh} is a folder; for all meshes in it run  rlacd batch {mesh} -o hulls/")
     if not os.path.exists(mesh):
-        raise MeshFileError(f"{mesh} does not exist: check the spelling and the folder")
+        raise missing(mesh)
 
 
 def _check_output(mesh: Path, wanted: OutputOptions) -> None:

@@ -70,7 +70,8 @@ def load_mesh(
     if faces is not None:
         if isinstance(source, str | os.PathLike | trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
             raise MeshDataError(
-                "what follows the mesh are faces, of vertices in its place: give options by their names"
+                f"{shown(faces)} is given where faces go, after vertices: give options by their names, such as "
+                "threshold=0.05"
             )
         source = (source, faces)
     if is_in_memory(source):
@@ -143,9 +144,9 @@ def _baked(name: str, contents: Contents) -> InputMesh:
     for node, (v, f) in contents.geometry:
         if len(f) and (f.min() < 0 or f.max() >= len(v)):
             wrong = int(f[(f < 0) | (f >= len(v))][0])
-            raise MeshDataError(
-                f"a face uses vertex {wrong}, but there are {len(v)} (counted from 0): the file is damaged"
-            )
+            from_one = f.min() == 1 and f.max() == len(v)
+            why = "count them from 0, not 1" if from_one else "the mesh is damaged"
+            raise MeshDataError(f"a face uses vertex {wrong}, but there are {len(v)} (counted from 0): {why}")
         if solid and not len(f):
             continue
         if not np.array_equal(node.transform, np.eye(4)):
@@ -174,7 +175,7 @@ def _usable(name: str, vertices: FloatArray, faces: Int64Array, node_of: Int64Ar
     if not finite.all():
         usable = finite[faces].all(axis=1)
         if len(faces) and not usable.any():
-            raise MeshDataError(f"every face of {name} uses a vertex that is NaN or infinite: export the mesh again")
+            raise MeshDataError(f"every face of {name} uses a vertex that is NaN or infinite: correct its coordinates")
         bad, unusable = np.count_nonzero(~finite), np.count_nonzero(~usable)
         warnings = [f"{bad} vertices are NaN or infinite: they and the {unusable} faces that use them were left out"]
         faces = (np.cumsum(finite) - 1)[faces[usable]]

@@ -51,12 +51,19 @@ def read_file(path: str | os.PathLike[str], most: int = LARGEST_FILE) -> bytes:
         return file.read(opened.st_size)
 
 
+def missing(path: Path | str) -> MeshFileError:
+    """The error for a file that does not exist; a path may be an address, of which `Path` keeps one slash."""
+    if re.match(r"(https?|ftp|s3|gs):/", str(path), re.IGNORECASE):
+        return MeshFileError(f"{path} is an address, and nothing is fetched: download the file, and give its path")
+    return MeshFileError(f"{path} does not exist: check the spelling and the folder")
+
+
 def read_named(path: Path, most: int = LARGEST_FILE, name: str | None = None) -> bytes:
     """Read a file that a user or another file names, as `read_file` does; raises MeshFileError."""
     try:
         return read_file(path, most)
     except FileNotFoundError as error:
-        raise MeshFileError(f"{name or path} does not exist: check the spelling and the folder") from error
+        raise missing(name or path) from error
     except IsADirectoryError as error:
         raise MeshFileError(f"{name or path} is a folder: give a file in it") from error
     except (OSError, ValueError) as error:
