@@ -73,6 +73,11 @@ class Avoids:
     """Those that hulls enter all the same; for each node that does."""
 
 
+COVERAGE_TOLERANCE = 0.005
+"""How far hulls may miss the surface, or reach beyond the threshold, before that is told: slack for repair and
+measurement, where the longest side is 2."""
+
+
 @dataclass(frozen=True)
 class Hausdorff:
     """Distances between the surfaces of hulls and input, to 1 %; upper bounds up to 0.001; null without time."""

@@ -269,7 +269,7 @@ def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
     status = Counter({"done": 27, "warned": 12, "uncovered": 1})
     summary = Summary(40, status=status, uncovered=[row], warnings=Counter({"Some lies … outside": 13}))
     said = "\n".join(summary_lines(summary, "out"))
-    assert "out: 40 of 40 meshes are done, 12 warned, 1 uncovered\n" in said
+    assert "out: 39 of 40 meshes are done, 12 of them with warnings, 1 uncovered\n" in said
     assert "spoon.obj: hulls miss its surface by up to 0.37 (longest side = 2)" in said
     assert "13 x warning: Some lies … outside" in said
 

@@ -15,14 +15,12 @@ from rlacd.batch.server import SERVER
 from rlacd.batch.store import ResultStore, put_files
 from rlacd.errors import MeshFileError, OutputNameError
 from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError
+from rlacd.report import COVERAGE_TOLERANCE
 
 Status = Literal["done", "warned", "uncovered", "fallback", "failed"]
 
 FAILED = ("fallback", "failed")
 """Statuses of meshes without a decomposition."""
-
-COVERED = 0.005
-"""Hulls that miss more of the input, where its longest side is 2, leave it uncovered."""
 
 HULL_SECONDS = 60.0
 """A hull takes milliseconds; a time limit meant for decompositions must not prevent it."""
@@ -151,7 +149,7 @@ def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerD
 
 
 def _status(report: dict[str, Any]) -> Status:
-    if (report.get("hausdorff", {}).get("under") or 0.0) > COVERED:
+    if (report.get("hausdorff", {}).get("under") or 0.0) > COVERAGE_TOLERANCE:
         return "uncovered"
     return "warned" if report["warnings"] else "done"
 

@@ -102,12 +102,11 @@ def summary_lines(summary: Summary, out: str) -> list[str]:
     """Summarise a run: what was done, what failed, and what took longest."""
     made = sum(summary.status.values()) - summary.passed_over
     meshes = counted(summary.meshes, "mesh", "meshes")
-    hulls = sum(summary.status[status] for status in ("done", "warned", "uncovered"))
-    words = [f"{hulls} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
+    warned = summary.status["warned"]
+    words = [f"{summary.status['done'] + warned} of {meshes} {'is' if summary.meshes == 1 else 'are'} done"]
+    words += [f"{warned} of them with warnings"] if warned else []
     words += [
-        f"{summary.status[status]} {status}"
-        for status in ("warned", "uncovered", "fallback", "failed")
-        if summary.status[status]
+        f"{summary.status[status]} {status}" for status in ("uncovered", "fallback", "failed") if summary.status[status]
     ]
     rate = f", {60 * made / summary.seconds:.0f} a minute" if made and summary.seconds > 0 else ""
     told = [*summary.uncovered, *summary.failures]

@@ -21,11 +21,11 @@ from rlacd.criteria.limited import limited_part
 from rlacd.find_parts import Reached
 from rlacd.finish.overlap import Seams, overlap_parts
 from rlacd.finish.primitives import primitive_part
-from rlacd.finish.report import COVERAGE_TOLERANCE, NEARLY, make_report
+from rlacd.finish.report import NEARLY, make_report
 from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
-from rlacd.report import Report
+from rlacd.report import COVERAGE_TOLERANCE, Report
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import DENSE, Part

@@ -21,18 +21,26 @@ from rlacd.fit import RESOLVED, length_unit, told_apart
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
-from rlacd.report import Avoids, Hausdorff, Hole, NodeParts, Overlap, Point, Report, ShortSeam, sizes_of
+from rlacd.report import (
+    COVERAGE_TOLERANCE,
+    Avoids,
+    Hausdorff,
+    Hole,
+    NodeParts,
+    Overlap,
+    Point,
+    Report,
+    ShortSeam,
+    sizes_of,
+)
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import Place, hull_distances, hull_union
-from rlacd.solid.frame import HALF_THICKNESS, Frame
+from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull, is_sliver
 from rlacd.solid.mass import joint_mass, mass_of
 from rlacd.solid.solid import Solid
-
-COVERAGE_TOLERANCE = 5 * HALF_THICKNESS
-"""How far hulls may reach beyond the threshold before the report warns: slack for repair and measurement."""
 
 NEARLY = RESOLVED
 """No point of the input should lie farther outside the hulls than this."""
