@@ -278,9 +278,11 @@ def test_every_command_takes_a_policy_that_sees_points(meshes: Path, sees_points
     from benchmarks.paper import app as paper
 
     mesh, policy = str(meshes / "cross.ply"), str(sees_points)
+    (tmp_path / "one").mkdir()
+    shutil.copy(mesh, tmp_path / "one")
     for words in (
         ["decompose", mesh, "-o", str(tmp_path / "out.obj"), "--policy", policy],
-        ["batch", mesh, "-o", str(tmp_path / "out"), "--policy", policy],
+        ["batch", str(tmp_path / "one"), "-o", str(tmp_path / "out"), "--policy", policy],
     ):
         done = CliRunner().invoke(app, [*words, "--quality", "fast"])
         assert done.exit_code == 0, done.output

@@ -129,6 +129,8 @@ def parse_network(content: bytes) -> Network:
         encoder = {name.removeprefix(ENCODER): arrays[name] for name in arrays.files if name.startswith(ENCODER)}
     if not layers or any(a[0].shape[0] != b[0].shape[1] for a, b in pairwise(layers)):
         raise ValueError
+    if not {array.dtype.kind for array in encoder.values()} <= {"f", "i"}:
+        raise ValueError
     if not all(np.isfinite(a).all() for a in (*chain(*layers), *encoder.values())):
         raise ValueError
     network = Network(layers, about, encoder)

@@ -281,7 +281,7 @@ class PointEncoder:
             network = PointNetwork(Sizes(**sizes))
         state = {name: torch.from_numpy(value.copy()) for name, value in weights.items()}
         network.load_state_dict(state, assign=True)
-        encoder = cls(network.requires_grad_(False), min(int(about["points"]), 16 * MOST))
+        encoder = cls(network.float().requires_grad_(False), min(int(about["points"]), 16 * MOST))
         if encoder.digest != about["digest"]:
             raise ValueError("its weights are others")
         return encoder
