@@ -18,13 +18,14 @@ from rlacd.errors import OptionError, WeightsError
 pytest.importorskip("torch", reason="needs the extra train")
 
 import torch
-from benchmarks.learned.i2p_mae import I2PMAEEncoder, PublishedEncoder, Sizes
+from benchmarks.learned.i2p_mae import published_network
 from benchmarks.paper import app as paper
 
 from rlacd.learn.dqn import pick_device, q_network
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.train import train
 from rlacd.policies.plane_features import PLANES
+from rlacd.policies.points import PointEncoder, PointNetwork, Sizes
 from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
 from tests.scripts import script
@@ -44,10 +45,10 @@ def clouds(count: int, points: int = 128, seed: int = 0) -> torch.Tensor:
     return torch.from_numpy(found.astype(np.float32))
 
 
-def tiny_encoder(seed: int = 0) -> I2PMAEEncoder:
+def tiny_encoder(seed: int = 0) -> PointNetwork:
     """An encoder of the least size whose batch norms are no identities."""
     torch.manual_seed(seed)
-    encoder = I2PMAEEncoder(TINY)
+    encoder = PointNetwork(TINY)
     for name, value in encoder.state_dict().items():
         if name.endswith("running_var"):
             value.uniform_(0.5, 1.5)
@@ -83,8 +84,8 @@ def published(state: dict[str, torch.Tensor], path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def official(stand_in: dict[str, torch.Tensor], tmp_path_factory: pytest.TempPathFactory) -> I2PMAEEncoder:
-    return I2PMAEEncoder.from_checkpoint(published(stand_in, tmp_path_factory.mktemp("weights") / "i2p_mae.pth"))
+def official(stand_in: dict[str, torch.Tensor], tmp_path_factory: pytest.TempPathFactory) -> PointNetwork:
+    return published_network(published(stand_in, tmp_path_factory.mktemp("weights") / "i2p_mae.pth"))
 
 
 @pytest.fixture(scope="session")
@@ -93,7 +94,7 @@ def features(reference: Path) -> tuple[torch.Tensor, np.ndarray]:
         return torch.from_numpy(held["points"]), held["features"]
 
 
-def test_names_and_shapes_are_the_published_ones(stand_in: dict[str, torch.Tensor], official: I2PMAEEncoder) -> None:
+def test_names_and_shapes_are_the_published_ones(stand_in: dict[str, torch.Tensor], official: PointNetwork) -> None:
     assert {k: v.shape for k, v in official.state_dict().items()} == {k: v.shape for k, v in stand_in.items()}
     assert sum(p.numel() for p in official.parameters()) == 12_654_976
     assert official.dim == 768
@@ -101,7 +102,7 @@ def test_names_and_shapes_are_the_published_ones(stand_in: dict[str, torch.Tenso
 
 
 def test_features_are_those_of_the_official_code(
-    official: I2PMAEEncoder, features: tuple[torch.Tensor, np.ndarray]
+    official: PointNetwork, features: tuple[torch.Tensor, np.ndarray]
 ) -> None:
     points, expected = features
     with torch.inference_mode():
@@ -114,7 +115,7 @@ def test_features_are_those_of_the_official_code(
 
 
 def test_features_ignore_size_and_place_and_are_the_same_each_time() -> None:
-    encoder = PublishedEncoder(tiny_encoder(), 512)
+    encoder = PointEncoder(tiny_encoder(), 512)
     solid = small_solids()["table"]
     one = encoder.describe(Component(solid))
     moved = encoder.describe(Component(solid.scale([0.25] * 3).translate([0.5, -0.25, 2])))
@@ -128,7 +129,7 @@ def test_features_ignore_size_and_place_and_are_the_same_each_time() -> None:
 
 
 def test_parameters_that_are_missing_of_another_size_or_not_finite_are_named(tmp_path: Path) -> None:
-    full = dict(I2PMAEEncoder(Sizes()).state_dict())
+    full = dict(PointNetwork(Sizes()).state_dict())
     names = list(full)
     nan = {**full, names[40]: full[names[40]] + torch.nan}
     for state, says in (
@@ -138,7 +139,7 @@ def test_parameters_that_are_missing_of_another_size_or_not_finite_are_named(tmp
         (nan, f"{names[40]} holds values that are not finite"),
     ):
         with pytest.raises(WeightsError, match=says):
-            I2PMAEEncoder.from_checkpoint(published(state, tmp_path / "weights.pth"))
+            published_network(published(state, tmp_path / "weights.pth"))
 
 
 FIRST = r"h_encoder\.token_embed\.0\.first_conv\.0\.weight"
@@ -156,9 +157,9 @@ def test_files_cut_short_and_those_of_something_else_are_one_error(
     path = published(dict(tiny_encoder().state_dict()), tmp_path / "weights.pth")
     path.write_bytes(change(path.read_bytes()))
     with pytest.raises(WeightsError, match=says):
-        I2PMAEEncoder.from_checkpoint(path)
+        published_network(path)
     with pytest.raises(WeightsError, match="there is no file"):
-        I2PMAEEncoder.from_checkpoint(tmp_path / "nowhere.pth")
+        published_network(tmp_path / "nowhere.pth")
 
 
 class Harmful:
@@ -176,7 +177,7 @@ def test_nothing_in_a_checkpoint_is_run(tmp_path: Path) -> None:
         {"base_model": dict(tiny_encoder().state_dict()), "extra": Harmful(tmp_path / "ran")}, tmp_path / "w.pth"
     )
     with pytest.raises(WeightsError, match="not a file of weights"):
-        I2PMAEEncoder.from_checkpoint(tmp_path / "w.pth")
+        published_network(tmp_path / "w.pth")
     assert not (tmp_path / "ran").exists()
 
 
@@ -201,7 +202,7 @@ def meshes(tmp_path: Path) -> Path:
 
 
 def run(meshes: Path, folder: Path, seed: int = 0, points: int = 64, resume: bool = False, **changes: Any) -> Path:
-    encoder, options = PublishedEncoder(tiny_encoder(seed), points), TrainOptions(**{**SHORT, **changes})
+    encoder, options = PointEncoder(tiny_encoder(seed), points), TrainOptions(**{**SHORT, **changes})
     return train(meshes, folder, options, resume=resume, encoder=encoder, say=lambda line: None)
 
 
@@ -217,7 +218,7 @@ def test_too_few_points_are_reported_before_a_run_begins(meshes: Path, tmp_path:
 
 
 def test_the_papers_network_sees_what_the_paper_sees() -> None:
-    network = q_network(I2PMAEEncoder().dim, PLANES)
+    network = q_network(PointNetwork().dim, PLANES)
     widths = [layer.out_features for layer in network.modules() if isinstance(layer, torch.nn.Linear)]
     assert widths == [1024, 512, 256, 128, 150]
     assert next(network.parameters()).shape == (1024, 384 + 384)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import os
 import shutil
@@ -21,8 +22,10 @@ import pytest
 from click.testing import CliRunner
 
 from rlacd.cli.main import app
-from rlacd.errors import OptionError, TrainingError
+from rlacd.errors import OptionError, TrainingError, WeightsError
+from rlacd.learn.meshes import Solids
 from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
+from rlacd.policies import make_policy
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 from rlacd.pool.local import InProcessPool, LocalPool
 from rlacd.solid.arrays import Float32Array
@@ -75,7 +78,7 @@ def weights(folder: Path) -> dict[str, bytes]:
 
 def curves(folder: Path) -> list[dict[str, float]]:
     points = [json.loads(line) for line in (folder / "curves.jsonl").read_text().splitlines()]
-    return [{k: v for k, v in point.items() if k != "seconds"} for point in points]
+    return [{k: v for k, v in point.items() if k not in ("seconds", "steps_per_s")} for point in points]
 
 
 def assert_same_run(one: Path, other: Path) -> None:
@@ -250,8 +253,104 @@ def test_an_encoder_of_ones_own_trains_and_decides(meshes: Path, tmp_path: Path)
     options = TrainOptions(**{**TINY, "env_steps": 60})
     with LocalPool(1) as pool:
         train(meshes, tmp_path / "run", options, encoder=Boxes(), pool=pool, say=lambda line: None)
-    policy = load_policy(tmp_path / "run", Boxes())
-    assert policy.choose(Component(small_solids()["cross"])) is not None
+    for kept in ("", "checkpoint.npz", "policy.npz"):
+        policy = load_policy(str(tmp_path / "run" / kept), Boxes())
+        assert policy.choose(Component(small_solids()["cross"])) is not None
+    with pytest.raises(OptionError, match=r"needs an encoder of your own \(boxes\)"):
+        load_policy(tmp_path / "run")
+    with pytest.raises(WeightsError, match="cannot be read"):
+        load_policy(tmp_path)
+
+
+@pytest.fixture
+def sees_points(meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A policy that was trained with a point encoder of the least size."""
+    pytest.importorskip("torch", reason="needs the extra train")
+    from rlacd.policies import points
+
+    tiny = points.Sizes((32, 16, 8), (8, 4, 4), (12, 24, 48), depth=1, heads=2, embedding=16)
+    monkeypatch.setattr(points, "REDUCED", (tiny, 64))
+    return run(meshes, tmp_path / "points", encoder="points", env_steps=60)
+
+
+def test_every_command_takes_a_policy_that_sees_points(meshes: Path, sees_points: Path, tmp_path: Path) -> None:
+    from benchmarks.learned import compare
+    from benchmarks.paper import app as paper
+
+    mesh, policy = str(meshes / "cross.ply"), str(sees_points)
+    (tmp_path / "one").mkdir()
+    shutil.copy(mesh, tmp_path / "one")
+    for words in (
+        ["decompose", mesh, "-o", str(tmp_path / "out.obj"), "--policy", policy],
+        ["batch", str(tmp_path / "one"), "-o", str(tmp_path / "out"), "--policy", policy],
+    ):
+        done = CliRunner().invoke(app, [*words, "--quality", "fast"])
+        assert done.exit_code == 0, done.output
+    solid = Component(small_solids()["cross"])
+    planes = {str(compare.policy_of(name, 0.05).choose(solid)) for name in (policy, f"planes:ap=10:{policy}")}
+    assert "None" not in planes
+    for i in range(20):
+        shutil.copy(mesh, meshes / f"{i}.ply")
+    words = [str(meshes), "--out", str(tmp_path / "again"), "--weights", policy, "--env-steps", "5"]
+    done = CliRunner().invoke(paper, words)
+    assert done.exit_code == 0, done.output
+    with np.load(policy) as one, np.load(tmp_path / "again" / "policy.npz") as other:
+        assert all(np.array_equal(one[k], other[k]) for k in one.files if k.startswith("encoder."))
+
+
+def test_a_policy_sees_points_as_its_network_did_in_training(sees_points: Path) -> None:
+    from rlacd.learn.train import load_policy
+    from rlacd.policies.points import PointEncoder
+
+    named, encoder = load_policy(sees_points), PointEncoder.reduced(TrainOptions().seed)
+    for solid in map(Component, small_solids().values()):
+        assert named.choose(solid) == load_policy(sees_points, encoder).choose(solid)
+
+
+def changed(content: bytes, **changes: Any) -> bytes:
+    """A policy that says other things of its encoder."""
+    file = io.BytesIO(content)
+    with np.load(file) as arrays:
+        held = dict(arrays)
+    about = json.loads(held["about"].tobytes())
+    about["encoder"].update(changes)
+    held["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
+    file = io.BytesIO()
+    np.savez(file, **held)
+    return file.getvalue()
+
+
+def test_damaged_encoders_are_one_sentence(sees_points: Path, tmp_path: Path) -> None:
+    sound = sees_points.read_bytes()
+    sizes = {"groups": [32, 16, 8], "neighbors": [8, 4, 4], "widths": [12, 24, 48], "depth": 1, "heads": 2}
+    for i, changes in enumerate(
+        (
+            {"digest": "another"},
+            {"points": 3},
+            {"points": "many"},
+            {"sizes": sizes},
+            {"sizes": {**sizes, "embedding": 10**9}},
+            {"sizes": {**sizes, "embedding": 16, "neighbors": [65, 4, 4]}},
+            {"sizes": {**sizes, "embedding": 16, "heads": 5}},
+        )
+    ):
+        (tmp_path / f"{i}.npz").write_bytes(changed(sound, **changes))
+        with pytest.raises(WeightsError, match=r"is damaged or not a network of rlacd; train or fetch it again\.$"):
+            make_policy(str(tmp_path / f"{i}.npz"))
+
+
+def test_without_torch_a_policy_that_sees_points_says_what_to_install(meshes: Path, sees_points: Path) -> None:
+    code = """
+import sys
+sys.modules["torch"] = None  # as if it were not installed
+import rlacd.cli.main
+sys.exit(rlacd.cli.main.app(["decompose", *sys.argv[1:]], standalone_mode=False))
+"""
+    words = [sys.executable, "-c", code, str(meshes / "cross.ply"), "--policy", str(sees_points)]
+    said = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert said.returncode != 0
+    assert "pip install 'rlacd[train]'" in " ".join(said.stderr.split())
+    assert "Traceback" not in said.stderr
 
 
 @pytest.mark.slow
@@ -288,7 +387,6 @@ def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tm
     from rlacd.criteria import Concavity
     from rlacd.cut import CutTree
     from rlacd.learn.train import load_policy
-    from rlacd.policies import make_policy
     from rlacd.run import Run
 
     assert "times greedy's parts" in said[-1]
@@ -321,3 +419,35 @@ def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Pat
         run(tmp_path / "empty", tmp_path / "other")
     with pytest.raises(TrainingError, match="there is no folder"):
         run(tmp_path / "nowhere", tmp_path / "another")
+
+
+def test_another_folder_of_meshes_is_refused_at_once_and_does_no_harm(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "run", env_steps=40)
+    shutil.rmtree(tmp_path / "run" / "solids")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(TrainingError, match=r"lacks .*, which the run began with; give the same folder"):
+        run(tmp_path / "empty", tmp_path / "run", resume=True)
+    with pytest.raises(TrainingError, match="there is no folder"):
+        run(tmp_path / "nowhere", tmp_path / "run", resume=True)
+    run(meshes, tmp_path / "run", resume=True)
+    run(meshes, tmp_path / "whole")
+    assert weights(tmp_path / "run") == weights(tmp_path / "whole")
+
+
+def test_a_mesh_that_cannot_be_read_in_mid_run_is_told_and_tried_again(meshes: Path, tmp_path: Path) -> None:
+    said: list[str] = []
+    solids = Solids(meshes, tmp_path / "solids", said.append)
+    (meshes / "cross.ply").rename(tmp_path / "away.ply")
+    assert solids.get("cross.ply") is None
+    assert [line.partition(":")[0] for line in said] == ["cross.ply is left out this time"]
+    (tmp_path / "away.ply").rename(meshes / "cross.ply")
+    assert solids.get("cross.ply") is not None
+
+
+def test_curves_show_values_exploration_and_pace(meshes: Path, tmp_path: Path) -> None:
+    run(meshes, tmp_path / "run", validation=0)
+    points = [json.loads(line) for line in (tmp_path / "run" / "curves.jsonl").read_text().splitlines()]
+    last = [point for point in points if "loss" in point][-1]
+    assert last["q_mean"] <= last["q_max"]
+    assert last["epsilon"] == 0.2
+    assert last["steps_per_s"] > 0

@@ -30,8 +30,7 @@ from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
 from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import least_hulls
-from rlacd.policies.network import KIND, SHORTLIST, Network, best_planes, load_network
-from rlacd.policies.plane_features import FEATURES, sweep_features
+from rlacd.policies.network import SHORTLIST, QFunction, best_planes, q_values
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray
@@ -58,18 +57,16 @@ def policy_of(name: str, length: float | None) -> Policy:
     given = dict(word.partition("=")[::2] for word in words)
     if not given.keys() <= {"ap", "ce", "no-spatial", "no-principal"}:
         raise OptionError(f"{name} is not known; there are planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz.")
-    network = load_network(path, KIND, FEATURES, 1)
     exists = np.repeat(["no-spatial" not in given, "no-principal" not in given], 3 * OFFSETS_PER_AXIS)
     counts = int(given.get("ap", SHORTLIST)), int(given.get("ce", EDGES_PER_COMPONENT))
-    return Deployment(network, length or network.threshold, exists, *counts)
+    return Deployment(q_values(path, length), exists, *counts)
 
 
 @dataclass(frozen=True)
 class Deployment:
     """The paper's rule, as `rlacd.policies.network.QPolicy`, of the planes that exist; ties go to the sweep's first."""
 
-    network: Network
-    length: float
+    values: QFunction
     exists: BoolArray
     planes: int
     edges: int
@@ -77,9 +74,8 @@ class Deployment:
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
         """Choose a plane."""
         candidates = paper_planes(component)
-        values = self.network(sweep_features(component, self.length))[:, 0]
         valid = (distinct_planes if self.exists.all() else valid_planes)(component, candidates)
-        best = best_planes(values, self.exists & valid, self.planes)
+        best = best_planes(self.values(component), self.exists & valid, self.planes)
         return least_hulls(component, candidates, np.sort(best), self.edges, threads)
 
 

@@ -20,11 +20,12 @@ from torch import Tensor, nn
 
 from rlacd.errors import OptionError, RlacdError
 from rlacd.learn.checkpoint import adam_state, restore_adam, tensors
-from rlacd.learn.encoder import Encoder
 from rlacd.learn.episodes import Episode
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.rollouts import Rollouts
-from rlacd.policies.network import Network
+from rlacd.policies.encoder import Encoder
+from rlacd.policies.network import KIND, Network
+from rlacd.policies.points import PointEncoder
 from rlacd.pool import Shared
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 
@@ -48,10 +49,11 @@ def q_network(inputs: int, outputs: int) -> nn.Sequential:
     return nn.Sequential(*layers[:-1])
 
 
-def plain(network: nn.Module, about: Mapping[str, Any]) -> Network:
-    """Copy a network for a file (`rlacd.policies.network`)."""
+def plain(network: nn.Module, **about: Any) -> Network:
+    """Copy a network as `rlacd.policies.network` takes it."""
     linear = [layer for layer in network.modules() if isinstance(layer, nn.Linear)]
-    return Network([(x.weight.detach().cpu().numpy(), x.bias.detach().cpu().numpy()) for x in linear], about)
+    layers = [(x.weight.detach().cpu().numpy(), x.bias.detach().cpu().numpy()) for x in linear]
+    return Network(layers, about or {"threshold": 1.0})
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,14 +173,14 @@ class DQN:
         self.device = pick_device(options.device, large=encoder.outputs > 1)
         torch.manual_seed(options.seed)
         self.network = q_network(encoder.dim, encoder.outputs).to(self.device)
-        self.target = copy.deepcopy(self.network)
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=options.learning_rate, fused=True)
         self.replay = ReplayBuffer(options.buffer_size)
         self.rng = np.random.default_rng([options.seed, 0])
         self.env_steps = self.updates = 0
-        self.losses: list[tuple[float, float]] = []  # and mean targets, of the episode learned from
+        self.learned: list[dict[str, float]] = []  # what the curves show of each gradient step of the last episode
         self.returns = options.target == "return"
-        self.playing = self.target if self.returns else self.network  # the average plays and is validated
+        self.target_network = copy.deepcopy(self.network)  # eq. 8 asks it
+        self.playing = copy.deepcopy(self.network) if self.returns else self.network  # an average; it is validated
 
     def train(self, rollouts: Rollouts) -> Iterator[Episode]:
         """Play episodes and learn from them until the last step."""
@@ -188,17 +190,21 @@ class DQN:
             self.learn_from(episode)
             yield episode
 
-    def acting(self) -> tuple[Shared | None, float]:
-        """How new episodes are played (4.1): at random at first, then epsilon-greedily; see `Rollouts.begin`."""
-        if self.env_steps < self.options.learning_starts:
-            return None, 1.0
+    @property
+    def epsilon(self) -> float:
+        """Share of random cuts in new episodes (4.1): all at first."""
         thousands = (self.env_steps - self.options.learning_starts) // 1000
-        network = Shared({"network": plain(self.playing, {"threshold": 1.0}).to_bytes()})
-        return network, self.options.epsilon * self.options.epsilon_decay**thousands
+        return 1.0 if thousands < 0 else self.options.epsilon * self.options.epsilon_decay**thousands
+
+    def acting(self) -> tuple[Shared | None, float]:
+        """How new episodes are played; see `Rollouts.begin`."""
+        if self.env_steps < self.options.learning_starts:
+            return None, self.epsilon
+        return Shared({"network": plain(self.playing).to_bytes()}), self.epsilon
 
     def learn_from(self, episode: Episode) -> None:
         """Keep an episode, and learn as often as its cuts ask for."""
-        self.losses = []
+        self.learned = []
         if len(episode.planes):
             self.replay.add(Experience.of(episode, self.options.target, self.encoder.outputs == 1))
         for _ in range(len(episode.planes)):
@@ -211,18 +217,20 @@ class DQN:
         drawn = self.replay.sample(self.options.batch_size, self.rng)
         batch = {name: torch.from_numpy(array).to(self.device) for name, array in drawn.items()}
         target = self.targets(batch)
-        loss = bellman_loss(self.network(batch["features"]), batch["planes"], target)
+        q = self.network(batch["features"])
+        loss = bellman_loss(q, batch["planes"], target)
         self.optimizer.zero_grad()
         loss.backward()
         self.optimizer.step()
         self.updates += 1
         if self.returns:
             with torch.no_grad():
-                for mean, new in zip(self.target.parameters(), self.network.parameters(), strict=True):
+                for mean, new in zip(self.playing.parameters(), self.network.parameters(), strict=True):
                     mean.lerp_(new, TAU)
         elif self.updates % self.options.target_frequency == 0:
-            self.target.load_state_dict(self.network.state_dict())
-        self.losses.append((float(loss.detach()), float(target.mean())))
+            self.target_network.load_state_dict(self.network.state_dict())
+        found = {"loss": loss, "target": target.mean(), "q_mean": q.mean(), "q_max": q.max()}
+        self.learned.append({name: float(value.detach()) for name, value in found.items()})
 
     @torch.no_grad()
     def targets(self, batch: Mapping[str, Tensor]) -> Tensor:
@@ -236,19 +244,30 @@ class DQN:
             possible = torch.minimum(batch["rewards"].clamp(min=0), volume * batch["excess"] + finish)
             return possible / (weight * batch["excess"].clamp(min=LEAST_EXCESS))
         mask = batch["child_masks"]
-        q = self.target(batch["child_features"]).reshape(mask.shape) * weight
+        q = self.target_network(batch["child_features"]).reshape(mask.shape) * weight
         values = q.masked_fill(~mask, -torch.inf).amax(dim=1)  # eq. 7
         return dual_state_target(batch["rewards"], values, batch["child_discounts"], batch["owner"]) / weight
 
+    def stored(self) -> Network:
+        """The network that plays, as a file holds it: with its encoder, or the name of one's own."""
+        sees, about = self.encoder, {"kind": KIND, "threshold": self.options.threshold}
+        if isinstance(sees, PointEncoder):
+            return Network(plain(self.playing).layers, {**about, "encoder": sees.about()}, sees.weights())
+        return plain(self.playing, **about, **({"encoder": sees.digest} if sees.digest else {}))
+
     def state(self) -> tuple[dict[str, Mapping[str, Any]], dict[str, Any]]:
         """Everything, for a checkpoint: arrays or tensors by owner and name, and plain values."""
-        networks = {"network": self.network.state_dict(), "target": self.target.state_dict()}
+        networks = {name: network.state_dict() for name, network in self._networks().items()}
         plain = {"env_steps": self.env_steps, "updates": self.updates, "generator": self.rng.bit_generator.state}
         return {**networks, "replay": self.replay.state(), "adam": adam_state(self.optimizer)}, plain
 
+    def _networks(self) -> dict[str, nn.Module]:
+        """The networks that a checkpoint keeps: the second is the one that follows the first."""
+        return {"network": self.network, "target": self.playing if self.returns else self.target_network}
+
     def restore(self, arrays: Mapping[str, dict[str, NDArray[Any]]], plain: Mapping[str, Any]) -> None:
         """Restore the result of `state`."""
-        for name, network in (("network", self.network), ("target", self.target)):
+        for name, network in self._networks().items():
             saved = tensors(arrays[name]).values()
             network.load_state_dict(dict(zip(network.state_dict(), saved, strict=True)))
         restore_adam(self.optimizer, tensors(arrays.get("adam", {})))

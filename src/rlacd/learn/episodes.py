@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd.learn.checkpoint import packed, unpacked
-from rlacd.learn.encoder import Encoder
 from rlacd.learn.environment import CutEnv
 from rlacd.learn.options import TrainOptions
 from rlacd.planes.sweep import valid_planes
+from rlacd.policies.encoder import Encoder
 from rlacd.policies.network import Network
 from rlacd.solid.arrays import BoolArray, Float32Array, FloatArray, Int64Array
 from rlacd.solid.component import Component

@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from manifold3d import Manifold, Mesh64
+from numpy.typing import NDArray
 
 from rlacd.errors import RlacdError, TrainingError
 from rlacd.io.read import READERS
@@ -69,14 +73,18 @@ def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: in
     Raises
     ------
     TrainingError
-        There is no such folder, or nothing in it to train on.
+        There is no such folder, nothing in it to train on, or not what the run began with.
     """
     kept = run / "meshes.json"
-    if kept.exists():
-        listed = json.loads(kept.read_text(encoding="utf-8"))
-        return MeshList(tuple(listed.pop("training")), tuple(listed.pop("validation")), **listed)
     if not meshes.is_dir():
         raise TrainingError(f"there is no folder {meshes}; give one that holds meshes.")
+    if kept.exists():
+        listed = json.loads(kept.read_text(encoding="utf-8"))
+        names = listed.pop("training"), listed.pop("validation")
+        missing = [name for name in (*names[0], *names[1]) if not (meshes / name).is_file()]
+        if missing:
+            raise TrainingError(f"{meshes} lacks {missing[0]}, which the run began with; give the same folder.")
+        return MeshList(tuple(names[0]), tuple(names[1]), **listed)
     found = list_meshes(meshes, max_faces, validation, seed)
     run.mkdir(parents=True, exist_ok=True)
     kept.write_text(json.dumps(dataclasses.asdict(found), indent=1), encoding="utf-8")
@@ -96,27 +104,41 @@ def turned(content: bytes, axis: int, degrees: float) -> Component | None:
     return Component(solid)
 
 
-class Solids:
-    """Solids of a folder's meshes by name, each repaired once; the folder `cache` is this class's own."""
+NOTHING: Mapping[str, NDArray[Any]] = MappingProxyType(
+    {"vertices": np.empty((0, 3)), "faces": np.empty((0, 3), np.uint64)}
+)
+"""Arrays of no solid."""
 
-    def __init__(self, folder: Path, cache: Path) -> None:
-        self._folder, self._cache = folder, cache
+
+class Solids:
+    """Solids of a folder's meshes by name, each repaired once; the folder `cache` is this class's own.
+
+    `say` is told of a file that cannot be read, which is tried again the next time.
+    """
+
+    def __init__(self, folder: Path, cache: Path, say: Callable[[str], None] = print) -> None:
+        self._folder, self._cache, self._say = folder, cache, say
 
     def get(self, name: str) -> Component | None:
         """Get a solid in its frame; None if it cannot be repaired."""
         return turned(self.packed(name), 0, 0.0)
 
     def packed(self, name: str) -> bytes:
-        """Get the arrays of a solid, for `turned` on any machine; empty ones if it cannot be repaired."""
+        """Get the arrays of a solid, for `turned` on any machine; empty ones if it cannot be read or repaired."""
         place = self._cache / f"{hashlib.sha256(name.encode()).hexdigest()[:24]}.npz"
         if place.exists():
             return place.read_bytes()
         try:
-            solid = repair(load_mesh(self._folder / name), threads=1)
+            mesh = load_mesh(self._folder / name)
+        except RlacdError as error:
+            self._say(f"{name} is left out this time: {error}")
+            return packed(NOTHING)
+        try:
+            solid = repair(mesh, threads=1)
             Component(solid.shape)
-            vertices, faces = solid.vertices, solid.faces.astype(np.uint64)
+            arrays: Mapping[str, NDArray[Any]] = {"vertices": solid.vertices, "faces": solid.faces.astype(np.uint64)}
         except (RlacdError, ValueError):  # flat or empty: nothing to cut
-            vertices, faces = np.empty((0, 3)), np.empty((0, 3), np.uint64)
-        content = packed({"vertices": vertices, "faces": faces})
+            arrays = NOTHING
+        content = packed(arrays)
         write_file(place, content)
         return content

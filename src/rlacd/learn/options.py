@@ -35,7 +35,10 @@ class TrainOptions:
     max_faces: int = option(2000, least=4)
     """Skip meshes with more triangles than this."""
 
-    # Q-learning (3.5, 4.1)
+    # Q-learning (3.3, 3.5, 4.1)
+    encoder: str = option("sweep", one_of=("sweep", "points"))
+    """What the network sees: sweep, of each plane what the sweep gives; or points, of a component the paper's encoder
+    of points (3.3), reduced and with random weights that are not learned, for the values of all planes at once."""
     target: str = option("one-step", one_of=("one-step", "return"))
     """What a plane is worth: one-step, its reward plus the values of the two sides (eq. 8); or return, the discounted
     rewards of the whole episode below it, in units of the component's excess volume, learned by a network whose average
@@ -123,6 +126,10 @@ _ONE_MESH: Mapping[str, Any] = {
     "validate_every": 250,
 }
 
-TRAIN_PRESETS: Mapping[str, Mapping[str, Any]] = {"paper": {}, "returns": _RETURNS, "one-mesh": _ONE_MESH}
+_POINTS: Mapping[str, Any] = {**_RETURNS, "encoder": "points", "buffer_size": 100_000, "learning_rate": 3e-4}
+
+TRAIN_PRESETS: Mapping[str, Mapping[str, Any]] = {
+    **{"paper": {}, "returns": _RETURNS, "one-mesh": _ONE_MESH, "points": _POINTS}
+}
 """Changes to the defaults, which are the paper's run: its loss without r2 (4.5.3), as far as it can be learned on two
-cores; the same for a few meshes that are learned by heart in a minute."""
+cores; the same for a few meshes that are learned by heart in a minute; and by the paper's network, reduced."""

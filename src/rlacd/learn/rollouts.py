@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from rlacd.criteria import Concavity
 from rlacd.errors import TrainingError
-from rlacd.learn.encoder import Encoder
 from rlacd.learn.environment import CutEnv, Memory
 from rlacd.learn.episodes import Episode, Player
 from rlacd.learn.meshes import TURNS, Solids, turned
 from rlacd.learn.options import TrainOptions
+from rlacd.policies.encoder import Encoder
 from rlacd.policies.network import Network, parse_network
 from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError
 from rlacd.solid.component import Component

@@ -24,14 +24,15 @@ from rlacd.errors import OptionError, TrainingError
 from rlacd.io.write.atomic import write_file
 from rlacd.learn.checkpoint import load_checkpoint, save_checkpoint
 from rlacd.learn.dqn import DQN, plain
-from rlacd.learn.encoder import Encoder, SweepEncoder
 from rlacd.learn.episodes import Episode
 from rlacd.learn.meshes import MeshList, Solids, list_once
 from rlacd.learn.options import TrainOptions
 from rlacd.learn.rollouts import Rollouts
 from rlacd.policies import Policy, make_policy
+from rlacd.policies.encoder import Encoder, SweepEncoder
 from rlacd.policies.greedy import RandomShortlist
-from rlacd.policies.network import KIND, SHORTLIST, Network, QPolicy, load_network
+from rlacd.policies.network import SHORTLIST, Network, QPolicy, q_values
+from rlacd.policies.points import PointEncoder
 from rlacd.pool import Pool, ProcessLimits
 from rlacd.pool.local import InProcessPool
 from rlacd.run import Run
@@ -83,8 +84,9 @@ def train(
     left_out = f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
     say(f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; {left_out}")
     with ExitStack() as stack:
-        where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids")
-        sees = encoder or SweepEncoder(options.threshold)
+        where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids", say)
+        points = options.encoder == "points"
+        sees = encoder or (PointEncoder.reduced(options.seed) if points else SweepEncoder(options.threshold))
         rollouts = Rollouts(where, solids, listed.training, options, sees, limits or ProcessLimits(), say)
         agent = DQN(options, sees)
         training = Training(run, agent, rollouts, Validation(listed, solids, options), say)
@@ -102,6 +104,7 @@ class Training:
         self.folder, self.agent, self.rollouts, self.validation, self.say = folder, agent, rollouts, validation, say
         self.options, self.best, self.seconds = agent.options, np.inf, 0.0
         self.seen: dict[str, list[float]] = {}  # since the last point of the curves
+        self.logged = 0, 0.0  # cuts and seconds at that point
 
     def run(self) -> None:
         """Train until the last step."""
@@ -125,16 +128,18 @@ class Training:
 
     def see(self, episode: Episode) -> None:
         """Note what an episode adds to the next point of the curves."""
-        for loss, target in self.agent.losses:
-            self._add(loss=loss, target=target)
+        for step in self.agent.learned:
+            self._add(**step)
         if len(episode.planes):
             self._add(reward=float(episode.rewards.mean()), parts=float(episode.parts))
         self._add(**{f"ended_{episode.ended}": 1.0})
 
     def log(self) -> None:
         """Append a point to the curves: means since the last one; for ways to end, counts."""
-        self._point({k: sum(v) if k.startswith("ended_") else sum(v) / len(v) for k, v in self.seen.items()})
-        self.seen = {}
+        means = {k: sum(v) if k.startswith("ended_") else sum(v) / len(v) for k, v in self.seen.items()}
+        (steps, seconds), self.logged, self.seen = self.logged, (self.agent.env_steps, self.seconds), {}
+        pace = (self.agent.env_steps - steps) / max(self.seconds - seconds, 1e-9)
+        self._point({**means, "epsilon": self.agent.epsilon, "steps_per_s": round(pace, 3)})
 
     def validate(self) -> None:
         """Count the parts of the validation's solids; the network with the fewest is kept as the best."""
@@ -142,8 +147,7 @@ class Training:
         self._point({f"validation_{name}": value for name, value in ratios.items()})
         if ratios["own_plane"] <= self.best:
             self.best = ratios["own_plane"]
-            about = {"kind": KIND, "threshold": self.options.threshold}
-            write_file(self.folder / "policy.npz", plain(self.agent.playing, about).to_bytes())
+            write_file(self.folder / "policy.npz", self.agent.stored().to_bytes())
 
     def save(self) -> None:
         """Write a checkpoint."""
@@ -170,6 +174,7 @@ class Training:
         self.agent.restore(arrays, state["agent"])
         self.rollouts.restore(arrays["rollouts"])
         self.seconds, self.seen, self.best = state["seconds"], state["seen"], state["best"]
+        self.logged = self.agent.env_steps, self.seconds
         kept = [line for line in curves.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
         done = self.agent.env_steps
         curves.write_text("".join(x for x in kept if json.loads(x)["env_steps"] <= done), encoding="utf-8")
@@ -191,13 +196,14 @@ def policy_of(network: Network, encoder: Encoder, **deployment: int) -> QPolicy:
     return QPolicy(lambda component: network(encoder.describe(component)).reshape(-1), **deployment)
 
 
-def load_policy(run: Path, encoder: Encoder | None = None, **deployment: int) -> QPolicy:
-    """Get the best network of a run as a policy, whatever its encoder; `deployment` as in `policy_of`."""
-    if not (run / "options.json").is_file():
-        raise OptionError(f"{run} holds no run.")
-    options = TrainOptions(**json.loads((run / "options.json").read_text(encoding="utf-8")))
-    sees = encoder or SweepEncoder(options.threshold)
-    return policy_of(load_network(str(run / "policy.npz"), KIND, sees.dim, sees.outputs), sees, **deployment)
+def load_policy(run: str | Path, encoder: Encoder | None = None, **deployment: int) -> QPolicy:
+    """Get the best network of a run, its folder its checkpoint or its policy's file, as a policy.
+
+    `encoder` is your own that it was trained with, if any; `deployment` as in `policy_of`.
+    """
+    path = Path(run) / "policy.npz" if Path(run).is_dir() else Path(run)
+    path = path.with_name("policy.npz") if path.name == "checkpoint.npz" else path
+    return QPolicy(q_values(str(path), encoder=encoder), **deployment)
 
 
 class Validation:
@@ -215,7 +221,7 @@ class Validation:
 
     def ratios(self, network: nn.Module, encoder: Encoder) -> dict[str, float]:
         """Ratios of the network's own plane, its ten best, and of random planes."""
-        fixed = plain(network, {"threshold": 1.0})
+        fixed = plain(network)
         own, ten = (self._parts(policy_of(fixed, encoder, shortlist=n)) for n in (1, SHORTLIST))
         ratios = {"own_plane": mean_ratio(own, self._greedy), "ten_best": mean_ratio(ten, self._greedy)}
         return {"parts": sum(own) / len(own), **ratios, "random": self._random}

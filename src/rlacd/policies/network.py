@@ -12,19 +12,20 @@ import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
-from rlacd.errors import WeightsError
+from rlacd.errors import OptionError, WeightsError, import_extra
 from rlacd.io.read.open_file import read_file
 from rlacd.planes.candidates import EDGES_PER_COMPONENT
 from rlacd.planes.sweep import distinct_planes, paper_planes
+from rlacd.policies.encoder import Encoder, SweepEncoder
 from rlacd.policies.greedy import least_hulls
-from rlacd.policies.plane_features import FEATURES, sweep_features
 from rlacd.solid.arrays import Float32Array
 from rlacd.solid.component import Component, Plane
 
@@ -33,10 +34,15 @@ MOST_BYTES = 2**28
 
 
 DAMAGE = (
-    *(ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, ArithmeticError, RecursionError),
-    *(MemoryError, NotImplementedError, zipfile.BadZipFile),
+    *(ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, ArithmeticError),
+    *(MemoryError, RuntimeError, zipfile.BadZipFile),
 )
 """Exceptions that parsing a damaged file may raise."""
+
+DAMAGED = "{} is damaged or not a network of rlacd; train or fetch it again."
+
+ENCODER = "encoder."
+"""Prefix of the encoder's weights in a file."""
 
 
 class Network:
@@ -46,16 +52,22 @@ class Network:
     ----------
     layers : sequence of (weight [outputs, inputs], bias [outputs])
     about : mapping
-        Facts in the file: ``kind``, and ``threshold``, the length of the criterion it was trained with.
+        Facts in the file: ``kind``; ``threshold``, the length of the criterion it was trained with; ``encoder``, if it
+        is not the sweep's: its ``digest``, and what `rlacd.policies.points.PointEncoder` is made from.
+    encoder : mapping
+        The encoder's weights by name, if it has any.
     """
 
     def __init__(
-        self, layers: Sequence[tuple[NDArray[np.generic], NDArray[np.generic]]], about: Mapping[str, Any]
+        self,
+        layers: Sequence[tuple[NDArray[np.generic], NDArray[np.generic]]],
+        about: Mapping[str, Any],
+        encoder: Mapping[str, NDArray[Any]] = MappingProxyType({}),
     ) -> None:
         self.layers = [(w.astype(np.float32), b.astype(np.float32)) for w, b in layers]
         self._by_input = [np.ascontiguousarray(weight.T) for weight, _ in self.layers]
         self._biases = [bias for _, bias in self.layers]
-        self.about = about
+        self.about, self.encoder = about, encoder
         self.threshold = float(about["threshold"])
 
     def __call__(self, features: Float32Array) -> Float32Array:
@@ -67,33 +79,38 @@ class Network:
     def to_bytes(self) -> bytes:
         """Make the content of a file."""
         arrays = {f"{name}{i}": a for i, layer in enumerate(self.layers) for name, a in zip("wb", layer, strict=True)}
+        arrays |= {ENCODER + name: array for name, array in self.encoder.items()}
         file = io.BytesIO()
         about = np.frombuffer(json.dumps(dict(self.about)).encode(), np.uint8)
         np.savez(file, allow_pickle=False, about=about, **arrays)
         return file.getvalue()
 
 
-@lru_cache(maxsize=4)
 def load_network(path: str | os.PathLike[str], kind: str, inputs: int, outputs: int) -> Network:
-    """Read a network; the last four are cached.
+    """Read a network of a kind; the last four are cached.
 
     Raises
     ------
     WeightsError
         The file is missing, damaged, or not a network of this kind.
     """
+    network = _read(os.fspath(path))
+    shape = network.layers[0][0].shape[1], network.layers[-1][0].shape[0]
+    if network.about.get("kind") != kind or shape != (inputs, outputs):
+        raise WeightsError(f"{path} is not a network of this kind ({kind}, {inputs} inputs); give another path.")
+    return network
+
+
+@lru_cache(maxsize=4)
+def _read(path: str) -> Network:
     try:
         content = read_file(path)
     except OSError as error:
         raise WeightsError(f"The policy {path} cannot be read ({error}); give another path.") from error
     try:
-        network = parse_network(content)
+        return parse_network(content)
     except DAMAGE as error:
-        raise WeightsError(f"{path} is damaged or not a network of rlacd; train or fetch it again.") from error
-    shape = network.layers[0][0].shape[1], network.layers[-1][0].shape[0]
-    if network.about.get("kind") != kind or shape != (inputs, outputs):
-        raise WeightsError(f"{path} is not a network of this kind ({kind}, {inputs} inputs); give another path.")
-    return network
+        raise WeightsError(DAMAGED.format(path)) from error
 
 
 def parse_network(content: bytes) -> Network:
@@ -109,11 +126,14 @@ def parse_network(content: bytes) -> Network:
             if weight.ndim != 2 or bias.shape != weight.shape[:1] or {weight.dtype.kind, bias.dtype.kind} != {"f"}:
                 raise ValueError
             layers.append((weight, bias))
+        encoder = {name.removeprefix(ENCODER): arrays[name] for name in arrays.files if name.startswith(ENCODER)}
     if not layers or any(a[0].shape[0] != b[0].shape[1] for a, b in pairwise(layers)):
         raise ValueError
-    if not all(np.isfinite(a).all() for layer in layers for a in layer):
+    if not {array.dtype.kind for array in encoder.values()} <= {"f", "i"}:
         raise ValueError
-    network = Network(layers, about)
+    if not all(np.isfinite(a).all() for a in (*chain(*layers), *encoder.values())):
+        raise ValueError
+    network = Network(layers, about, encoder)
     if not 0 < network.threshold < math.inf:
         raise ValueError
     return network
@@ -158,13 +178,54 @@ class QPolicy:
 
 
 def deployed(path: str, scale: float | None = None) -> QPolicy:
-    """Deploy a network as the paper does; `path` is a file written by ``rlacd train`` with cheap features.
+    """Deploy a network as the paper does; see `q_values`."""
+    return QPolicy(q_values(path, scale), SHORTLIST, EDGES_PER_COMPONENT)
 
-    `scale` is the criterion's length in the frame; the network's own by default.
+
+def q_values(path: str, scale: float | None = None, encoder: Encoder | None = None) -> QFunction:
+    """Get the values of planes by a file that ``rlacd train`` wrote.
+
+    Parameters
+    ----------
+    scale : float, optional
+        The criterion's length in the frame; the network's own by default.
+    encoder : Encoder, optional
+        One of your own that the network was trained with; by default the one that the file names.
+
+    Raises
+    ------
+    WeightsError
+        The file is missing, damaged, or not a network of this kind.
+    OptionError
+        The network was trained with an encoder of one's own, and this is not it.
+    MissingExtraError
+        The encoder needs torch.
     """
-    network = load_network(path, KIND, FEATURES, 1)
-    threshold = network.threshold if scale is None else scale
-    return QPolicy(lambda c: network(sweep_features(c, threshold))[:, 0], SHORTLIST, EDGES_PER_COMPONENT)
+    own = _read(path).about.get("encoder")
+    if isinstance(own, str) and (encoder is None or encoder.digest != own):
+        raise OptionError(f"{path} needs an encoder of your own ({own}); give it to load_policy of rlacd.learn.train.")
+    sees = encoder or named_encoder(path, scale)
+    network = load_network(path, KIND, sees.dim, sees.outputs)
+    return lambda component: network(sees.describe(component)).reshape(-1)
+
+
+def named_encoder(path: str, scale: float | None = None) -> Encoder:
+    """Get the encoder that a network's file names; raises as `q_values`."""
+    file = _read(path)
+    try:
+        return _stored_encoder(file, file.threshold if scale is None else scale)
+    except DAMAGE as error:
+        raise WeightsError(DAMAGED.format(path)) from error
+
+
+@lru_cache(maxsize=4)
+def _stored_encoder(file: Network, threshold: float) -> Encoder:
+    if "encoder" not in file.about:
+        return SweepEncoder(threshold)
+    import_extra("torch", "a policy that sees points", "train")
+    from rlacd.policies.points import PointEncoder
+
+    return PointEncoder.stored(file.about["encoder"], file.encoder)
 
 
 def best_planes(values: Float32Array, mask: NDArray[np.bool_], count: int) -> NDArray[np.intp]:

@@ -1,4 +1,7 @@
-"""What the Q network sees of a component: s(m) in the paper's 3.3. `rlacd.learn.train.train` takes one of your own."""
+"""What the Q network sees of a component: s(m) in the paper's 3.3. `rlacd.learn.train.train` takes one of your own.
+
+`SweepEncoder` is the default; `rlacd.policies.points.PointEncoder` is the paper's.
+"""
 
 from __future__ import annotations
 
