@@ -19,7 +19,9 @@ from rlacd.plain_json import as_plain, printable, to_json
 
 
 def _info(mesh: Path, as_json: bool, package_dirs: Sequence[str] | None) -> None:
-    """Show what a file contains and how it would be repaired; of a robot, its links with collision meshes.
+    """Show what a file contains and how it would be repaired.
+
+    Of a robot, show its links with collision meshes.
 
     \b
     Examples:
