@@ -61,7 +61,7 @@ class Sizes:
 
 
 REDUCED = Sizes((128, 64, 16), (16, 8, 8), (48, 96, 192), depth=2, embedding=64), 512
-"""Sizes and points that take 15 ms a component; the published sizes with 2,048 points take 360."""
+"""Sizes and points that take under 20 ms a component; the published sizes with 2,048 points take 360."""
 
 
 class Attention(nn.Module):
