@@ -188,14 +188,14 @@ def test_a_robot_without_collision_meshes_is_refused(robots: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "reference", ["../{}", "meshes/../../{}", "/{}", "file:///{}", "package://{}", "package://tmp/{}"]
+    "reference", ["../{}", "meshes/../../{}", "/{}", "file:///{}", "package://{}", "package://all/{}"]
 )
 @pytest.mark.promise("hostile-robots")
 def test_an_uploaded_robot_names_files_of_its_own_folder_only(
     press: ViewServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: str
 ) -> None:
-    """The folder of all temporary files is named tmp, and holds a package."""
-    folder = tmp_path / "tmp"
+    """The folder of all temporary files is named all, and holds a package."""
+    folder = tmp_path / "all"
     (folder / "mine").mkdir(parents=True)
     (folder / "mine" / "package.xml").write_text("<package><name>mine</name></package>")
     trimesh.creation.box().export(folder / "mine" / "secret.stl")
