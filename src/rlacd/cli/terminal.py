@@ -59,12 +59,14 @@ def graceful_stop(said: str, *, in_kernels: bool = False) -> Iterator[threading.
         say(f"stopping; {said} (Ctrl-C again to quit at once)")
 
     with handling(on_interrupt):
-        if in_kernels:
+        counts = in_kernels and threading.current_thread() is threading.main_thread()
+        if counts:
             count_interrupts(ExitCode.INTERRUPTED, 1.0)  # the second one leaves a second to end in good order
         try:
             yield wanted
         finally:
-            forget_interrupts()
+            if counts:
+                forget_interrupts()
 
 
 def open_bar(*columns: str | None, **fields: Any) -> Bars | None:
