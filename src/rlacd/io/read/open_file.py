@@ -53,8 +53,10 @@ def read_file(path: str | os.PathLike[str], most: int = LARGEST_FILE) -> bytes:
 
 def missing(path: Path | str) -> MeshFileError:
     """The error for a file that does not exist; a path may be an address, of which `Path` keeps one slash."""
-    if re.match(r"(https?|ftp|s3|gs):/", str(path), re.IGNORECASE):
-        return MeshFileError(f"{path} is an address, and nothing is fetched: download the file, and give its path")
+    address = re.fullmatch(r"((?:https?|ftp|s3|gs):)/+(.*)", str(path), re.IGNORECASE | re.DOTALL)
+    if address:
+        named = "//".join(address.groups())
+        return MeshFileError(f"{named} is an address, and nothing is fetched: download the file, and give its path")
     return MeshFileError(f"{path} does not exist: check the spelling and the folder")
 
 
