@@ -1,13 +1,11 @@
-// Python bindings of distances: of points, of a part from its hull, of hulls from a solid and of their union.
+// Python bindings of distances: of points, of hulls from a solid and of their union.
 #include <nanobind/stl/shared_ptr.h>
 
 #include "bind/released.hpp"
 #include "convex/union_distance.hpp"
 #include "core/parallel.hpp"
+#include "solid/against.hpp"
 #include "solid/apart.hpp"
-#include "solid/concavity.hpp"
-#include "solid/filling.hpp"
-#include "solid/glue.hpp"
 #include "surface/crossings.hpp"
 #include "surface/pushed.hpp"
 #include "surface/surface.hpp"
@@ -107,54 +105,30 @@ void bind_surface(nb::module_& m) {
         "within `reach` of the solid; the search ends when `enough` are found.");
 }
 
-void bind_concavity(nb::module_& m) {
-  nb::class_<TreeCache>(m, "TreeCache", "The tree of one part's surface, made by the first test that needs it.")
-      .def(nb::init<>());
-  m.def("meets_concavity",
-        released([](const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double threshold,
-                    const TreeCache* tree) {
-          const TreeCache own;
-          return meets_concavity(part, hull, part_volume, hull_volume, threshold, tree ? *tree : own);
-        }),
-        "vertices"_a, "faces"_a, "hull"_a, "part_volume"_a, "hull_volume"_a, "threshold"_a, "tree"_a = nb::none(),
-        "Whether the concavity of a closed part with this hull is certainly <= threshold.\n\n"
-        "False when it is larger, or so close (0.1 %) that branch and bound gave up. The hull must hold the part. "
-        "`tree` is that of the part's surface; without it, one is made and forgotten.");
-  m.def("volume_radius", released(volume_radius), "part_volume"_a, "hull_volume"_a,
-        "R_v: the radius of a ball with the volume between a part and its hull.");
-  m.def("concavity",
-        released([](const Mesh& part, const ConvexBody& hull, double part_volume, double hull_volume, double tolerance,
-                    double floor, const TreeCache* tree) {
-          require_positive(tolerance);
-          const TreeCache own;
-          const Concavity c = concavity(part, hull, part_volume, hull_volume, tolerance, floor, tree ? *tree : own);
-          return std::tuple(c.value(), c.part_to_hull, c.hull_to_part, c.volume_radius);
-        }),
-        "vertices"_a, "faces"_a, "hull"_a, "part_volume"_a, "hull_volume"_a, "tolerance"_a, "floor"_a = 0.0,
-        "tree"_a = nb::none(),
-        "Concavity of a closed part with this hull: (value, part_to_hull, hull_to_part, volume_radius).\n\n"
-        "The first three are certified intervals (lower, upper). The value's is at most `tolerance` wide; that of a "
-        "one-sided distance may be wider below the value, where the others decide it. Values up to `floor` need not be "
-        "told apart: the interval may then be as wide as (0, floor), which is much faster for nearly convex parts.");
-  m.def("glue", released(glue), "vertices_a"_a, "faces_a"_a, "vertices_b"_a, "faces_b"_a,
-        "Surface (vertices [V, 3], faces [F, 3]) of the union of two closed solids with disjoint interiors: both "
-        "surfaces without the regions where they touch face to face (within 1e-8). Not a closed mesh: for measuring "
-        "only.");
-}
-
-void bind_filling(nb::module_& m) {
-  nb::class_<Filling>(m, "Filling", "A closed solid that hulls of its parts are held against.")
-      .def("__init__", released([](Filling* self, const Mesh& solid, int threads) {
+void bind_against(nb::module_& m) {
+  nb::class_<Against>(m, "Against", "A closed solid that convex hulls of its parts are held against.")
+      .def("__init__", released([](Against* self, const Mesh& solid, int threads) {
              require(!solid.faces.empty(), "the solid has no faces");
-             new (self) Filling(solid, threads);
+             new (self) Against(solid, threads);
            }),
            "vertices"_a, "faces"_a, "threads"_a = 1)
-      .def_prop_ro("surface", &Filling::surface, nb::rv_policy::reference_internal, "The solid's surface.")
-      .def("is_feasible", released(&Filling::is_feasible), "hull"_a, "threshold"_a,
-           "Whether the surfaces of a hull and of the solid's share of it may be as near as the threshold.")
+      .def_prop_ro("surface", &Against::surface, nb::rv_policy::reference_internal, "The solid's surface.")
+      .def("meets", released(&Against::meets), "hull"_a, "threshold"_a,
+           "Whether no point of the solid's surface is certainly deeper than the threshold inside a hull, and none of "
+           "the hull's surface farther than that from the solid.\n\n"
+           "False when one is, or so nearly (0.1 %) that branch and bound gave up.")
+      .def("measure", released([](const Against& self, const ConvexBody& hull, double tolerance, double floor) {
+             require_positive(tolerance);
+             const Against::Fit fit = self.measure(hull, tolerance, floor);
+             return std::pair(fit.depth, fit.reach);
+           }),
+           "hull"_a, "tolerance"_a, "floor"_a = 0.0,
+           "How deep the solid's surface comes into a hull at most, and how far the hull's surface is from the solid: "
+           "(depth, reach), certified intervals (lower, upper).\n\n"
+           "That of the larger is at most `tolerance` wide, or ends below `floor`.")
       .def(
           "feasible_volumes",
-          released([](const Filling& self, const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs,
+          released([](const Against& self, const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs,
                       double threshold, int threads) {
             const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
             std::vector<double> volumes(pairs.shape(0));
@@ -164,23 +138,18 @@ void bind_filling(nb::module_& m) {
             return volumes;
           }),
           "hulls"_a, "pairs"_a, "threshold"_a, "threads"_a = 0,
-          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls, infinite where a joint hull is not feasible: that "
-          "is decided less thoroughly than for a single hull, and where the hulls themselves are close enough to their "
-          "shares of the solid.")
-      .def("comes_deeper", released(&Filling::comes_deeper), "hull"_a, "threshold"_a,
-           "Whether the solid's surface comes deeper than the threshold inside a hull: it is not feasible.")
-      .def("clipped", released([](const Filling& self, const ConvexBody& hull) {
-             ClippedSolid clip = self.clipped(hull);
-             return std::tuple(std::move(clip.mesh.vertices), std::move(clip.mesh.faces), clip.volume);
-           }),
-           "hull"_a,
-           "The solid clipped to a convex hull and closed by caps on the hull's facets: vertices [V, 3], faces [F, 3], "
-           "volume.")
-      .def("grown", released(&Filling::grown), "hull"_a, "depth"_a,
+          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls that meet the threshold, infinite where the joint hull "
+          "certainly does not.")
+      .def("comes_deeper", released(&Against::comes_deeper), "hull"_a, "threshold"_a,
+           "Whether the solid's surface comes deeper than the threshold inside a hull.")
+      .def("filled", released(&Against::filled), "hull"_a, "The volume that the solid fills of a convex hull.")
+      .def("inside", released(&Against::inside), "hull"_a,
+           "The solid clipped to a convex hull and closed: vertices [V, 3], faces [F, 3]; no faces if it is too tangled.")
+      .def("grown", released(&Against::grown), "hull"_a, "depth"_a,
            "Half-spaces n.x <= d that hold a hull, rows of n and d [P, 4]: their intersection has grown until the "
            "solid's surface stops it, which may come as deep as `depth` into it.")
       .def("uncovered",
-           released([](const Filling& self, const std::vector<const ConvexBody*>& hulls, double reach, double grain,
+           released([](const Against& self, const std::vector<const ConvexBody*>& hulls, double reach, double grain,
                        int threads) {
              require(!hulls.empty(), "there are no hulls");
              require(grain > 0, "the grain must be positive");
@@ -236,8 +205,7 @@ void bind_union(nb::module_& m) {
 
 void bind_distance(nb::module_& m) {
   bind_surface(m);
-  bind_concavity(m);
-  bind_filling(m);
+  bind_against(m);
   bind_union(m);
 }
 

@@ -12,7 +12,7 @@
 #include <tuple>
 
 #include "core/stop.hpp"
-#include "solid/filling.hpp"
+#include "solid/against.hpp"
 
 namespace rlacd {
 

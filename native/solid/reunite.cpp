@@ -9,8 +9,8 @@
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
 #include "solid/caps.hpp"
-#include "solid/glue.hpp"
 #include "solid/plane_cut.hpp"
+#include "solid/touching.hpp"
 #include "solid/triangulate.hpp"
 
 namespace rlacd {

@@ -11,7 +11,7 @@
 
 #include "core/parallel.hpp"
 #include "core/stop.hpp"
-#include "solid/filling.hpp"
+#include "solid/against.hpp"
 
 namespace rlacd {
 namespace {

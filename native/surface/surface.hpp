@@ -21,15 +21,4 @@ class Surface {
   Lazy<Winding> winding_;  // refers to bvh_
 };
 
-// The tree of one surface that several tests may need, made by the first of them.
-class TreeCache {
- public:
-  const Bvh& of(const Mesh& surface) const {
-    return bvh_.get([&]() -> const Mesh& { return surface; });
-  }
-
- private:
-  Lazy<Bvh> bvh_;
-};
-
 }  // namespace rlacd

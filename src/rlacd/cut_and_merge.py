@@ -93,7 +93,7 @@ def cut_and_merge(
     if not merge or (strict and unmet):
         return Pass(pieces, unmet, pieces, criterion)
     with run.stage("merge"), run.limited(MOST_MERGING, cuts=None if strict else "merge"):
-        parts = merge_parts(pieces, criterion, run, solid=tree.root)
+        parts = merge_parts(pieces, criterion, run)
     return Pass(pieces, unmet, parts, criterion)
 
 

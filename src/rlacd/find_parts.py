@@ -28,7 +28,7 @@ from rlacd.search import SearchContext, at_least, cost, eliminate_parts, search
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover, slabs
-from rlacd.solid.hull import NO_SIDES, Hull
+from rlacd.solid.hull import NO_SIDES
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.resting import resting_sides
 from rlacd.solid.solid import Solid
@@ -88,7 +88,7 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     states, goal, found = decomposer.decompose(goal)
     limited, most, parts = LimitedCriterion(goal, options.hull_limits, sides=sides), options.max_hulls, states[-1]
     if most is not None and len(parts) > most:
-        parts = at_most(most, decomposer.coarser(states, goal), decomposer.unite, root, limited, run)
+        parts = at_most(most, decomposer.coarser(states, goal), root, limited, run)
     elif any(options.hull_limits):
         with run.stage("limit"):
             parts = cut_to_limits(parts, limited, root, options, run)
@@ -234,11 +234,6 @@ class _Decomposer:
         policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
         return self.model.transfer(parts, goal, factor, policy, self.run, merge=self.options.merge)
 
-    def unite(self, first: Part, second: Part) -> Part:
-        """Unite two parts, across what lies between them where they were carried from a proxy."""
-        clipped = self.model.proxy and self.model.solid.inside(Hull.around(first.hull, second.hull))
-        return clipped if clipped and clipped.size else Part.glued(first, second)
-
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion
     ) -> tuple[list[list[Part]], SearchSummary | None]:
@@ -259,7 +254,7 @@ class _Decomposer:
             if options.quality == FAST or len(parts) > most or self.solid.is_apart:
                 if goes_on:
                     with run.stage("merge"), run.limited(run.work.done):
-                        states = [parts := grow_cover(parts, goal, run, root)]
+                        states = [parts := grow_cover(parts, goal, run)]
                 if eliminates and run.stopped_by is None:
                     with run.stage("search"):
                         states = [eliminate_parts(context, parts, run)]

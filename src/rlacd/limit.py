@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from rlacd._native import Stopped
@@ -81,7 +81,7 @@ def _cut_for(
             cut = [piece for part in parts for piece in kept[part]]
         if len(cut) > len(parts) and options.merge:
             with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_SHARE)):
-                cut = merge_parts(cut, limited, run, solid=solid)
+                cut = merge_parts(cut, limited, run)
                 context = SearchContext(solid, limited, options.seed)
                 cut = eliminate_parts(context, cut, run)
     except Stopped:
@@ -92,11 +92,11 @@ def _cut_for(
 def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, run: Run, extra: int) -> list[Part]:
     """The pieces of a part, all of which meet the criterion; none if there are too many."""
     inside = solid.inside(part.hull)
-    if not inside.size:
+    if inside is None:
         return []
     scale = limited.outward_deviation if math.isfinite(limited.outward_deviation) else None
     policy = make_policy(options.first_policy, SweepCache(), scale)
-    tree = CutTree(Component((inside.vertices, inside.faces)), policy, run)
+    tree = CutTree(inside, policy, run)
     done = cut_and_merge(tree, limited, run, merge=options.merge, most=PIECES * (extra + 1), strict=True)
     is_done = not done.unmet and not run.is_over and len(done.parts) <= extra + 1
     return done.parts if is_done else []
@@ -105,7 +105,6 @@ def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, 
 def at_most(
     most: int,
     decompositions: Iterable[Sequence[Part]],
-    unite: Callable[[Part, Part], Part],
     whole: Part,
     limited: LimitedCriterion,
     run: Run,
@@ -119,8 +118,6 @@ def at_most(
     decompositions : iterable of sequence of Part
         Under coarser and coarser goals. Their parts are united two at a time, and every state on the way counts, unless
         a coarser one has more than `STILL_MANY` times `most`.
-    unite : callable
-        Returns the union of two parts.
     whole : Part
         The solid, which is left as one part if there is no time.
     limited : LimitedCriterion
@@ -130,7 +127,7 @@ def at_most(
     best, least, errors = [whole], math.inf, dict[Part, float]()
     try:
         for parts in itertools.chain([[whole]], few_enough(decompositions, most)):
-            for state, error in united_in_turn(parts, unite, limited.criterion, Work(MOST_CUTTING), run):
+            for state, error in united_in_turn(parts, limited.criterion, Work(MOST_CUTTING), run):
                 if error > NEARLY_EQUAL * least:
                     break  # unions only make it larger
                 if len(state) > most:

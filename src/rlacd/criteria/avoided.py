@@ -33,7 +33,7 @@ class Kept:
     Attributes
     ----------
     name : str
-    filling : Filling or None
+    against : Against or None
         Its triangles in the frame; None if none is left.
     margin : float
         How far hulls stay off it, in the frame.
@@ -44,7 +44,7 @@ class Kept:
     """
 
     name: str
-    filling: _native.Filling | None
+    against: _native.Against | None
     margin: float
     is_crossed: bool
     is_told: bool
@@ -54,21 +54,21 @@ class Kept:
         """Leave out what the solid with this surface, if it has one, crosses or holds."""
         triangles = frame.to_frame(obstacle.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
         triangles, is_crossed = (triangles, False) if surface is None else _outside(triangles, surface)
-        filling = _native.Filling(*_mesh(triangles), threads) if len(triangles) else None
-        return cls(obstacle.name, filling, obstacle.margin * frame.scale, is_crossed, obstacle.is_told)
+        against = _native.Against(*_mesh(triangles), threads) if len(triangles) else None
+        return cls(obstacle.name, against, obstacle.margin * frame.scale, is_crossed, obstacle.is_told)
 
     def is_entered(self, hull: Hull) -> bool:
         """Whether a hull comes nearer than the margin."""
-        return self.filling is not None and self.filling.comes_deeper(hull.body, ROUNDING - self.margin)
+        return self.against is not None and self.against.comes_deeper(hull.body, ROUNDING - self.margin)
 
     def depth(self, hull: Hull) -> float:
         """How deep it reaches into a hull, to `TOLERANCE`; 0 if it does not."""
-        if self.filling is None or not self.filling.comes_deeper(hull.body, TOLERANCE):
+        if self.against is None or not self.against.comes_deeper(hull.body, TOLERANCE):
             return 0.0
         low, high = TOLERANCE, 2.0
         while high - low > TOLERANCE:
             middle = (low + high) / 2
-            is_deeper = self.filling.comes_deeper(hull.body, middle)
+            is_deeper = self.against.comes_deeper(hull.body, middle)
             low, high = (middle, high) if is_deeper else (low, middle)
         return high
 

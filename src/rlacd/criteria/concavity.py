@@ -1,10 +1,12 @@
-"""How far a part and its hull may be apart, decided strictly: by distance, or by CoACD's concavity.
+"""How far a hull and the solid may be apart, decided strictly: by distance, or by a concavity like CoACD's.
 
-The distance of a part with convex hull CH is ``H_b``, the two-sided Hausdorff distance between the *surfaces* of the
-part and of its hull. Its concavity is ``max(H_b, 0.3 R_v)``, where ``R_v = cbrt(3 (|CH| - |part|) / 4 pi)`` is the
-radius of a ball with the volume between them (Wei et al., "Approximate Convex Decomposition for 3D Meshes with
-Collision-Aware Concavity and Tree Search", SIGGRAPH 2022). CoACD samples ``H_b``; here it is bounded. What limits on
-vertices and triangles add to a hull counts for ``H_b`` only.
+The distance ``H`` of a convex hull CH from the solid S is the larger of its *depth*, how deep the surface of S comes
+inside CH, and its *reach*, how far the surface of CH leads from S; inside S that is 0. Its concavity is ``max(H, 0.3
+R_v)``, where ``R_v = cbrt(3 (|CH| - |S in CH|) / 4 pi)`` is the radius of a ball with the volume that S leaves of CH.
+CoACD compares CH with one part instead, by ``H_b``, the Hausdorff distance between the surfaces of the two, which it
+samples (Wei et al., "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and Tree Search",
+SIGGRAPH 2022); here both terms are bounded, and what other parts fill of a hull is no error of it. What limits on
+vertices and triangles add to a hull counts for ``H`` only.
 """
 
 from __future__ import annotations
@@ -12,20 +14,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
+from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.errors import OptionError
 from rlacd.fit import LengthFit, told_apart
 from rlacd.options import Options
 from rlacd.run import Run
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
-from rlacd.solid.component import Part
-from rlacd.solid.hull import Hull
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Component, Part
 from rlacd.solid.solid import Solid
 
 VOLUME_WEIGHT = 0.3
@@ -40,68 +40,30 @@ class ConcavityValue:
     ----------
     value
         The concavity or distance; the interval is at most as wide as the tolerance.
-    part_to_hull
-        Greatest distance from the part's surface to the hull's surface.
-    hull_to_part
-        Greatest distance from the hull's surface to the part's surface.
+    depth
+        Greatest depth of the solid's surface inside the hull.
+    reach
+        Greatest distance of the hull's surface from the solid.
     volume_radius
         ``R_v``; 0 for a distance.
 
-    The interval of a one-sided distance may be wider than the tolerance if another term decides the value.
+    The interval of a single length may be wider than the tolerance if another decides the value.
     """
 
     value: tuple[float, float]
-    part_to_hull: tuple[float, float]
-    hull_to_part: tuple[float, float]
+    depth: tuple[float, float]
+    reach: tuple[float, float]
     volume_radius: float
 
 
-@dataclass(frozen=True)
-class DistanceEarlyOut(EarlyOut):
-    """Necessary conditions for a distance or concavity of at most `threshold`.
-
-    The reach is twice the threshold: if parts are farther apart, the middle of the joint hull is too far from both.
-
-    Attributes
-    ----------
-    threshold : float
-    weight : float
-        Weight of ``R_v``, which the volumes give; 0 for a distance.
-    """
-
-    threshold: float
-    weight: float
-
-    looks_inside: ClassVar[bool] = True
-
-    def filled(self, part: Part) -> float:
-        """The part's volume: the rest of the hull is the volume between the two surfaces."""
-        return part.volume
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """``0.3 R_v``, a lower bound of the concavity."""
-        return self.weight * _native.volume_radius(volume, hull_volume)
-
-    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
-        """Whether ``0.3 R_v`` alone exceeds the threshold."""
-        radius = self.threshold / self.weight if self.weight else math.inf
-        ball = 4 / 3 * math.pi * radius * radius * radius
-        return np.asarray(hull_volume - volume > ball)
-
-    def is_feasible(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Test the solid's corners and points of the hull."""
-        return filling.is_feasible(hull.body, self.threshold)
-
-    def feasible_volumes(
-        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
-    ) -> FloatArray:
-        """Test the solid's corners and points of the joint hulls."""
-        return filling.feasible_volumes(hulls, pairs, self.threshold, threads)
+def volume_radius(volume: float, hull_volume: float) -> float:
+    """``R_v``: the radius of a ball with the volume that is left of a hull."""
+    return float(_native.cube_roots(np.array([max(0.0, 3 * (hull_volume - volume) / (4 * math.pi))]))[0])
 
 
 @dataclass(frozen=True)
 class Distance(Criterion):
-    """The criterion "the surfaces of a part and its hull lie at most ``threshold`` apart".
+    """The criterion "hull and solid lie at most ``threshold`` apart".
 
     Parameters
     ----------
@@ -118,12 +80,12 @@ class Distance(Criterion):
     Notes
     -----
     Inside a convex polytope, the distance to its surface is the least distance to a facet's plane; the distance to the
-    part is the least distance to one of its triangles. Both are minima of convex functions ``f_w``, so over a triangle
-    ``T`` and for weights ``l_w >= 0`` that sum to 1, the distance is at most the greatest value of ``sum l_w f_w`` at
-    the corners of ``T``. Branch and bound over the triangles with this bound, for single witnesses and pairs of them,
-    closes the interval around the maximum; sampling decides nothing but an early "no". Facet planes of the hull are
-    moved out to its farthest corner, so that the inexact normal of a sliver can make a distance larger, never smaller.
-    Rounding errors are about 1e-8 of the lengths involved.
+    solid is the least distance to one of its triangles or to a ball inside it. Both are minima of convex functions
+    ``f_w``, so over a triangle ``T`` and for weights ``l_w >= 0`` that sum to 1, the distance is at most the greatest
+    value of ``sum l_w f_w`` at the corners of ``T``. Branch and bound over the triangles with this bound, for single
+    witnesses and pairs of them, closes the interval around the maximum; sampling decides nothing but an early "no".
+    Facet planes of the hull are moved out to its farthest corner, so that the inexact normal of a sliver can make a
+    distance larger, never smaller. Rounding errors are about 1e-8 of the lengths involved.
     """
 
     threshold: float = 0.05
@@ -144,10 +106,24 @@ class Distance(Criterion):
         """Make the criterion; its warnings give lengths in the threshold's unit: the frame's or the input's."""
         return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
 
-    @cached_property
-    def early_out(self) -> DistanceEarlyOut:
-        """Tests of the solid's corners, and of volumes if they count."""
-        return DistanceEarlyOut(2 * self.threshold, self.threshold, self.weight)
+    @property
+    def reach(self) -> float:
+        """Twice the threshold: in a wider gap, the middle of the joint hull is too far from both."""
+        return 2 * self.threshold
+
+    def credit(self, part: Part) -> float:
+        """The part's volume: the rest of the hull is what lies between the surfaces."""
+        return part.volume
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """``0.3 R_v``."""
+        return self.weight * volume_radius(volume, hull_volume) if self.weight else 0.0
+
+    def joint_volumes(
+        self, whole: Component, hulls: Sequence[_native.ConvexBody], pairs: IntArray, volumes: FloatArray, threads: int
+    ) -> FloatArray:
+        """Hold a few corners and points of the joint hulls against the solid."""
+        return whole.against.feasible_volumes(hulls, pairs, self.threshold, threads)
 
     def scaled(self, factor: float) -> Distance:
         """The same criterion with ``factor`` times the threshold."""
@@ -182,8 +158,14 @@ class Distance(Criterion):
 
         False if it is larger, or if it is within 0.1 % of the threshold and branch and bound cannot decide.
         """
-        volumes = self._volumes(part)
-        return _native.meets_concavity(part.vertices, part.faces, part.hull.body, *volumes, self.threshold, part.tree)
+        return self._is_full(part) and part.whole.against.meets(part.hull.body, self.threshold)
+
+    def _is_full(self, part: Part) -> bool:
+        """Whether ``0.3 R_v`` is at most the threshold, if it counts; the part's own volume mostly shows it."""
+        hull = part.exact or part.hull
+        radius = self.threshold / self.weight if self.weight else math.inf
+        free = hull.volume - 4 / 3 * math.pi * radius**3
+        return free <= part.volume or free <= part.filled
 
     def measure(self, part: Part, tolerance: float = 1e-3, floor: float = 0.0) -> ConcavityValue:
         """Measure the distance or concavity to within ``tolerance`` (same frame as the threshold).
@@ -193,14 +175,11 @@ class Distance(Criterion):
         """
         if not tolerance > 0:
             raise OptionError(f"The tolerance must be positive, not {tolerance}; 0.001 is usual.")
-        volumes = self._volumes(part)
-        found = _native.concavity(part.vertices, part.faces, part.hull.body, *volumes, tolerance, floor, part.tree)
-        return ConcavityValue(*found)
-
-    def _volumes(self, part: Part) -> tuple[float, float]:
-        """Volumes of the part and its exact hull, as far as they matter: equal ones make ``R_v`` 0."""
-        hull = part.exact or part.hull
-        return part.volume if self.weight else hull.volume, hull.volume
+        radius = volume_radius(part.filled, (part.exact or part.hull).volume) if self.weight else 0.0
+        by_volume = self.weight * radius
+        lengths = part.whole.against.measure(part.hull.body, tolerance, max(floor, by_volume + tolerance))
+        lower, upper = (max(by_volume, *ends) for ends in zip(*lengths, strict=True))
+        return ConcavityValue((lower, upper), *lengths, radius)
 
 
 @dataclass(frozen=True)

@@ -1,21 +1,18 @@
-"""The interface of criteria: strict tests of parts, and early-out tests of unions that certainly fail."""
+"""The interface of criteria: strict tests of parts, and quick ones of unions that certainly fail."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
-
-import numpy as np
+from typing import Any, Protocol
 
 from rlacd import _native
 from rlacd.criteria.avoided import Avoided
 from rlacd.options import Options
 from rlacd.run import Run
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray
-from rlacd.solid.component import Part
-from rlacd.solid.hull import Hull
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Component, Part
 from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
@@ -50,9 +47,26 @@ class Criterion(Protocol):
         return False
 
     @property
-    def early_out(self) -> EarlyOut:
-        """Early-out tests, which reject unions that cannot meet the criterion."""
-        ...
+    def reach(self) -> float:
+        """Distance beyond which two parts cannot be one, unless the solid fills what lies between them."""
+        return math.inf
+
+    def credit(self, part: Part) -> float:
+        """Volume credited to a part; a pair costs |CH| - the credits of both, and the cheapest merges first."""
+        return part.piece_hulls
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """The error that the volumes of a part and its hull alone give it."""
+        return 0.0
+
+    def joint_volumes(
+        self, whole: Component, hulls: Sequence[_native.ConvexBody], pairs: IntArray, volumes: FloatArray, threads: int
+    ) -> FloatArray:
+        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls around so much of the solid [P].
+
+        Infinite where it takes no time to see that the criterion forbids the union.
+        """
+        return _native.joint_hull_volumes(hulls, pairs, threads)
 
     def is_met(self, part: Part) -> bool:
         """Decide strictly whether the part meets the criterion."""
@@ -101,45 +115,3 @@ class Criterion(Protocol):
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """Summarise how well finished parts meet the criterion; `errors` holds that of each part, None if unknown."""
         ...
-
-
-@dataclass(frozen=True)
-class EarlyOut:
-    """Early-out tests: necessary conditions for a union to meet a criterion.
-
-    The defaults suit a criterion that judges hulls alone. It needs no solid clipped to a joint hull: the glued union of
-    the pair, which has the same hull, has been judged already.
-
-    Attributes
-    ----------
-    reach : float
-        Distance beyond which the union of two components cannot meet the criterion.
-    """
-
-    reach: float
-
-    looks_inside: ClassVar[bool] = False
-    """Whether the criterion judges what fills a hull, not the hull alone."""
-
-    def filled(self, part: Part) -> float:
-        """Volume credited to a part; a pair costs |CH| - the credits of both, and the cheapest merges first."""
-        return part.piece_hulls
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """Lower bound of the criterion's error, from the volumes of a part and its hull alone."""
-        return 0.0
-
-    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
-        """Whether the volumes alone show that a part, or each of several, cannot meet the criterion."""
-        return np.zeros(np.shape(volume), dtype=bool)
-
-    def is_feasible(self, filling: _native.Filling, hull: Hull) -> bool:
-        """Decide whether a solid clipped to a hull may meet the criterion."""
-        return False
-
-    def feasible_volumes(
-        self, filling: _native.Filling, hulls: Sequence[_native.ConvexBody], pairs: IntArray, threads: int
-    ) -> FloatArray:
-        """Volumes [P] of the joint hulls of pairs [P, 2] of hulls, infinite where one is not feasible, decided less
-        thoroughly."""
-        return np.full(len(pairs), np.inf)

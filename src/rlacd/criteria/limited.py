@@ -12,14 +12,14 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria.avoided import FINEST_SHARE, Avoided
 from rlacd.criteria.concavity import Concavity, Distance
-from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
+from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.criteria.navigable import Intrusions, Navigable
 from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Part
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, keeps, limit_hull
 from rlacd.solid.passages import Density, passage_balls
@@ -79,9 +79,7 @@ def limited_part(
     hull = limit_hull(part.hull, limits, tolerance, sides, CLEARLY * enough)
     if hull is part.hull:
         return part
-    limited = part.with_hull(hull)
-    limited.exact = part.exact if keeps(part.hull, limits) else part.hull
-    return limited
+    return Part(hull, part.members, part.whole, part.exact if keeps(part.hull, limits) else part.hull)
 
 
 @dataclass(frozen=True)
@@ -130,9 +128,23 @@ class LimitedCriterion(Criterion):
         return self.criterion.eliminates
 
     @property
-    def early_out(self) -> EarlyOut:
-        """The underlying criterion's tests: what they reject fails here too."""
-        return self.criterion.early_out
+    def reach(self) -> float:
+        """That of the underlying criterion."""
+        return self.criterion.reach
+
+    def credit(self, part: Part) -> float:
+        """That of the underlying criterion."""
+        return self.criterion.credit(part)
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """That of the underlying criterion."""
+        return self.criterion.least_error(volume, hull_volume)
+
+    def joint_volumes(
+        self, whole: Component, hulls: Sequence[_native.ConvexBody], pairs: IntArray, volumes: FloatArray, threads: int
+    ) -> FloatArray:
+        """Those of the underlying criterion: what it forbids is forbidden here too."""
+        return self.criterion.joint_volumes(whole, hulls, pairs, volumes, threads)
 
     @property
     def outward_deviation(self) -> float:

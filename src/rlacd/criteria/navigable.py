@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
+from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.errors import OptionError
 from rlacd.fit import Measured, SpaceFit
 from rlacd.options import Options
@@ -170,9 +170,9 @@ class Navigable(Criterion):
         return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
 
     @property
-    def early_out(self) -> EarlyOut:
-        """Reaches twice the sum of radius and tolerance: a ball can pass through a wider gap between two parts."""
-        return EarlyOut(2 * (self.radius + self.tolerance))
+    def reach(self) -> float:
+        """Twice the sum of radius and tolerance: a ball can pass through a wider gap between two parts."""
+        return 2 * (self.radius + self.tolerance)
 
     @property
     def obstacles(self) -> Balls:

@@ -14,14 +14,14 @@ from functools import partial
 
 import numpy as np
 
-from rlacd._native import mesh_volume
+from rlacd import _native
 from rlacd.criteria.concavity import Distance
-from rlacd.criteria.criterion import Criterion, CriterionSummary, EarlyOut
+from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.fit import VolumeFit, told_apart
 from rlacd.options import Options
 from rlacd.run import Run
-from rlacd.solid.arrays import BoolArray, FloatArray
-from rlacd.solid.component import Part
+from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Solid
 
@@ -33,27 +33,6 @@ FACETS_REACH = 0.05
 
 REACH = 0.2
 """Parts farther apart than this (the longest side is 2) are not united: their joint hull would bridge the gap."""
-
-
-@dataclass(frozen=True)
-class VolumeEarlyOut(EarlyOut):
-    """Early-out tests by volumes alone."""
-
-    criterion: AddedVolume
-
-    def filled(self, part: Part) -> float:
-        """The part's volume: the rest of the hull is what the criterion counts."""
-        return part.volume
-
-    def least_error(self, volume: float, hull_volume: float) -> float:
-        """The error itself."""
-        return self.criterion.share(volume, hull_volume)
-
-    def excludes(self, volume: FloatArray | float, hull_volume: FloatArray | float) -> BoolArray:
-        """Whether the hull adds too much."""
-        whole = self.criterion.whole
-        base = np.maximum(volume if whole is None else whole, self.criterion.least)
-        return np.asarray(hull_volume - volume > self.criterion.tolerance * base)
 
 
 @dataclass(frozen=True)
@@ -80,7 +59,7 @@ class AddedVolume(Criterion):
         if run is None:
             return cls(options.volume_tolerance, None, 0.0)
         hull = Hull.of(solid.vertices) if len(solid.vertices) else None
-        whole = float(mesh_volume(*solid.mesh)) if options.volume_of == "whole" else None
+        whole = float(_native.mesh_volume(*solid.mesh)) if options.volume_of == "whole" else None
         return cls(options.volume_tolerance, whole, LEAST_PART * hull.volume if hull is not None else 0.0)
 
     def share(self, volume: float, hull_volume: float) -> float:
@@ -90,17 +69,33 @@ class AddedVolume(Criterion):
         return added / base if base > 0 else math.inf if added else 0.0
 
     @property
-    def early_out(self) -> VolumeEarlyOut:
-        """Tests of volumes."""
-        return VolumeEarlyOut(REACH, self)
+    def reach(self) -> float:
+        """`REACH`."""
+        return REACH
+
+    def credit(self, part: Part) -> float:
+        """The part's volume: the rest of the hull is what the criterion counts."""
+        return part.volume
+
+    def least_error(self, volume: float, hull_volume: float) -> float:
+        """The error itself."""
+        return self.share(volume, hull_volume)
+
+    def joint_volumes(
+        self, whole: Component, hulls: Sequence[_native.ConvexBody], pairs: IntArray, volumes: FloatArray, threads: int
+    ) -> FloatArray:
+        """Infinite where the joint hulls add too much."""
+        joint = super().joint_volumes(whole, hulls, pairs, volumes, threads)
+        base = np.maximum(volumes if self.whole is None else self.whole, self.least)
+        return np.where(joint - volumes > self.tolerance * base, np.inf, joint)
 
     def is_met(self, part: Part) -> bool:
         """Whether the hull adds at most the tolerance."""
-        return self.error(part) <= self.tolerance
+        return self.share(part.volume, part.hull.volume) <= self.tolerance or self.error(part) <= self.tolerance
 
     def error(self, part: Part) -> float:
-        """The share that the hull adds."""
-        return self.share(part.volume, part.hull.volume)
+        """The share that the hull adds to what the solid fills of it."""
+        return self.share(part.filled, part.hull.volume)
 
     def scaled(self, factor: float) -> AddedVolume:
         """The same criterion with `factor` times the tolerance."""

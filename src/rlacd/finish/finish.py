@@ -120,7 +120,7 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
     """The parts with hulls grown to take in input outside the finished ones; None if none can grow."""
     hulls = [part.hull for part in finished]
     points = np.concatenate(
-        _native.Filling(*reached.solid.surface, run.threads).uncovered(
+        _native.Against(*reached.solid.surface, run.threads).uncovered(
             [hull.body for hull in hulls], COVERAGE_TOLERANCE, GROWTH_TO_SPARE, run.threads
         )
     )
@@ -138,8 +138,7 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
     slack = ROUNDING + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
-        part.tree = part.tree or _native.TreeCache()
-        shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack, root)
+        shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack)
         if shaped is not part:
             return shaped
         share = SHARE_OF_DEVIATION if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
@@ -150,8 +149,6 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
         )
 
     parts, seams = reached.parts, None
-    if root is not None:  # a stop left no time to clip the solid to hulls that cover it
-        parts = run.map(lambda part: part if part.size else root.filled(part.hull), parts)
     if options.overlap > 0 and root is not None:
         parts, seams = overlap_parts(parts, root, goal, 2 * options.overlap)
     return run.map(cleaned, parts), seams

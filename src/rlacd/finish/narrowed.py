@@ -63,7 +63,7 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> 
     if reached.root is None or most <= NARROWEST:
         return Narrowed()
     threads, frame, solid = run.threads, reached.solid.frame, reached.solid.mesh
-    surface, union = reached.root.filling.surface, hull_union(hulls, threads)
+    surface, union = reached.root.against.surface, hull_union(hulls, threads)
 
     def lose(balls: Balls) -> BoolArray:
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii

@@ -17,7 +17,7 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.component import LOST_VOLUME, Component, Part
+from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import TOLERANCE, Hull
 
 HELD = 0.7
@@ -71,14 +71,13 @@ def overlap_parts(
     solid : Component
         The whole solid.
     criterion : Criterion
-        It judges all that the solid fills of a grown hull.
     overlap : float
         Depth of the overlap, in the frame.
 
     Returns
     -------
     parts : list of Part
-        In the same order. A part whose hull grew holds all that the solid fills of it.
+        In the same order.
     seams : Seams
     """
     bodies = [_Body(part) for part in parts]
@@ -101,7 +100,7 @@ def overlap_parts(
         seams.append(seam)
         best, most = dict[int, _Body](), -1
         for change in _changes(bodies, near, first, second, overlap):
-            grown = {place: _judged(bodies[place].part, hull, solid, criterion, tolerated) for place, hull in change}
+            grown = {place: _judged(bodies[place].part, hull, criterion, tolerated) for place, hull in change}
             if any(part is None for part in grown.values()):
                 continue
             changed = {place: _Body(part) for place, part in grown.items() if part is not None}
@@ -158,11 +157,9 @@ def _changes(
             yield [change for _, change in halves]
 
 
-def _judged(part: Part, hull: Hull, solid: Component, criterion: Criterion, tolerated: float | None) -> Part | None:
-    """All that the solid fills of a grown hull, if it meets the criterion or is no worse than the worst part."""
-    candidate = solid.inside(hull)
-    if candidate.volume < (1 - LOST_VOLUME) * part.volume:  # the clipping failed
-        return None
+def _judged(part: Part, hull: Hull, criterion: Criterion, tolerated: float | None) -> Part | None:
+    """The part with a grown hull, if that meets the criterion or is no worse than the worst part."""
+    candidate = part.with_hull(hull)
     if criterion.is_met(candidate) or (tolerated is not None and criterion.error(candidate) <= tolerated):
         return candidate
     return None

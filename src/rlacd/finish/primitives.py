@@ -13,7 +13,7 @@ from rlacd.criteria import Criterion
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, heights, length
-from rlacd.solid.component import LOST_VOLUME, Component, Part
+from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, Hull, keeps
 from rlacd.solid.primitive import Primitive
@@ -43,14 +43,12 @@ def primitive_part(
     kinds: Collection[PrimitiveKind],
     limits: HullLimits = NO_LIMITS,
     slack: float = ROUNDING,
-    solid: Component | None = None,
 ) -> Part:
     """Get the part with a primitive for a hull, if one meets the criterion; otherwise the same part.
 
     Of all that meet it, the simplest is taken whose volume is within `SIMPLER` of the least. The hull of the result is
     a convex polyhedron around the primitive, within the limits. The criterion decides on it as strictly as on any hull,
-    except that its volume is the primitive's own. If it is not met, and `solid` is given, everything the solid fills of
-    the primitive is judged in place of the part: cuts at an angle leave no box, but what they cut off is solid.
+    except that its volume is the primitive's own.
 
     Parameters
     ----------
@@ -62,8 +60,6 @@ def primitive_part(
         Limits on the polyhedron.
     slack : float
         How much larger a primitive is made than needed, for later rounding.
-    solid : Component, optional
-        The whole solid.
     """
     fitted = [
         primitive.grown(primitive.beyond(part.hull.vertices) + slack) for primitive in fit_primitives(part.hull, kinds)
@@ -75,9 +71,9 @@ def primitive_part(
             if hull is None or not keeps(hull, limits):
                 return None
             around = replace(hull, volume=primitive.volume, primitive=primitive)
-            for candidate in _candidates(part, around, solid, criterion):
-                if criterion.is_met(candidate):
-                    return candidate
+            candidate = part.with_hull(around)
+            if criterion.is_met(candidate):
+                return candidate
         return None
 
     fitted.sort(key=lambda primitive: primitive.volume)
@@ -92,20 +88,6 @@ def primitive_part(
         ]
         return next((better for better in map(judged, sorted(simpler, key=_rank)) if better is not None), found)
     return part
-
-
-def _candidates(part: Part, hull: Hull, solid: Component | None, criterion: Criterion) -> Iterator[Part]:
-    """The part with another hull, and all that the solid fills of it, unless either certainly fails the criterion."""
-    early_out = criterion.early_out
-    if not early_out.excludes(part.volume, hull.volume):
-        yield part.with_hull(hull)
-    if solid is None or criterion.obstacles is not None:
-        return
-    if early_out.looks_inside and not early_out.is_feasible(solid.filling, hull):
-        return
-    inside = solid.inside(hull)
-    if inside.volume >= (1 - LOST_VOLUME) * part.volume and not early_out.excludes(inside.volume, hull.volume):
-        yield inside  # otherwise the clipping failed
 
 
 def fit_primitives(hull: Hull, kinds: Collection[PrimitiveKind] = PRIMITIVE_KINDS) -> list[Primitive]:

@@ -85,9 +85,8 @@ def make_report(
         The seams, if hulls were to overlap.
     """
     solid, options, criterion = reached.solid, reached.options, reached.goal
-    is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: the parts in them are unknown
-    is_unknown = is_cover or not all(part.size for part in parts)  # or there was no time to clip the solid to them
-    errors = None if is_unknown else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
+    is_cover = len(solid.faces) == 0  # hulls of an input that was not repaired: what they stand for is unknown
+    errors = None if is_cover else run.if_in_time(lambda: run.map(criterion.error, parts), lambda: None)
     summary = criterion.summary(errors)
     has_surface = len(solid.surface[1]) > 0  # a cloud of points has none
     distances = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
@@ -270,7 +269,7 @@ def _added(counts: Sequence[Mapping[str, int] | None]) -> dict[str, int] | None:
 
 def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
     solid, root = reached.solid, reached.root
-    surface = root.filling.surface if root is not None and solid.is_as_given else solid.index
+    surface = root.against.surface if root is not None and solid.is_as_given else solid.index
     surface = surface or _native.Surface(*solid.surface, run.threads)
     hulls = [part.hull for part in parts]
     found = hull_distances(hulls, *solid.surface, threads=run.threads, surface=surface)

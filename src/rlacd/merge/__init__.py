@@ -1,6 +1,6 @@
 """Uniting parts."""
 
 from rlacd.merge.grow import grow_cover
-from rlacd.merge.merge import merge_parts, merge_transferred
+from rlacd.merge.merge import merge_parts
 
-__all__ = ["grow_cover", "merge_parts", "merge_transferred"]
+__all__ = ["grow_cover", "merge_parts"]

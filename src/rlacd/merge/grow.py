@@ -15,10 +15,10 @@ import numpy as np
 from rlacd import _native
 from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import is_alone, merge_parts
+from rlacd.merge.merge import merge_parts, price_of_uniting
 from rlacd.run import Run, work
 from rlacd.solid.arrays import BoolArray, FloatArray, heights
-from rlacd.solid.component import DENSE, ClippedPart, Component, Part, Plane, is_thin
+from rlacd.solid.component import DENSE, LOST_VOLUME, Component, Part, Plane, is_thin
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import TOLERANCE, Hull, is_sliver
@@ -43,7 +43,7 @@ SLIVER_LOSS = 2 * HALF_THICKNESS
 """A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
 
 
-def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
+def grow_cover(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]:
     """Cover a solid in which bodies cross by parts grown from its pieces, if that takes fewer.
 
     Parameters
@@ -53,36 +53,41 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run, solid: Compon
     criterion : Criterion
     run : Run
         The merged parts are returned when its work runs out.
-    solid : Component
-        The solid that was decomposed.
     """
-    judges = criterion.early_out.looks_inside and math.isfinite(criterion.outward_deviation)
-    if not judges or solid.size > DENSE or sum(not is_alone(part) for part in merged) < CROSSING * len(merged):
+    if criterion.obstacles is not None or not math.isfinite(criterion.outward_deviation):
+        return merged
+    if merged[0].whole.size > DENSE or sum(map(_shares, merged)) < CROSSING * len(merged):
         return merged
     try:
-        parts = _regrown(merged, criterion, run, solid)
+        parts = _regrown(merged, criterion, run)
     except Stopped:
         run.note_stop()
         return merged
     return parts if len(parts) <= WORTH * len(merged) and not run.is_over else merged
 
 
-def _regrown(merged: list[Part], criterion: Criterion, run: Run, solid: Component) -> list[Part]:
+def _shares(part: Part) -> bool:
+    """Whether a union's hull holds material of other parts."""
+    return len(part.members) > 1 and part.filled > (1 + LOST_VOLUME) * part.volume
+
+
+def _regrown(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]:
     """Parts grown from the pieces and merged; the merged parts if samples show that growing saves none."""
+    whole = merged[0].whole
     pieces = [member for part in merged for member in part.members]
     corners = sum(len(piece.hull.vertices) for piece in pieces)
     if not run.work.pay(sum(work.growing(len(piece.hull.vertices), corners) for piece in pieces)):
         return merged
     depth = DEPTH * criterion.outward_deviation
-    grown = run.map(lambda piece: solid.filling.grown(piece.hull.body, depth), pieces)
+    grown = run.map(lambda piece: whole.against.grown(piece.hull.body, depth), pieces)
     chosen = _chosen(pieces, grown)
     if len(chosen) > WORTH * len(merged):
         return merged
-    parts = _taken(pieces, [grown[i] for i in chosen], criterion, run, solid)
+    parts = _taken(pieces, [grown[i] for i in chosen], criterion, run, whole)
     if not parts:
         return merged
     parts = drop_slivers(parts, run)
-    return drop_slivers(merge_parts(parts, criterion, run, solid=solid), run)
+    return drop_slivers(merge_parts(parts, criterion, run), run)
 
 
 def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[int]:
@@ -105,7 +110,7 @@ def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[in
 
 
 def _taken(
-    pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run, solid: Component
+    pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run, whole: Component
 ) -> list[Part]:
     """Parts of what each intersection of half-spaces holds, if they meet the criterion, and parts of the rest.
 
@@ -121,10 +126,10 @@ def _taken(
             break
         if hull is None:
             continue
-        part = ClippedPart(solid, inside, hull)
-        if not run.work.pay(work.filling(part.size, len(hull.faces)) + work.judging(part.size, len(hull.faces))):
+        part = Part(hull, tuple(inside), whole)
+        if not run.work.pay(price_of_uniting(part)):
             break
-        if part.is_whole and criterion.is_met(part):
+        if criterion.is_met(part):
             parts.append(part)
             rest = outside
     return [*parts, *rest]
@@ -163,7 +168,7 @@ def _divided(components: Sequence[Component], spaces: FloatArray) -> tuple[list[
 
 def drop_slivers(parts: list[Part], run: Run) -> list[Part]:
     """Drop slivers, which growing leaves beside grown hulls, where the other hulls cover them."""
-    thin = run.map(lambda part: is_thin(part) or is_sliver(part.hull), parts)
+    thin = run.map(lambda part: all(map(is_thin, part.members)) or is_sliver(part.hull), parts)
     boxes = np.array([part.box for part in parts])
     kept = np.ones(len(parts), dtype=bool)
     stood_in: dict[int, BoolArray] = {}  # the hulls near each sliver when it was dropped
@@ -185,9 +190,11 @@ def drop_slivers(parts: list[Part], run: Run) -> list[Part]:
 
 def _misses(union: _native.HullUnion, sliver: Part, threads: int) -> bool:
     """Whether a point of a sliver is too far from the other hulls; corners, tested first, decide most."""
-    if (union.distance(sliver.vertices[np.unique(sliver.faces)], threads) > SLIVER_LOSS).any():
-        return True
-    return union.under(sliver.vertices, sliver.faces, SLIVER_LOSS / 4, threads)[1] > SLIVER_LOSS
+    return any(
+        (union.distance(piece.vertices, threads) > SLIVER_LOSS).any()
+        or union.under(piece.vertices, piece.faces, SLIVER_LOSS / 4, threads)[1] > SLIVER_LOSS
+        for piece in sliver.members
+    )
 
 
 def _near(boxes: FloatArray, sliver: FloatArray) -> BoolArray:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.criterion import EarlyOut
+from rlacd.criteria.criterion import Criterion
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Part
 
@@ -19,7 +19,7 @@ class NumberedParts:
     ----------
     parts : sequence of Part
         They get the numbers 0, 1, ...
-    early_out : EarlyOut
+    criterion : Criterion
         Tells the volume credited to each part.
 
     Attributes
@@ -28,13 +28,16 @@ class NumberedParts:
     bodies : list of ConvexBody
         Hulls by number, also of removed parts.
     boxes : Boxes
+    whole : Component
+        The solid that the parts' hulls are held against.
     """
 
-    def __init__(self, parts: Sequence[Part], early_out: EarlyOut) -> None:
+    def __init__(self, parts: Sequence[Part], criterion: Criterion) -> None:
         self.parts: dict[int, Part] = {}
         self.bodies: list[_native.ConvexBody] = []
         self.boxes = _native.Boxes([])
-        self._early_out = early_out
+        self._criterion = criterion
+        self.whole = parts[0].whole
         self._summands = np.empty((3, 2 * len(parts)))  # uniting pairs makes fewer than twice as many
         for part in parts:
             self.add(part)
@@ -44,7 +47,7 @@ class NumberedParts:
         number, hull = len(self.bodies), part.hull
         if number == self._summands.shape[1]:
             self._summands = np.concatenate([self._summands, np.empty((3, number + 1))], axis=1)
-        self._summands[:, number] = len(hull.vertices), part.volume, self._early_out.filled(part)
+        self._summands[:, number] = len(hull.vertices), part.volume, self._criterion.credit(part)
         self.parts[number] = part
         self.bodies.append(hull.body)
         self.boxes.add(number, hull.body)

@@ -1,7 +1,7 @@
 """The model that is cut for a solid: the solid, or a simpler copy of a dense one, whose parts are transferred.
 
-Hulls grow to take in the surface of the solid that they miss (`Filling.uncovered`), so that together they cover the
-solid. The part of a hull is the solid clipped to it; a part that fails the criterion is cut on the solid.
+Hulls grow to take in the surface of the solid that they miss (`Against.uncovered`), so that together they cover the
+solid. What the solid fills of a hull that fails the criterion is cut.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
-from rlacd.merge import merge_transferred
+from rlacd.merge import merge_parts
 from rlacd.policies import Policy
 from rlacd.proxy.simplify import Proxy, simplify
 from rlacd.run import Run
@@ -35,43 +35,32 @@ MOST_CUTS = 2
 
 
 @dataclass
-class _Transferred:
-    """A part being transferred to the solid.
+class _Moved:
+    """A part on its way to the solid.
 
     Attributes
     ----------
-    hull : Hull
-    part : Part or None
-        The solid clipped to this hull, once it has been.
+    part : Part
     is_met : bool
-        Whether that is known to meet the goal.
+        Whether it is known to meet the goal.
     cuts : int
         How often it was cut on the solid; 0 if it comes from the proxy.
     """
 
-    hull: Hull
-    part: Part | None = None
+    part: Part
     is_met: bool = False
     cuts: int = 0
-
-    @property
-    def on_solid(self) -> Part:
-        """The solid clipped to the hull; only once it has been."""
-        assert self.part is not None, "clipped first"
-        return self.part
 
     def grow(self, points: FloatArray, simple: bool) -> None:
         """Take in points, with a `simple` hull if there is time.
 
-        A part that was cut on the solid stays what it is, without the slivers that were left out, and its hull is not
-        simplified: there may be no room for it below the threshold. The points are in no piece of it, so it has no
-        members any more.
+        The points are in no piece of the part, so its pieces are not known any more. The hull of a part that was cut on
+        the solid is not simplified: there may be no room for it below the threshold.
         """
-        grown = Hull.of(np.concatenate([self.hull.vertices, points]))
+        grown = Hull.of(np.concatenate([self.part.hull.vertices, points]))
         assert grown is not None, "a hull stays solid when it grows"
-        self.hull = limit_hull(grown, tolerance=TOLERANCE if self.cuts else SIMPLE_FIRST / 2) if simple else grown
-        cut = self.part if self.cuts else None
-        self.part = cut and Part(cut.vertices, cut.faces, cut.volume, self.hull, cut.piece_hulls)
+        tolerance = TOLERANCE if self.cuts else SIMPLE_FIRST / 2
+        self.part = Part(limit_hull(grown, tolerance=tolerance) if simple else grown, (), self.part.whole)
         self.is_met = False
 
 
@@ -88,7 +77,7 @@ class Transfer:
     policy : Policy
         Chooses the planes where parts are cut again.
     run : Run
-        When it stops, the hulls cover the solid, and their parts have no faces: there was no time to clip it to them.
+        When it stops, the hulls cover the solid.
     """
 
     solid: Component
@@ -105,52 +94,55 @@ class Transfer:
         parts : sequence of Part
             They cover the proxy. Those that meet their criterion on it only are cut again.
         """
-        covering: list[Hull] = []
+        covering: list[Part] = []
         try:
-            moved = [_Transferred(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
+            moved = [self._begun(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
             self._cover(moved)
-            covering = [each.hull for each in moved]
+            covering = [each.part for each in moved]
             return self._tested(moved)
         except Stopped:
             self.run.note_stop()
         with self.run.shielded():
-            hulls = covering or self._covering(parts)
-        return [Part.unclipped(hull) for hull in hulls], 1.0
+            return covering or self._covering(parts), 1.0
 
-    def _covering(self, parts: Sequence[Part]) -> list[Hull]:
-        """Get hulls that cover the solid, when there is no time to simplify them."""
-        moved = [_Transferred(part.hull) for part in parts]
+    def _begun(self, hull: Hull) -> _Moved:
+        return _Moved(Part(hull, (), self.solid))
+
+    def _covering(self, parts: Sequence[Part]) -> list[Part]:
+        """Get parts that cover the solid, when there is no time to simplify their hulls."""
+        moved = [self._begun(part.hull) for part in parts]
         self._cover(moved, simple=False)
-        return [each.hull for each in moved]
+        return [each.part for each in moved]
 
-    def _tested(self, moved: list[_Transferred]) -> tuple[list[Part], float]:
-        """Clip the solid to the hulls, and cut it there where one fails, until none is left to cut (see `_failing`)."""
-        self._clip(moved)
+    def _tested(self, moved: list[_Moved]) -> tuple[list[Part], float]:
+        """Cut the solid within hulls that fail, until none is left to cut (see `_failing`)."""
         while failing := self._failing(moved):
             for i in reversed(failing):
                 moved[i : i + 1] = self._cut_again(moved[i])
             self._cover(moved)
-            self._clip(moved)
-        errors = self.run.map(self.goal.error, [each.on_solid for each in moved if not each.is_met])
-        return [each.on_solid for each in moved], max([1.0, *(error / self.goal.outward_deviation for error in errors)])
+        errors = self.run.map(self.goal.error, [each.part for each in moved if not each.is_met])
+        return [each.part for each in moved], max([1.0, *(error / self.goal.outward_deviation for error in errors)])
 
-    def _cut_again(self, failing: _Transferred) -> list[_Transferred]:
-        """Cut a part on the solid; the second time to a tighter goal, as the hulls of its pieces may grow."""
-        part, tighter = failing.on_solid, 1 - failing.cuts * self.proxy.margin(self.goal)
-        tree = CutTree(Component((part.vertices, part.faces)), self.policy, self.run)
-        new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
+    def _cut_again(self, failing: _Moved) -> list[_Moved]:
+        """Cut a part on the solid; the second time to a tighter goal, as the hulls of its pieces may grow.
+
+        What the solid fills of its hull may have a hull that is tight enough, without cuts.
+        """
+        inside = self.solid.inside(failing.part.hull)
         cuts = failing.cuts + 1
-        return [_Transferred(part.hull, part, True, cuts) for part in new] or [replace(failing, cuts=cuts)]
+        if inside is None:
+            return [replace(failing, cuts=cuts)]
+        if failing.cuts == 0 and self.goal.is_met(inside):
+            return [_Moved(inside, True)]
+        tree = CutTree(inside, self.policy, self.run)
+        tighter = 1 - failing.cuts * self.proxy.margin(self.goal)
+        new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
+        return [_Moved(part, True, cuts) for part in new]
 
-    def confirmed(self, hull: Hull) -> Part | None:
-        """Get what the solid fills of a hull; None if it does not meet the goal."""
-        part = self.solid.filled(hull)
-        return part if self.goal.is_met(part) else None
-
-    def _cover(self, moved: Sequence[_Transferred], simple: bool = True) -> None:
+    def _cover(self, moved: Sequence[_Moved], simple: bool = True) -> None:
         """Grow hulls where necessary to cover the solid's surface; those that need not grow stay the same."""
-        points = self.solid.filling.uncovered(
-            [each.hull.body for each in moved],
+        points = self.solid.against.uncovered(
+            [each.part.hull.body for each in moved],
             2 * self.proxy.deviation + SIMPLE_FIRST,
             GROWTH_TO_SPARE,
             self.run.threads,
@@ -159,27 +151,12 @@ class Transfer:
             if len(own):
                 each.grow(own, simple)
 
-    def _clip(self, moved: Sequence[_Transferred]) -> None:
-        """Get what the solid fills of hulls that have changed."""
-        changed = [each for each in moved if each.part is None]
-        for each, part in zip(changed, self.run.map(self.solid.filled, [each.hull for each in changed]), strict=True):
-            each.part = part
-
-    def _failing(self, moved: list[_Transferred]) -> list[int]:
+    def _failing(self, moved: list[_Moved]) -> list[int]:
         """Indices of the parts that fail on the solid, but for those that were cut there `MOST_CUTS` times."""
         asked = [i for i, each in enumerate(moved) if each.cuts < MOST_CUTS and not each.is_met]
-        for i, met in zip(asked, self.run.map(self._met, [moved[i] for i in asked]), strict=True):
-            if met is not None:
-                moved[i] = replace(moved[i], hull=met.hull, part=met, is_met=True)
+        for i, is_met in zip(asked, self.run.map(self.goal.is_met, [moved[i].part for i in asked]), strict=True):
+            moved[i].is_met = is_met
         return [i for i in asked if not moved[i].is_met]
-
-    def _met(self, moved: _Transferred) -> Part | None:
-        """Its part of the solid if that meets the goal, with its simple hull or else its exact one."""
-        part = moved.on_solid
-        if self.goal.is_met(part):
-            return part
-        exact = Hull.of(part.vertices) if moved.cuts == 0 else None
-        return tight if exact is not None and self.goal.is_met(tight := part.with_hull(exact)) else None
 
 
 @dataclass(frozen=True)
@@ -225,10 +202,7 @@ class Model:
         assert self.proxy is not None
         scaled = goal if factor == 1.0 else goal.scaled(factor)
         with run.stage("transfer"):
-            moving = Transfer(self.solid, self.proxy, scaled, policy, run)
-            parts, worst = moving(parts)
+            parts, worst = Transfer(self.solid, self.proxy, scaled, policy, run)(parts)
             if merge and run.stopped_by is None:  # the margin may have kept some from merging
-                moving = replace(moving, goal=scaled.scaled(worst))
-                looser = moving.goal.alone.scaled(1 + self.proxy.margin(goal))
-                parts = merge_transferred(parts, self.component, looser, moving.confirmed, run)
+                parts = merge_parts(parts, scaled.scaled(worst), run, few=0)
         return parts

@@ -87,13 +87,3 @@ def growing(vertices: int, points: int) -> float:
 def limiting(vertices: int) -> float:
     """Find a hull of few corners around one of `vertices` corners, and even it out."""
     return 60 * vertices
-
-
-def gluing(faces: int) -> float:
-    """Glue two parts that have `faces` faces in total."""
-    return 16 + 0.2 * faces
-
-
-def filling(faces: int, hull_faces: int) -> float:
-    """Clip a solid to a hull around parts that have `faces` faces in total."""
-    return 170 + 1.05 * faces + 4.1 * hull_faces

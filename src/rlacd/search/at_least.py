@@ -50,7 +50,7 @@ def at_least(solid: Component, parts: Sequence[Part], reach: float, run: Run) ->
     """
     if not math.isfinite(reach) or len(parts) == 1:
         return 1
-    surface = solid.filling.surface
+    surface = solid.against.surface
     samples, _ = _native.sample_surface(solid.vertices, solid.faces, CANDIDATES, 0)
     corners, _ = surface.closest(np.concatenate([part.hull.vertices for part in parts]), run.threads)
     points = np.concatenate([corners, samples])

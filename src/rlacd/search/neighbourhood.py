@@ -98,11 +98,11 @@ class Neighbourhood:
         self._context = context
         self._run = run
         self._random = np.random.default_rng(context.seed)
-        self._now = NumberedParts(parts, context.criterion.early_out)
+        self._now = NumberedParts(parts, context.criterion)
         self.best = list(parts)
         self.gained = time.perf_counter()
         self.steps = self.accepted = 0
-        self._near = min(context.criterion.early_out.reach, 2 * context.criterion.outward_deviation)
+        self._near = min(context.criterion.reach, 2 * context.criterion.outward_deviation)
         self._around: dict[int, tuple[int, ...]] = {}
         self._begun: deque[tuple[_Trial, Apart[Exchange | None]]] = deque()
         self._again: deque[_Trial] = deque()  # to be repeated: what they found came too late
@@ -172,7 +172,7 @@ class Neighbourhood:
         tries = self._tries[key] = self._tries.get(key, 0) + 1
         random = np.random.default_rng(int(self._random.integers(2**32)))
         divide = give if operator is Operator.GIVE else partial(redistribute, again=tries > 1)
-        return partial(divide, parts[trial.part], [parts[i] for i in near], context.criterion, random, context.root)
+        return partial(divide, parts[trial.part], [parts[i] for i in near], context.criterion, random)
 
     def _make(self, trials: Iterator[_Trial], most: float = math.inf) -> None:
         """Make trials, `LAG` at a time, and apply what they find, until there are `most`."""

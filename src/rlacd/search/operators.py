@@ -1,8 +1,8 @@
 """The operators of the search, which exchange parts for fewer.
 
 - redistribute: a part is divided until the parts around have taken all of it, or some piece cannot go. Hulls may
-  overlap, so a taker need not end where the part began: it takes a piece if the solid clipped to their joint hull meets
-  the criterion (`rlacd.merge.merge.Uniter`). A piece that no part can take is halved, and the halves are offered again.
+  overlap, so a taker need not end where the part began: it takes a piece if their joint hull meets the criterion. A
+  piece that no part can take is halved, and the halves are offered again.
 - give: the same, but what no part can take stays a part.
 """
 
@@ -10,15 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import Uniter
+from rlacd.merge.merge import feasible_unions, joint_part, price_of_uniting
 from rlacd.run import Run, work
-from rlacd.solid.component import ClippedPart, Component, Part, reunite
-from rlacd.solid.hull import Hull
+from rlacd.solid.component import Component, Part, reunite
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +59,6 @@ def redistribute(
     around: Sequence[Part],
     criterion: Criterion,
     random: np.random.Generator,
-    solid: Component,
     run: Run,
     again: bool = False,
 ) -> Exchange | None:
@@ -76,8 +73,6 @@ def redistribute(
     criterion : Criterion
     random : numpy.random.Generator
         Draws where pieces are halved.
-    solid : Component
-        The solid that was decomposed.
     run : Run
         Give up when it is over.
     again : bool
@@ -90,7 +85,7 @@ def redistribute(
     """
     if not part.members:
         return None
-    division = _Division(around, Uniter(criterion, solid, run.work), random, run, again)
+    division = _Division(around, criterion, random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
     if not all(division.takers(piece) or division.may_go(piece) for piece in pieces):
         return None  # a quick test that ends most trials
@@ -104,7 +99,6 @@ def give(
     around: Sequence[Part],
     criterion: Criterion,
     random: np.random.Generator,
-    solid: Component,
     run: Run,
 ) -> Exchange | None:
     """Let the parts around a part take what they can of it (see `redistribute`).
@@ -114,24 +108,15 @@ def give(
     Exchange or None
         Equally many parts or one fewer; None if nothing can be taken, or what is left does not meet the criterion.
     """
-    division = _Division(around, Uniter(criterion, solid, run.work), random, run, again=True)
+    division = _Division(around, criterion, random, run, again=True)
     left = [component for member in part.members for component in division.left_of(_Piece(member))]
     if run.is_over or all(now is before for now, before in zip(division.now, around, strict=True)):
         return None
-    rest = [_whole(left, criterion, solid)] if len(left) > 1 else left
+    rest = [Part.joint(*left)] if left else []
     for whole in rest:
-        is_lost = isinstance(whole, ClippedPart) and not whole.is_whole
-        if is_lost or not run.work.pay(work.judging(whole.size, len(whole.hull.faces))) or not criterion.is_met(whole):
+        if not run.work.pay(price_of_uniting(whole)) or not criterion.is_met(whole):
             return None
     return _exchanged(part, around, [*division.now, *rest], criterion)
-
-
-def _whole(pieces: Sequence[Component], criterion: Criterion, solid: Component) -> Part:
-    """Join disjoint pieces into a part, with all the solid fills of their hull if the criterion looks inside."""
-    if not criterion.early_out.looks_inside:
-        parts: Sequence[Part] = pieces
-        return reduce(Part.glued, parts)
-    return ClippedPart(solid, pieces, Hull.around(*(piece.hull for piece in pieces)))
 
 
 def _exchanged(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
@@ -160,17 +145,17 @@ class _Division:
     """Parts that are offered pieces of another, which are halved if none can take them."""
 
     def __init__(
-        self, around: Sequence[Part], uniter: Uniter, random: np.random.Generator, run: Run, again: bool
+        self, around: Sequence[Part], criterion: Criterion, random: np.random.Generator, run: Run, again: bool
     ) -> None:
         self.now = list(around)
-        self._uniter = uniter
+        self._criterion = criterion
         self._random = random
         self._run = run
         self._again = again
 
     def takers(self, piece: _Piece) -> list[int]:
         """The parts that may take a piece, those first whose hulls would grow the least."""
-        feasible = self._uniter.feasible(piece.component, self.now)
+        feasible = feasible_unions(piece.component, self.now, self._criterion, self._run.work)
         return [i for i, _ in sorted(feasible, key=lambda found: found[1] - self.now[found[0]].hull.volume)[:TAKERS]]
 
     def may_go(self, piece: _Piece, halvings: int = PIECE_HALVINGS) -> bool:
@@ -181,8 +166,8 @@ class _Division:
     def left_of(self, piece: _Piece, halvings: int = PIECE_HALVINGS, stop: bool = False) -> list[Component]:
         """Give parts what they can take of a piece; returns the rest, or with `stop` the first of the rest."""
         for i in self.takers(piece):
-            union = self._uniter.unite_feasible(self.now[i], piece.component)
-            if union is not None:
+            union, price = joint_part(self.now[i], piece.component, self._criterion)
+            if self._run.work.pay(price) and union is not None:
                 self.now[i] = union
                 return []
         halves = self._halves(piece) if halvings > 0 else []

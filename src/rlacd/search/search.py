@@ -207,7 +207,7 @@ class _Search:
         """Offer each part of a start to those around."""
         run, context = self._run, self._context
         with run.limited(self._first_pass):
-            parts = grow_cover(parts, context.criterion, run, context.root)
+            parts = grow_cover(parts, context.criterion, run)
         if self._state is None:
             self.early = parts
         state = Neighbourhood(replace(context, seed=context.seed + self.starts), parts, run)

@@ -1,4 +1,4 @@
-"""A piece of the solid on its way to becoming a part: its surface, its hull, and how it is cut and glued.
+"""Parts of a decomposition, and the pieces of the solid that they stand for, which can be cut.
 
 Everything is in the normalised frame (bounding box of the input centred, longest side 2).
 
@@ -7,10 +7,10 @@ Components that touch can be reunited into one that can be cut again.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -43,72 +43,70 @@ class Plane:
 
 
 class Part:
-    """A solid's surface with its volume and hull, computed once.
+    """A convex hull, and the disjoint pieces of the solid that it stands for.
+
+    Every question about a part is one about its hull and the whole solid (`Component.against`).
 
     Parameters
     ----------
-    vertices : float64 [V, 3]
-    faces : int32 [F, 3]
-        A surface that bounds the solid, for measuring distances; that of a part glued from several is not a closed
-        mesh.
-    volume : float
-        Of the solid.
     hull : Hull
-        A convex polytope that contains the solid.
-    piece_hulls : float, optional
-        Sum of the volumes of the hulls of the pieces it was glued from; its own hull's volume by default.
     members : tuple of Component
-        The components that it consists of. Empty if it, or any part in it, was not made from components: then nothing
-        less than its hull covers what it stands for.
+        The pieces, which the hull contains. Empty if they are not known, as those of a hull that was carried over from
+        a simpler copy: then nothing less than the hull covers what it stands for.
+    whole : Component
+        The solid that the hull is held against; a component without one is its own.
+    exact : Hull or None
+        Its hull before limits on vertices and triangles made that larger; None if they did not.
 
     Attributes
     ----------
-    size : int
-        Triangles of the surface, counting those where its pieces touch.
     within : Part or None
         A part whose hull contains this one's: the one it was cut from.
-    exact : Hull or None
-        Its hull before limits on vertices and triangles made that larger; None if they did not.
-    tree : TreeCache or None
-        Keeps the tree over the surface for the tests to come, whatever the hull; None forgets it after each.
     """
 
+    within: Part | None = None
+
     def __init__(
-        self,
-        vertices: FloatArray,
-        faces: IntArray,
-        volume: float,
-        hull: Hull,
-        piece_hulls: float | None = None,
-        members: tuple[Component, ...] = (),
+        self, hull: Hull, members: tuple[Component, ...], whole: Component | None, exact: Hull | None = None
     ) -> None:
-        self._surface = vertices, faces
-        self._members = members
-        self.size = len(faces)
-        self.volume = volume
         self.hull = hull
-        self.piece_hulls = hull.volume if piece_hulls is None else piece_hulls
-        self.within: Part | None = None
-        self.exact: Hull | None = None
-        self.tree: _native.TreeCache | None = None
+        self.exact = exact
+        self._members = members
+        self._whole = whole
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}(volume {self.volume:.4g}, hull {self.hull.volume:.4g})"
+        return f"{type(self).__name__}(hull {self.hull.volume:.4g})"
 
     @property
     def members(self) -> tuple[Component, ...]:
-        """The components it consists of."""
+        """The pieces it stands for."""
         return self._members
 
     @property
-    def vertices(self) -> FloatArray:
-        """Points of the surface [V, 3]."""
-        return self._resolved()[0]
+    def whole(self) -> Component:
+        """The solid that its hull is held against."""
+        assert self._whole is not None, "only a component is its own whole"
+        return self._whole
+
+    @cached_property
+    def volume(self) -> float:
+        """Of its pieces; all that the solid fills of its hull if they are not known."""
+        return sum(member.volume for member in self.members) if self.members else self.filled
+
+    @cached_property
+    def filled(self) -> float:
+        """Volume of all that the solid fills of its hull, whichever part that belongs to, without limits."""
+        return self.whole.against.filled((self.exact or self.hull).body)
 
     @property
-    def faces(self) -> IntArray:
-        """Triangles of the surface [F, 3]."""
-        return self._resolved()[1]
+    def piece_hulls(self) -> float:
+        """Sum of the volumes of its pieces' hulls."""
+        return sum(member.hull.volume for member in self.members) if self.members else self.hull.volume
+
+    @property
+    def size(self) -> int:
+        """Triangles of its pieces."""
+        return sum(member.size for member in self.members)
 
     @property
     def box(self) -> FloatArray:
@@ -116,103 +114,15 @@ class Part:
         return self.hull.box
 
     def with_hull(self, hull: Hull) -> Part:
-        """Return the same solid with another hull around it."""
-        other = copy.copy(self)
-        other.hull = hull
-        other.within = None  # the other hull may be larger
-        return other
+        """Return the same pieces with another hull around them."""
+        return Part(hull, self.members, self.whole, self.exact)
 
     @staticmethod
-    def unclipped(hull: Hull) -> Part:
-        """What a solid fills of a hull, before there was time to clip it: without faces."""
-        return Part(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32), 0.0, hull)
-
-    @staticmethod
-    def glued(first: Part, second: Part, hull: Hull | None = None) -> Part:
-        """Unite two parts with disjoint interiors; the regions where they touch are not part of the union's surface.
-
-        If either is a `ClippedPart`, which also holds what other parts contribute, the union is one too, if clipping
-        leaves any of it. Pass the joint hull if it is known.
-        """
-        hull = hull or Hull.around(first.hull, second.hull)
-        for part in (first, second):
-            if isinstance(part, ClippedPart):
-                clipped = ClippedPart(part.solid, (first, second), hull)
-                if clipped.size:  # clipping may leave nothing of what is as thin as rounding
-                    return clipped
-        return _Union(first, second, hull)
-
-    def _resolved(self) -> tuple[FloatArray, IntArray]:
-        return self._surface
-
-
-def _members_of(parts: Sequence[Part]) -> tuple[Component, ...]:
-    """The members of all parts; none if a part has none."""
-    known = all(part.members for part in parts)
-    return tuple(member for part in parts for member in part.members) if known else ()
-
-
-class _Union(Part):
-    """The union of two parts. They are glued when the surface is first needed: some criteria look at the hull only."""
-
-    def __init__(self, first: Part, second: Part, hull: Hull) -> None:
-        volume, piece_hulls = first.volume + second.volume, first.piece_hulls + second.piece_hulls
-        super().__init__(*first._surface, volume, hull, piece_hulls, _members_of((first, second)))
-        self.size = first.size + second.size
-        self._operands: tuple[Part, Part] | None = (first, second)
-
-    def _resolved(self) -> tuple[FloatArray, IntArray]:
-        for union in reversed(self._unresolved()):  # a loop: a thousand nested unions are too deep to recurse
-            operands = union._operands
-            if operands is not None:  # another thread may have done it already
-                (a, b), (c, d) = (part._resolved() for part in operands)
-                union._surface = _native.glue(a, b, c, d)
-                union._operands = None
-        return self._surface
-
-    def _unresolved(self) -> list[_Union]:
-        """This union and all unglued unions below it, outer before inner."""
-        found: list[_Union] = []
-        waiting: list[Part] = [self]
-        while waiting:
-            part = waiting.pop()
-            if isinstance(part, _Union) and (operands := part._operands) is not None:
-                found.append(part)
-                waiting += operands
-        return found
-
-
-class ClippedPart(Part):
-    """All that the solid fills of a hull of several of its parts, whichever part it came from.
-
-    Parts on both sides of a third become one this way, such as a beam that another crosses: hulls may overlap, and
-    material that lies in any of them is covered. The members stay disjoint, so parts can be reunited and cut again.
-
-    Parameters
-    ----------
-    solid : Component
-        The whole solid.
-    parts : sequence of Part
-        Consist of components of the solid.
-    hull : Hull
-        Contains them.
-
-    Attributes
-    ----------
-    solid : Component
-    """
-
-    def __init__(self, solid: Component, parts: Sequence[Part], hull: Hull) -> None:
-        inside = solid.inside(hull)
-        piece_hulls = sum(part.piece_hulls for part in parts)
-        super().__init__(inside.vertices, inside.faces, inside.volume, hull, piece_hulls, _members_of(parts))
-        self.tree = inside.tree
-        self.solid = solid
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether the clipping left faces, and no member lost volume in it."""
-        return self.size > 0 and self.volume >= (1 - LOST_VOLUME) * sum(member.volume for member in self.members)
+    def joint(*parts: Part) -> Part:
+        """Unite parts with disjoint pieces; the pieces of the union are not known if those of one part are not."""
+        known = all(part.members for part in parts)
+        members = tuple(member for part in parts for member in part.members) if known else ()
+        return Part(Hull.around(*(part.hull for part in parts)), members, parts[0].whole)
 
 
 class Component(Part):
@@ -223,7 +133,14 @@ class Component(Part):
     solid : Shape
         The solid, in the normalised frame; not flat. A surface [V, 3], [F, 3] has to be closed and oriented.
     threads : int
-        Threads that prepare `filling`.
+        Threads that prepare `against`.
+
+    Attributes
+    ----------
+    vertices : float64 [V, 3]
+    faces : int32 [F, 3]
+        Closed and oriented.
+    volume : float
 
     Raises
     ------
@@ -231,33 +148,49 @@ class Component(Part):
         The solid is flat.
     """
 
+    volume: float
+
     def __init__(self, solid: Shape, threads: int = 1) -> None:
         vertices, faces = mesh_of(solid)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")
-        super().__init__(vertices, faces, _native.mesh_volume(vertices, faces), hull)
+        self._take((vertices, faces, _native.mesh_volume(vertices, faces)), hull, None)
         self._threads = threads
 
     @classmethod
-    def of(cls, piece: Piece, within: Component | None = None) -> Component:
-        """Take over what a kernel made."""
-        vertices, faces, volume, corners, facets, hull_volume = piece
+    def of(cls, piece: Piece, within: Component | None = None, whole: Component | None = None) -> Component:
+        """Take over what a kernel made: a piece `within` another, or of the `whole`; else a solid of its own."""
+        *solid, corners, facets, hull_volume = piece
         component = cls.__new__(cls)
-        Part.__init__(component, vertices, faces, volume, Hull(corners, facets, hull_volume))
-        component._threads = 1
+        component._take(solid, Hull(corners, facets, hull_volume), within.whole if within is not None else whole)
         component.within = within
         return component
+
+    def _take(self, solid: Sequence[Any], hull: Hull, whole: Component | None) -> None:
+        super().__init__(hull, (), whole)
+        self.vertices, self.faces, self.volume = solid
+        self._threads = 1
 
     @property
     def members(self) -> tuple[Component, ...]:
         """Itself."""
         return (self,)
 
+    @property
+    def whole(self) -> Component:
+        """The solid that it is a piece of; itself if it is none."""
+        return self._whole or self
+
+    @property
+    def size(self) -> int:
+        """Triangles."""
+        return len(self.faces)
+
     @cached_property
-    def filling(self) -> _native.Filling:
-        """Tests how well the hulls of the solid's parts are filled."""
-        return _native.Filling(self.vertices, self.faces, self._threads)
+    def against(self) -> _native.Against:
+        """Holds hulls against the solid: asked of the whole only."""
+        return _native.Against(self.vertices, self.faces, self._threads)
 
     @cached_property
     def principal_axes(self) -> FloatArray:
@@ -287,17 +220,14 @@ class Component(Part):
         sides = _native.halve_between(self.vertices, self.faces, own, around, share, NEGLIGIBLE_VOLUME)
         return [Component.of(side, self) for side in sides]
 
-    def inside(self, hull: Hull) -> Part:
-        """Return all that the solid fills of a hull, closed by caps on the hull's facets; without faces if nothing."""
-        vertices, faces, volume = self.filling.clipped(hull.body)
-        part = Part(vertices, faces, volume, hull)
-        part.tree = _native.TreeCache()
-        return part
-
-    def filled(self, hull: Hull) -> Part:
-        """The same, but the hull itself if nothing is left."""
-        part = self.inside(hull)
-        return part if part.size else Part(hull.vertices, hull.faces, hull.volume, hull)
+    def inside(self, hull: Hull) -> Component | None:
+        """Return all that the solid fills of a hull, closed by caps on the hull's facets; None if that is flat."""
+        vertices, faces = self.against.inside(hull.body)
+        tight = Hull.of(vertices) if len(faces) else None
+        if tight is None:
+            return None
+        volume = _native.mesh_volume(vertices, faces)
+        return Component.of((vertices, faces, volume, tight.vertices, tight.faces, tight.volume), whole=self.whole)
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""
@@ -309,9 +239,9 @@ THIN = HALF_THICKNESS / 5
 """Mean thickness up to which a part is a sliver that a cut or rounding has left: sheets are ten times thicker."""
 
 
-def is_thin(part: Part) -> bool:
-    """Whether the part's mean thickness, twice its volume over its area, is at most `THIN`."""
-    return 2 * part.volume <= THIN * _native.mesh_area(part.vertices, part.faces)
+def is_thin(component: Component) -> bool:
+    """Whether the mean thickness, twice the volume over the area, is at most `THIN`."""
+    return 2 * component.volume <= THIN * _native.mesh_area(component.vertices, component.faces)
 
 
 def concatenated(surfaces: list[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:
@@ -333,7 +263,7 @@ def reunite(components: Sequence[Component]) -> Component | None:
     if len(components) == 1:
         return components[0]
     whole = _native.reunite([one.vertices for one in components], [one.faces for one in components], NEGLIGIBLE_VOLUME)
-    return whole and Component.of(whole)
+    return whole and Component.of(whole, whole=components[0].whole)
 
 
 def _joined_again(components: Sequence[Component]) -> list[Component]:

@@ -10,7 +10,7 @@ from manifold3d import Manifold
 from rlacd._native import Stopped
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, heights, length
-from rlacd.solid.component import DENSE, Part
+from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.frame import HALF_THICKNESS, Frame, thickened
 from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.input_mesh import InputMesh
@@ -73,7 +73,9 @@ def slabs(solid: Solid, run: Run) -> list[Part]:
 
 
 def _part(hull: Hull) -> Part:
-    return Part(hull.vertices, hull.faces, hull.volume, hull)
+    """A part that is its own hull."""
+    mesh = hull.vertices, hull.faces, hull.volume
+    return Component.of((*mesh, *mesh))
 
 
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:

@@ -1,4 +1,4 @@
-#include "solid/glue.hpp"
+#include "solid/touching.hpp"
 
 #include <algorithm>
 
@@ -27,36 +27,12 @@ bool is_film(const Outline& p) {
   return doubled_area_of(p) <= kCoincident * std::sqrt(longest2);
 }
 
-// Keeps what of a polygon lies left of the line through a and b; the rest goes to `right`. False if hardly anything
-// does.
-bool keep_left(Outline& polygon, PlanePoint a, PlanePoint b, Outline& right) {
-  Outline left;
+// Keeps what of a polygon lies left of the line through a and b; false if hardly anything does.
+bool keep_left(Outline& polygon, PlanePoint a, PlanePoint b) {
+  Outline left, right;
   const Lies lies = split(polygon, [a, b](PlanePoint p) { return -doubled_area(a, b, p); }, left, right);
-  if (lies == Lies::kAcross)
-    polygon.swap(left);
-  else
-    right.clear();
+  if (lies == Lies::kAcross) polygon.swap(left);
   return lies != Lies::kAbove && !is_film(polygon);
-}
-
-// Removes a triangle (counter-clockwise) from convex polygons.
-void subtract(std::vector<Outline>& polygons, const std::array<PlanePoint, 3>& triangle) {
-  std::vector<Outline> left;
-  Outline right;
-  for (Outline& p : polygons) {
-    Outline rest = p;
-    std::vector<Outline> pieces;
-    bool overlaps = true;
-    for (int e = 0; e < 3 && overlaps; ++e) {
-      overlaps = keep_left(rest, triangle[e], triangle[(e + 1) % 3], right);
-      if (!right.empty() && !is_film(right)) pieces.push_back(right);
-    }
-    if (overlaps)
-      left.insert(left.end(), pieces.begin(), pieces.end());
-    else
-      left.push_back(std::move(p));  // what the triangle only touches stays whole
-  }
-  polygons = std::move(left);
 }
 
 // A triangle with its plane and the two coordinates it is projected to.
@@ -84,14 +60,6 @@ struct Facet {
   }
 
   PlanePoint project(Vec3 p) const { return {p[u], p[v]}; }
-  Vec3 lift(PlanePoint p) const {
-    const int drop = 3 - u - v;
-    Vec3 x;
-    x[u] = p[0];
-    x[v] = p[1];
-    x[drop] = (offset - normal[u] * p[0] - normal[v] * p[1]) / normal[drop];
-    return x;
-  }
 
   bool touches(const Facet& other) const {
     if (dot(normal, other.normal) >= 0) return false;
@@ -110,73 +78,18 @@ std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
   return result;
 }
 
-// Appends to `out` the part of mesh `a` that does not touch `b`.
-void append_untouched(Mesh& out, const Mesh& a, const Mesh& b, const Box& common) {
-  const std::vector<Facet> others = facets_within(b, common);
-  // Unions are glued again and again, so vertices that no triangle needs any more are left behind.
-  Renumbered taken_over(a.vertices, out.vertices);
-  std::vector<Outline> polygons;
-  for (const Triangle& face : a.faces) {
-    poll_stop();
-    const Facet facet(a, face);
-    if (facet.height <= kCoincident) continue;  // its edges belong to its neighbours
-    bool whole = true;
-    if (facet.box.meets(common, kCoincident)) {
-      for (const Facet& other : others) {
-        if (!facet.box.meets(other.box, kCoincident) || !facet.touches(other)) continue;
-        if (whole)
-          polygons.assign(
-              1, {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])});
-        whole = false;
-        // Seen from this side the other triangle is clockwise.
-        subtract(polygons,
-                 {facet.project(other.corner[0]), facet.project(other.corner[2]), facet.project(other.corner[1])});
-        if (polygons.empty()) break;
-      }
-    }
-    if (whole) {
-      out.faces.push_back(taken_over(face));
-      continue;
-    }
-    for (const Outline& p : polygons) {
-      const auto first = static_cast<std::int32_t>(out.vertices.size());
-      for (const PlanePoint q : p) out.vertices.push_back(facet.lift(q));
-      for (std::int32_t i = 1; i + 1 < static_cast<std::int32_t>(p.size()); ++i)
-        out.faces.push_back({first, first + i, first + i + 1});
-    }
-  }
-}
-
 // Whether a triangle of one solid and an opposite one of the other share more than an edge.
 bool share_area(const Facet& facet, const Facet& other) {
   if (!facet.box.meets(other.box, kCoincident) || !facet.touches(other)) return false;
   Outline common = {facet.project(facet.corner[0]), facet.project(facet.corner[1]), facet.project(facet.corner[2])};
   const PlanePoint outline[3] = {facet.project(other.corner[0]), facet.project(other.corner[2]),
                                  facet.project(other.corner[1])};
-  Outline right;
   for (int e = 0; e < 3; ++e)
-    if (!keep_left(common, outline[e], outline[(e + 1) % 3], right)) return false;
+    if (!keep_left(common, outline[e], outline[(e + 1) % 3])) return false;
   return true;
 }
 
 }  // namespace
-
-Mesh glue(const Mesh& a, const Mesh& b) {
-  const Box box_a = box_of_faces(a), box_b = box_of_faces(b);
-  Box common;
-  for (int axis = 0; axis < 3; ++axis) {
-    common.lower[axis] = std::max(box_a.lower[axis], box_b.lower[axis]);
-    common.upper[axis] = std::min(box_a.upper[axis], box_b.upper[axis]);
-  }
-  Mesh out;
-  append_untouched(out, a, b, common);
-  append_untouched(out, b, a, common);
-  if (!out.faces.empty()) return out;
-  // Films thinner than kCoincident touch everywhere; what bounds them still has to be measured.
-  out = a;
-  append(out, b);
-  return out;
-}
 
 void add_touching_planes(std::vector<Plane>& planes, const Mesh& a, const Mesh& b) {
   const std::vector<Facet> others = facets_within(b, box_of_faces(a));

@@ -1,4 +1,4 @@
-#include "solid/filling.hpp"
+#include "solid/against.hpp"
 
 #include <algorithm>
 #include <queue>
@@ -8,7 +8,6 @@
 #include "convex/polygon.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
-#include "solid/caps.hpp"
 #include "solid/pieces.hpp"
 
 namespace rlacd {
@@ -17,9 +16,12 @@ namespace {
 constexpr double kInside = 0.5;
 constexpr double kBeyond = 1 + 1e-9;
 
-// Limits on the cells examined: this many besides the facets, down to this share of the threshold. Most pairs of hulls
-// are never united, so less is spent on each.
-constexpr int kMostCells = 400, kMostCellsOfPair = 64;
+// Where a verdict is undecided, as a share of the threshold.
+constexpr double kUndecided = 1e-3;
+
+// Limits on the looks at the joint hull of a pair: this many besides the facets, down to this share of the threshold.
+// Most pairs are never united.
+constexpr int kMostLooks = 64;
 constexpr double kSmall = 0.2;
 
 // Points of a cell may be farther out than its middle by its radius, but hardly ever are by more than this share of it.
@@ -78,26 +80,138 @@ class Depths {
   Polygon polygon_, deeper_, rest_;
 };
 
-struct Cell {
+// A piece of a facet.
+struct Look {
   Corners corner;
   Vec3 middle;
   double radius;
   std::int32_t hint;                                      // the slot of a nearby face of the solid
   double most = std::numeric_limits<double>::infinity();  // how far a point of the cell outside the solid may well be
 
-  Cell(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
+  Look(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
     radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
   }
-  bool operator<(const Cell& other) const { return most < other.most; }
+  bool operator<(const Look& other) const { return most < other.most; }
 };
+
+// Depth of points under the planes of a hull, 0 outside; the witnesses are the planes.
+class DepthField {
+ public:
+  explicit DepthField(const ConvexBody& hull) : planes_(hull.planes()) {}
+
+  Sample at(Vec3 p, std::int32_t hint, double enough) const {
+    if (hint >= 0)
+      if (const double depth = from(hint, p); depth <= enough) return {depth, hint};
+    const ConvexPlanes::Nearest nearest = planes_.nearest(p);
+    return {std::max(nearest.depth, 0.0), nearest.plane};
+  }
+  double from(std::int32_t plane, Vec3 p) const { return std::max(planes_.depth(plane, p), 0.0); }
+
+ private:
+  const ConvexPlanes& planes_;
+};
+
+// Distance to a solid, 0 inside. The witnesses are the triangles of its surface, by their slots, and balls inside it,
+// by negative numbers: a point that is `radius` inside is at least so far from everything outside.
+class SolidField {
+ public:
+  explicit SolidField(const Surface& surface) : surface_(surface) {}
+
+  Sample at(Vec3 p, std::int32_t hint, double enough) const {
+    std::int32_t near = hint;
+    if (is_ball(hint)) {
+      if (const double away = from(hint, p); away <= enough) return {away, hint};
+      near = ball(hint).near;
+    }
+    const Bvh::Hit hit = surface_.bvh().closest(p, near, enough);
+    const double distance = std::sqrt(hit.distance2);
+    if (distance <= enough || surface_.winding().of_closed(p) < kInside) return {distance, hit.slot};
+    balls_.push_back({p, distance, hit.slot});
+    return {0, kFirstBall - static_cast<std::int32_t>(balls_.size() - 1)};
+  }
+  double from(std::int32_t witness, Vec3 p) const {
+    if (!is_ball(witness)) return surface_.bvh().distance(witness, p);
+    return std::max(0.0, norm(p - ball(witness).middle) - ball(witness).radius);
+  }
+
+ private:
+  struct InnerBall {
+    Vec3 middle;
+    double radius;
+    std::int32_t near;  // the slot of a triangle that it touches
+  };
+  static constexpr std::int32_t kFirstBall = -2;
+  static bool is_ball(std::int32_t witness) { return witness <= kFirstBall; }
+  const InnerBall& ball(std::int32_t witness) const { return balls_[static_cast<std::size_t>(kFirstBall - witness)]; }
+
+  const Surface& surface_;
+  mutable std::vector<InnerBall> balls_;  // of one thread
+};
+
+// The maximum, bounded also by the witness of every triangle's centre alone: exact for triangles that lie on those they
+// are measured to.
+template <class Field>
+Interval measured(const Field& field, const Mesh& mesh, const Goal& goal) {
+  Interval found = maximize(field, mesh, goal, 1);
+  double most = found.lower;
+  for (std::size_t f = 0; f < mesh.faces.size() && most < found.upper; ++f) {
+    const Corners corner = corners_of(mesh, mesh.faces[f]);
+    const std::int32_t witness = field.at((1.0 / 3.0) * (corner[0] + corner[1] + corner[2]), -1, 0).witness;
+    for (const Vec3& point : corner) most = std::max(most, field.from(witness, point));
+  }
+  found.upper = std::min(found.upper, most);
+  return found;
+}
 
 }  // namespace
 
-bool Filling::is_feasible(const ConvexBody& hull, double threshold) const {
-  return !comes_deeper(hull, threshold) && !is_missed(hull.mesh(), hull.mesh().faces, threshold, kMostCells);
+bool Against::meets(const ConvexBody& hull, double threshold) const {
+  if (comes_deeper(hull, threshold)) return false;
+  Goal goal;
+  goal.tolerance = kUndecided * threshold;
+  goal.pass = goal.rough = goal.fail = threshold;
+  return maximize(SolidField(surface_), hull.mesh(), goal, 1).upper <= threshold;
 }
 
-double Filling::feasible_volume(const ConvexBody& first, const ConvexBody& second, double threshold) const {
+Against::Fit Against::measure(const ConvexBody& hull, double tolerance, double floor) const {
+  Fit fit;
+  Goal goal;
+  goal.tolerance = tolerance;
+  goal.pass = goal.rough = std::max(floor, tolerance);
+  fit.depth = measured(DepthField(hull), faces_inside(hull), goal);
+  goal.pass = goal.rough = std::max(goal.pass, fit.depth.lower + tolerance);
+  fit.reach = measured(SolidField(surface_), hull.mesh(), goal);
+  return fit;
+}
+
+Mesh Against::faces_inside(const ConvexBody& hull) const {
+  Mesh inside;
+  const ConvexPlanes& planes = hull.planes();
+  Polygon polygon, below, above;
+  const auto visit = [&](std::int32_t slot) {
+    const Corners corners = corners_of(solid_, solid_.faces[surface_.bvh().face(slot)]);
+    polygon.assign(corners.begin(), corners.end());
+    for (std::size_t i = 0; i < planes.size(); ++i) {
+      const auto height = [&](Vec3 p) { return -planes.depth(static_cast<std::int32_t>(i), p); };
+      const Lies lies = split(polygon, height, below, above);
+      if (lies == Lies::kAbove) return false;
+      if (lies == Lies::kAcross) polygon.swap(below);
+    }
+    const auto first = static_cast<std::int32_t>(inside.vertices.size());
+    inside.vertices.insert(inside.vertices.end(), polygon.begin(), polygon.end());
+    for (std::size_t i = 2; i < polygon.size(); ++i) {
+      const auto last = first + static_cast<std::int32_t>(i);
+      inside.faces.push_back({first, last - 1, last});
+    }
+    return false;
+  };
+  surface_.bvh().any_of([&](const Box& box) { return poll_stop(), box.meets(hull.box()); }, visit);
+  return inside;
+}
+
+Mesh Against::inside(const ConvexBody& hull) const { return inside_all(solid_, hull.mesh()); }
+
+double Against::feasible_volume(const ConvexBody& first, const ConvexBody& second, double threshold) const {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   const std::vector<Vec3>&all_first = first.mesh().vertices, &all_second = second.mesh().vertices;
   const ConvexBody few(hull_mesh(joined(first.few_corners(), second.few_corners())));
@@ -122,10 +236,10 @@ double Filling::feasible_volume(const ConvexBody& first, const ConvexBody& secon
   for (std::size_t f = 0; f < hull.faces.size(); ++f)
     if (is_new[f]) facets.push_back(hull.faces[f]);
   if (!are_all && (is_missed(hull, facets, threshold, 0) || comes_deeper(body, threshold))) return kNever;
-  return is_missed(hull, facets, threshold, kMostCellsOfPair) ? kNever : mesh_volume(hull);
+  return is_missed(hull, facets, threshold, kMostLooks) ? kNever : mesh_volume(hull);
 }
 
-bool Filling::comes_deeper(const ConvexBody& hull, double threshold) const {
+bool Against::comes_deeper(const ConvexBody& hull, double threshold) const {
   Depths depths(hull.planes(), threshold);
   Box inner = hull.box();
   inner.lower = inner.lower + Vec3{threshold, threshold, threshold};
@@ -141,10 +255,10 @@ bool Filling::comes_deeper(const ConvexBody& hull, double threshold) const {
   });
 }
 
-bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {
-  std::priority_queue<Cell> open;
+bool Against::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, double threshold, int most) const {
+  std::priority_queue<Look> open;
   // Whether the middle of a cell is missed; the cell stays open if another point of it may well be.
-  const auto look_at = [&](Cell cell) {
+  const auto look_at = [&](Look cell) {
     poll_stop();
     if (cell.radius < kSmall * threshold) return false;
     const double enough = std::max(kNear * threshold, threshold - cell.radius), within = kBeyond * threshold;
@@ -159,33 +273,17 @@ bool Filling::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
     return false;
   };
   for (const auto& [a, b, c] : facets)
-    if (look_at(Cell(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
+    if (look_at(Look(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
   for (int looked = 0; looked < most && !open.empty(); looked += 2) {
-    const Cell cell = open.top();
+    const Look cell = open.top();
     open.pop();
     // Across the longest side, so that cells stay well shaped.
     const int from = longest_side(cell.corner);
     const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
     const Vec3 between = 0.5 * (p + q);
-    if (look_at(Cell(p, between, tip, cell.hint)) || look_at(Cell(between, q, tip, cell.hint))) return true;
+    if (look_at(Look(p, between, tip, cell.hint)) || look_at(Look(between, q, tip, cell.hint))) return true;
   }
   return false;
-}
-
-ClippedSolid Filling::clipped(const ConvexBody& hull) const {
-  ClippedSolid out;
-  std::optional<ConvexClip> clip = clip_to_convex(solid_, surface_, hull);
-  if (clip) {
-    CapArea area;
-    for (const ConvexClip::Section& section : clip->sections) {
-      const CapArea own = add_caps(clip->mesh.faces, clip->mesh.vertices, section.rims, section.normal);
-      area = {area.all + own.all, area.folded + own.folded};
-    }
-    if (area.folded > kFolded * area.all) clip.reset();
-  }
-  out.mesh = clip ? std::move(clip->mesh) : inside_all(solid_, hull.mesh());
-  out.volume = std::fmax(0, mesh_volume(out.mesh));
-  return out;
 }
 
 }  // namespace rlacd
