@@ -55,24 +55,20 @@ def merge_parts(parts: Sequence[Part], criterion: Criterion, run: Run, few: int 
     list of Part
         Parts that could not be united further, in the order of their first piece.
     """
-    return _Merging(parts, criterion, run, few).united()
+    near = _Merging(parts, criterion, run).united()
+    return _Merging(near, criterion, run, few).united()
 
 
 def joint_part(first: Part, second: Part, criterion: Criterion) -> tuple[Part | None, float]:
     """Unite two parts if the union meets the criterion; also returns the work of deciding."""
     union = Part.joint(first, second)
-    return union if criterion.is_met(union) else None, price_of_uniting(union)
-
-
-def price_of_uniting(union: Part) -> float:
-    """The work of judging a union."""
-    return work.testing(len(union.hull.vertices)) + work.judging(union.size, len(union.hull.faces))
+    return union if criterion.is_met(union) else None, work.uniting(len(union.hull.vertices))
 
 
 class _Merging:
     """Parts that are being united."""
 
-    def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run, few: int) -> None:
+    def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run, few: int | None = None) -> None:
         self._alive = NumberedParts(parts, criterion)
         self._criterion = criterion
         self._run = run
@@ -130,8 +126,8 @@ class _Merging:
     def _find(self, new: Sequence[int]) -> None:
         """Find the pairs of a new part and another that may be united; not all of them if the run's work runs out."""
         alive, criterion, run = self._alive, self._criterion, self._run
-        reach = np.inf if len(alive.parts) <= self._few else criterion.reach
-        pairs = alive.boxes.pairs(new, reach, across=True)
+        reach = np.inf if self._few is not None and len(alive.parts) <= self._few else criterion.reach
+        pairs = alive.boxes.pairs(new, reach, across=self._few is not None)
         for begin in range(0, len(pairs), PAIRS_AT_ONCE):
             some = pairs[begin : begin + PAIRS_AT_ONCE]
             vertices, volumes, credits = alive.sums(some)
@@ -238,7 +234,7 @@ def _pop_least(
         if pair.union is not None:
             return pair
         union = Part.joint(alive[pair.first], alive[pair.second])
-        if not account.pay(price_of_uniting(union)):
+        if not account.pay(work.uniting(len(union.hull.vertices))):
             return None
         heapq.heappush(queue, pair._replace(error=criterion.error(union), union=union))
     return None

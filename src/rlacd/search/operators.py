@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import feasible_unions, joint_part, price_of_uniting
+from rlacd.merge.merge import feasible_unions, joint_part
 from rlacd.run import Run, work
 from rlacd.solid.component import Component, Part, reunite
 
@@ -114,7 +114,7 @@ def give(
         return None
     rest = [Part.joint(*left)] if left else []
     for whole in rest:
-        if not run.work.pay(price_of_uniting(whole)) or not criterion.is_met(whole):
+        if not run.work.pay(work.uniting(len(whole.hull.vertices))) or not criterion.is_met(whole):
             return None
     return _exchanged(part, around, [*division.now, *rest], criterion)
 

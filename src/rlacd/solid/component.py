@@ -104,11 +104,6 @@ class Part:
         return sum(member.hull.volume for member in self.members) if self.members else self.hull.volume
 
     @property
-    def size(self) -> int:
-        """Triangles of its pieces."""
-        return sum(member.size for member in self.members)
-
-    @property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
         return self.hull.box
