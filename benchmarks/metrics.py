@@ -5,7 +5,6 @@ Lengths are in the frame where the input's bounding box is centred and its longe
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -17,7 +16,7 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.component import Part
+from rlacd.solid.component import Component, Part
 from rlacd.solid.distance import hull_union
 from rlacd.solid.hull import Hull
 from rlacd.solid.manifold import to_manifold
@@ -155,18 +154,16 @@ def _overlap(hulls: Sequence[Hull]) -> float:
 
 
 def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> tuple[float, int | None, int]:
-    """The largest concavity of a part, the number of parts above the promised one, and the number of empty hulls."""
-    worst, exceeding, empty = 0.0, 0, 0
+    """The largest concavity of a hull, the number of hulls above the promised one, and the number of empty hulls."""
+    worst, exceeding, empty, whole = 0.0, 0, 0, Component(solid.shape)
     for hull in hulls:
-        part = _part(solid, hull)
-        if part is None:
+        part = Part(hull, (), whole)
+        if part.filled < NOTHING:
             empty += 1
             continue
-        both = [part, *filter(None, [_grown(solid, hull)])]
         # Only the maximum is needed: parts below the current worst need no exact value.
-        worst = max(worst, min(Concavity().measure(part, TOLERANCE, worst).value[1] for part in both))
-        if promised is not None:
-            exceeding += not any(Concavity(promised + TOLERANCE).is_met(part) for part in both)
+        worst = max(worst, Concavity().measure(part, TOLERANCE, worst).value[1])
+        exceeding += promised is not None and not Concavity(promised + TOLERANCE).is_met(part)
     return worst, None if promised is None else exceeding, empty
 
 
@@ -195,21 +192,3 @@ def is_valid(vertices: FloatArray, faces: IntArray) -> bool:
     offsets = np.einsum("ij,ij->i", normals, corners[sound, 0])
     strips = (slice(i, i + 1024) for i in range(0, len(normals), 1024))
     return all((points_there @ normals[s].T - offsets[s]).max() <= CONVEX for s in strips)
-
-
-def _part(solid: Solid, hull: Hull) -> Part | None:
-    """What of the solid lies in a hull; None if nothing does."""
-    share = solid.manifold ^ to_manifold(hull.vertices, hull.faces.astype(np.int64))
-    if share.is_empty() or share.volume() < NOTHING:
-        return None
-    # A mesh may overlap itself: a piece that lies within another has no surface that could be seen.
-    mesh = Manifold.batch_boolean(share.decompose(), OpType.Add).to_mesh64()
-    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
-    return Part(vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32), share.volume(), hull)
-
-
-def _grown(solid: Solid, hull: Hull) -> Part | None:
-    """The part of a hull grown by `TOLERANCE`: a sheet on a face of the hull itself is lost to rounding."""
-    corners = TOLERANCE * np.array(list(itertools.product((-1, 1), repeat=3)))
-    grown = Hull.of((hull.vertices[:, None] + corners).reshape(-1, 3))
-    return None if grown is None else _part(solid, grown)

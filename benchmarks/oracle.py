@@ -332,7 +332,7 @@ def measure(solid: Solid, threshold: float, budget: int) -> Row | None:
             row |= {f"{name}.bound": node.high[LAST], f"{name}.proved": found.proved}
             trees[name] = found.parts
         for name, parts in trees.items():
-            merged = merge_parts(parts, criterion.settled(parts), run, solid=root)
+            merged = merge_parts(parts, criterion.settled(parts), run)
             row |= {f"{name}.raw": len(parts), f"{name}.merged": len(merged)}
         return row | {"expanded": oracle.expanded}
 

@@ -116,8 +116,8 @@ def union_queries(hulls: list[Hull], mesh: Soup, surface: _native.Surface, rando
     same(lambda threads: _native.joint_hull_volumes([hull.body for hull in hulls], pairs, threads))
 
 
-def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generator) -> None:
-    """Run the queries on components: planes, sweeps, concavity, gluing. Kernels must accept any soup."""
+def part_queries(mesh: Soup, hull: Hull, random: np.random.Generator) -> None:
+    """Run the queries on components: planes, sweeps, distances from their hulls. Kernels must accept any soup."""
     directions = random.normal(size=(6, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     directions[:3] = np.eye(3)
@@ -130,15 +130,16 @@ def part_queries(mesh: Soup, other: Soup, hull: Hull, random: np.random.Generato
         )
     )
     _native.candidate_planes(*mesh, hull.body, 12, 4)
-    volume = _native.mesh_volume(*mesh)
     threshold = float(random.choice([0.01, 0.05, 0.3]))
-    met = _native.meets_concavity(*mesh, hull.body, volume, hull.volume, threshold)
-    (lower, upper), *_ = _native.concavity(*mesh, hull.body, volume, hull.volume, TOLERANCE)
-    assert lower <= upper, f"concavity: {lower}, {upper}"
-    assert not (met and lower > threshold * (1 + 1e-9)), f"concavity {lower} said to be within {threshold}"
-    reached = distance_to_triangles(sampled(hull.vertices, hull.faces.astype(np.int64), 30, random), mesh[0][mesh[1]])
-    assert reached.max() <= upper + ROUNDING, f"concavity: {reached.max()} > {upper}"
-    _native.glue(*mesh, *other)
+    against = _native.Against(*mesh)
+    met = against.meets(hull.body, threshold)
+    lower, upper = np.max(against.measure(hull.body, TOLERANCE), axis=0)
+    assert lower <= upper, f"distance: {lower}, {upper}"
+    assert not (met and lower > threshold * (1 + 1e-9)), f"distance {lower} said to be within {threshold}"
+    assert 0 <= against.filled(hull.body) <= hull.volume * (1 + ROUNDING), "no more is filled than there is"
+    points = sampled(hull.vertices, hull.faces.astype(np.int64), 30, random)
+    away = distance_to_triangles(points, mesh[0][mesh[1]])[against.surface.winding(points, 4.0, 1) < 0.5]
+    assert away.max(initial=0.0) <= upper + ROUNDING, f"distance: {away.max()} > {upper}"
 
 
 def ball_queries(hull: Hull, surface: _native.Surface, random: np.random.Generator) -> None:
@@ -176,7 +177,7 @@ def try_seed(seed: int) -> None:
         return
     union_queries(hulls, mesh, surface, random)
     if len(hulls) == 2:  # the first is the hull of the mesh
-        part_queries(mesh, other, hulls[0], random)
+        part_queries(mesh, hulls[0], random)
         ball_queries(hulls[0], surface, random)
 
 

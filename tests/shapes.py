@@ -116,7 +116,7 @@ def arc(start: float, end: float) -> Component:
 
 def bent_bar() -> list[Component]:
     """Stretches of 26, 16 and 26 degrees; 36 degrees is as much as one hull may span."""
-    return [arc(0, 26), arc(26, 42), arc(42, 68)]
+    return together([arc(0, 26), arc(26, 42), arc(42, 68)])
 
 
 @st.composite
@@ -127,7 +127,7 @@ def stacks(draw: st.DrawFn) -> list[Component]:
     for x, y, z in draw(st.lists(size, min_size=2, max_size=5)):
         stack.append(Component(box((-x / 2, -y / 2, floor), (x / 2, y / 2, floor + z))))
         floor += z
-    return stack
+    return together(stack)
 
 
 def strangers(components: Sequence[Component]) -> list[Component]:
@@ -135,10 +135,11 @@ def strangers(components: Sequence[Component]) -> list[Component]:
     return [Component((component.vertices, component.faces)) for component in components]
 
 
-def together(parts: Sequence[Part]) -> Component:
-    solid = reunite(strangers([member for part in parts for member in part.members]))
+def together(components: Sequence[Component]) -> list[Component]:
+    """The same components, as pieces of their union."""
+    solid = reunite(strangers(components))
     assert solid is not None
-    return solid
+    return [Component((component.vertices, component.faces), whole=solid) for component in components]
 
 
 def own_volume(parts: Sequence[Part]) -> float:

@@ -31,7 +31,7 @@ def comb(teeth: int) -> Manifold:
 
 
 def apart(solid: Component, points: Floats, reach: float = REACH + UNCOVERED) -> Floats:
-    return points[_native.apart_points(solid.filling.surface, points, reach, len(points))]
+    return points[_native.apart_points(solid.against.surface, points, reach, len(points))]
 
 
 def points_of(solid: Component, count: int = 120) -> Floats:
@@ -65,8 +65,8 @@ def test_pairs_that_are_apart_pass_a_place_that_is_far_from_the_solid() -> None:
     assert len(found) >= 4
     for a, b in itertools.combinations(found, 2):
         between = a + np.linspace(0, 1, 400)[:, None] * (b - a)
-        outside = solid.filling.surface.winding(between) < 0.5
-        assert (solid.filling.surface.distance(between)[outside] > REACH + UNCOVERED).any()
+        outside = solid.against.surface.winding(between) < 0.5
+        assert (solid.against.surface.distance(between)[outside] > REACH + UNCOVERED).any()
 
 
 def test_what_lies_in_a_cavity_is_not_open_to_the_outside() -> None:

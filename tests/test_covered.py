@@ -154,14 +154,14 @@ STAGES: dict[str, Callable[..., Any]] = {
     "rlacd.find_parts.cut_and_merge": lambda tree, *_, of: [(tree.root, of.pieces), (tree.root, of.parts)],
     "rlacd.proxy.model.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
     "rlacd.limit.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
-    "rlacd.find_parts.grow_cover": lambda parts, goal, run, root, *, of: [(root, of)],
+    "rlacd.find_parts.grow_cover": lambda parts, *_, of: [(parts[0].whole, of)],
     "rlacd.find_parts.eliminate_parts": lambda context, *_, of: [(context.root, of)],
     "rlacd.limit.eliminate_parts": lambda context, *_, of: [(context.root, of)],
     "rlacd.find_parts.search": lambda context, *_, of: [(context.root, parts) for parts in of[0]],
     "rlacd.proxy.model.Transfer.__call__": lambda self, *_, of: [(self.solid, of[0])],
     "rlacd.find_parts.Model.transfer": lambda self, *_, of: [(self.solid, of)],
     "rlacd.find_parts.cut_to_limits": lambda parts, limited, solid, *_, of: [(solid, of)],
-    "rlacd.find_parts.at_most": lambda most, decompositions, unite, whole, *_, of: [(whole, of)],
+    "rlacd.find_parts.at_most": lambda most, decompositions, whole, *_, of: [(whole, of)],
     "rlacd.finish.finish.overlap_parts": lambda parts, solid, *_, of: [(solid, of[0])],
     "rlacd.finish.finish.cleaned_parts": lambda reached, *_, of: [(reached.root, of[0])],
 }
@@ -238,10 +238,10 @@ def test_a_stopped_run_measures_its_parts_on_the_solid_not_on_the_copy(monkeypat
     assert result.report.concavity.per_part is not None
     for hull, error in zip(result, result.report.concavity.per_part, strict=True):
         around = Hull.of(frame.to_frame(hull.vertices))
-        assert error == pytest.approx(Concavity(0.05).error(solid.inside(around).with_hull(around)), abs=1e-4)
+        assert error == pytest.approx(Concavity(0.05).error(Part(around, (), solid)), abs=1e-4)
 
 
-def test_a_transfer_without_time_leaves_hulls_that_nothing_is_known_of() -> None:
+def test_a_transfer_without_time_leaves_hulls_that_cover_the_solid() -> None:
     mesh = spoon(0)
     solid = component_of(mesh)
     proxy, policy = simplify(solid, 0.05), make_policy("greedy", SweepCache(), None)
@@ -250,4 +250,4 @@ def test_a_transfer_without_time_leaves_hulls_that_nothing_is_known_of() -> None
         run.stop.trip()
         parts, _ = Transfer(solid, proxy, Concavity(0.05), policy, run)([proxy.component])
     assert is_covered(solid, parts)
-    assert [part.size for part in parts] == [0]
+    assert all(part.whole is solid for part in parts)

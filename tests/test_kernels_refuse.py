@@ -28,7 +28,7 @@ def least(points: Any = VERTICES, offsets: Any = (0.2,), exponent: float = 1.3, 
 
 
 def concave(points: Any = VERTICES, faces: Any = FACES, hull: Any = FACES) -> Any:
-    return _native.meets_concavity(points, faces, _native.ConvexBody(VERTICES, hull), 1.0, 1.0, 0.05)
+    return _native.Against(points, faces).meets(_native.ConvexBody(VERTICES, hull), 0.05)
 
 
 def simple(points: Any, faces: Any) -> Any:
@@ -59,8 +59,8 @@ CASES: list[tuple[Callable[[], Any], str]] = [
     (lambda: least(NOT_FINITE), "not finite"),
     (lambda: cut(faces=OUT_OF_RANGE), "out of range"),
     (lambda: cut(NOT_FINITE), "not finite"),
-    (lambda: concave(faces=NONE), "part has no faces"),
-    (lambda: concave(hull=NONE), "hull has no faces"),
+    (lambda: concave(faces=NONE), "solid has no faces"),
+    (lambda: concave(hull=NONE), "no facet with an area"),
     (lambda: concave(hull=0 * FACES), "no facet with an area"),
     (lambda: concave(NOT_FINITE), "not finite"),
     (lambda: concave(faces=OUT_OF_RANGE), "out of range"),

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold, Mesh64, OpType
 
 import rlacd
-from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
@@ -49,14 +48,6 @@ def along(normal: tuple[float, float, float], offset: float) -> Plane:
 def run():
     with Run(2) as pool:
         yield pool
-
-
-def test_parts_that_are_all_slivers_keep_their_surfaces() -> None:
-    """Every face of such a part touches the other one: without a surface there would be nothing to measure."""
-    below = Component(Manifold.cube((1, 1, 2e-9)))
-    above = Component(Manifold.cube((1, 1, 2e-9)).translate((0, 0, 2e-9)))
-    glued = Part.glued(below, above)
-    assert len(glued.faces) == len(below.faces) + len(above.faces)
 
 
 # --- slivers ----------------------------------------------------------------------------------------------------------
@@ -110,7 +101,7 @@ def test_what_grows_holds_its_hull_and_the_solid_comes_no_deeper_into_it(count: 
     solid = bars(count, seed)
     with Run(1) as run:
         piece = max((member for part in merged(solid, run) for member in part.members), key=lambda one: one.volume)
-    spaces = solid.filling.grown(piece.hull.body, depth)
+    spaces = solid.against.grown(piece.hull.body, depth)
     normals, offsets = spaces[:, :3], spaces[:, 3]
     assert (piece.hull.vertices @ normals.T <= offsets + 1e-9).all()
     inside = (offsets - dense(from_manifold(to_manifold(solid.vertices, solid.faces))) @ normals.T).min(axis=1)
@@ -122,12 +113,11 @@ def test_bars_that_cross_take_fewer_parts_that_are_tight_and_lose_nothing() -> N
     for threads in (1, 2, 3):
         with Run(threads) as run:
             before = merged(solid, run)
-            found.append(grow_cover(before, CRITERION, run, solid))
+            found.append(grow_cover(before, CRITERION, run))
     after, whole = found[0], to_manifold(solid.vertices, solid.faces)
     assert len(after) < len(before)
     for part in after:
-        inside = whole ^ to_manifold(part.hull.vertices, part.hull.faces)
-        assert CRITERION.is_met(Component(inside)), "the solid clipped by another library"
+        assert CRITERION.is_met(Part(part.hull, (), Component(whole))), "with the volume of all that is in the hull"
     assert depth_outside(dense(from_manifold(whole)), after) < 5e-3, "no more than slivers"
     assert own_volume(after) == pytest.approx(solid.volume, rel=1e-2)
     for others in found[1:]:
@@ -140,7 +130,7 @@ def test_without_enough_work_the_merged_parts_stay(units: int) -> None:
     with Run(1) as run:
         parts = merged(solid, run)
         with run.limited(units):
-            assert grow_cover(parts, CRITERION, run, solid) is parts
+            assert grow_cover(parts, CRITERION, run) is parts
         assert run.stopped_by is None
 
 
@@ -150,12 +140,11 @@ TIGHT = Concavity(0.02)
 CROSS = block(2, 0.3, 0.3) + block(0.3, 2, 0.3)
 
 
-def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
-    """The solid, and what lies left of x = -0.15, right of x = 0.15 and between."""
-    root = Component(solid)
-    left, rest = root.cut(Plane((1.0, 0.0, 0.0), -0.15))
+def arms_and_beam(solid: Manifold) -> list[Part]:
+    """What of the solid lies left of x = -0.15, right of x = 0.15 and between."""
+    left, rest = Component(solid).cut(Plane((1.0, 0.0, 0.0), -0.15))
     middle, right = rest.cut(Plane((1.0, 0.0, 0.0), 0.15))
-    return root, [left, middle, right]
+    return [left, middle, right]
 
 
 @pytest.mark.parametrize(
@@ -168,8 +157,8 @@ def arms_and_beam(solid: Manifold) -> tuple[Component, list[Part]]:
     ],
 )
 def test_arms_stay_apart_where_something_is_missing_between(run: Run, solid: Manifold) -> None:
-    root, parts = arms_and_beam(solid)
-    merged = merge_parts(parts, TIGHT, run, solid=root)
+    parts = arms_and_beam(solid)
+    merged = merge_parts(parts, TIGHT, run)
     assert not any({parts[0], parts[2]} <= set(part.members) for part in merged)
 
 
@@ -192,22 +181,10 @@ def heap_of_blocks(random: np.random.Generator) -> tuple[Component, list[Manifol
     return Component(Manifold.batch_boolean(blocks, OpType.Add)), blocks
 
 
-def share_fits(solid: Component, hull: Hull, threshold: float) -> bool | None:
-    """Whether what the solid fills of a hull meets the strict test; None where it is empty."""
-    share = to_manifold(solid.vertices, solid.faces) ^ Manifold(Mesh64(hull.vertices + 0, hull.faces.astype(np.uint64)))
-    mesh = share.to_mesh64()
-    vertices = np.ascontiguousarray(mesh.vert_properties[:, :3])
-    if len(vertices) == 0:
-        return None
-    return _native.meets_concavity(
-        vertices, mesh.tri_verts.astype(np.int32), hull.body, share.volume(), hull.volume, threshold
-    )
-
-
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 10**6), st.floats(0.01, 0.5))
-def test_a_quick_no_about_a_hull_or_a_pair_is_never_wrong(seed: int, threshold: float) -> None:
-    """Held against the strict test of the share itself, for joint hulls of random blocks that the solid fills.
+def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> None:
+    """Held against the strict test of the joint hull, for random blocks that the solid fills.
 
     Nor does anything get lost by leaving out the facets of the two hulls.
     """
@@ -215,18 +192,15 @@ def test_a_quick_no_about_a_hull_or_a_pair_is_never_wrong(seed: int, threshold: 
     solid, blocks = heap_of_blocks(random)
     hulls = [hull for b in blocks if (hull := Hull.of(b.to_mesh64().vert_properties[:, :3].astype(float))) is not None]
     pairs = np.array([(i, j) for j in range(len(hulls)) for i in range(j)], dtype=np.int32)
-    early_out = Concavity(threshold).early_out
-    volumes = early_out.feasible_volumes(solid.filling, [hull.body for hull in hulls], pairs, 1)
+    volumes = solid.against.feasible_volumes([hull.body for hull in hulls], pairs, threshold, 1)
     for (i, j), volume in zip(pairs, volumes, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
-        alone = early_out.is_feasible(solid.filling, joint)
         assert volume == np.inf or volume == pytest.approx(joint.volume)
-        assert np.isfinite(volume) <= alone
-        assert not (share_fits(solid, joint, threshold) and not (np.isfinite(volume) or alone))
-        if solid.filling.comes_deeper(joint.body, threshold):
+        assert np.isfinite(volume) or not solid.against.meets(joint.body, threshold)
+        if solid.against.comes_deeper(joint.body, threshold):
             larger = Hull.of(np.concatenate([joint.vertices, random.uniform(-1, 1, (3, 3))]))
-            assert solid.filling.comes_deeper(larger.body, threshold * (1 - 1e-9))
-            assert not alone
+            assert solid.against.comes_deeper(larger.body, threshold * (1 - 1e-9))
+            assert not solid.against.meets(joint.body, threshold)
 
 
 def grooved() -> Manifold:
@@ -248,8 +222,8 @@ def test_what_is_deep_in_a_hull_is_seen(
 ) -> None:
     whole = Component(solid())
     for threshold in too_deep:
-        assert whole.filling.comes_deeper(whole.hull.body, threshold)
-    assert Concavity(deep_enough).early_out.is_feasible(whole.filling, whole.hull)
+        assert whole.against.comes_deeper(whole.hull.body, threshold)
+    assert whole.against.meets(whole.hull.body, deep_enough)
 
 
 def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:

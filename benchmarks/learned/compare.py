@@ -96,8 +96,8 @@ def measure(
         if merge:
             pieces = [*done, *left]
             settled = decides.settled(pieces)
-            row["navacd"] = float(len(merge_parts(pieces, settled, run)))
-            row["merged"] = float(len(merge_parts(pieces, settled, run, solid=root)))
+            row["navacd"] = float(len(merge_parts(pieces, settled, run, across=False)))
+            row["merged"] = float(len(merge_parts(pieces, settled, run)))
     return row
 
 

@@ -126,25 +126,26 @@ void bind_against(nb::module_& m) {
            "How deep the solid's surface comes into a hull at most, and how far the hull's surface is from the solid: "
            "(depth, reach), certified intervals (lower, upper).\n\n"
            "That of the larger is at most `tolerance` wide, or ends below `floor`.")
-      .def(
-          "feasible_volumes",
-          released([](const Against& self, const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs,
-                      double threshold, int threads) {
-            const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
-            std::vector<double> volumes(pairs.shape(0));
-            parallel_for(volumes.size(), threads, [&](std::size_t i) {
-              volumes[i] = self.feasible_volume(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
-            });
-            return volumes;
-          }),
-          "hulls"_a, "pairs"_a, "threshold"_a, "threads"_a = 0,
-          "Volumes [P] of the joint hulls of pairs [P, 2] of hulls that meet the threshold, infinite where the joint hull "
-          "certainly does not.")
+      .def("feasible_volumes",
+           released([](const Against& self, const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs,
+                       double threshold, int threads) {
+             const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
+             std::vector<double> volumes(pairs.shape(0));
+             parallel_for(volumes.size(), threads, [&](std::size_t i) {
+               volumes[i] = self.feasible_volume(*hulls[pair[2 * i]], *hulls[pair[2 * i + 1]], threshold);
+             });
+             return volumes;
+           }),
+           "hulls"_a, "pairs"_a, "threshold"_a, "threads"_a = 0,
+           "Volumes [P] of the joint hulls of pairs [P, 2] of hulls that meet the threshold, infinite where the joint "
+           "hull "
+           "certainly does not.")
       .def("comes_deeper", released(&Against::comes_deeper), "hull"_a, "threshold"_a,
            "Whether the solid's surface comes deeper than the threshold inside a hull.")
       .def("filled", released(&Against::filled), "hull"_a, "The volume that the solid fills of a convex hull.")
       .def("inside", released(&Against::inside), "hull"_a,
-           "The solid clipped to a convex hull and closed: vertices [V, 3], faces [F, 3]; no faces if it is too tangled.")
+           "The solid clipped to a convex hull and closed: vertices [V, 3], faces [F, 3]; no faces if it is too "
+           "tangled.")
       .def("grown", released(&Against::grown), "hull"_a, "depth"_a,
            "Half-spaces n.x <= d that hold a hull, rows of n and d [P, 4]: their intersection has grown until the "
            "solid's surface stops it, which may come as deep as `depth` into it.")

@@ -281,7 +281,8 @@ def test_what_was_open_is_reported() -> None:
 
 
 def part_of(hull: Hull, within: Part | None = None) -> Part:
-    part = Part(hull.vertices, hull.faces, hull.volume, hull)
+    mesh = hull.vertices, hull.faces, hull.volume
+    part = Component.of((*mesh, *mesh))
     part.within = within
     return part
 

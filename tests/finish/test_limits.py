@@ -24,7 +24,7 @@ from rlacd.limit import few_enough
 from rlacd.merge.merge import united_in_turn
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run, Work
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import Component
 from rlacd.solid.hull import NO_LIMITS, Hull, limit_hull
 from tests.hulls import assert_same_hulls
 from tests.shapes import box, trimesh_of
@@ -161,7 +161,7 @@ def test_redundant_corners_stay_if_the_threshold_needs_them() -> None:
     cube = np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, -1).T
     chamfer = np.ones(3) - 4e-7 * np.eye(3)
     hull = Hull.of(np.concatenate([cube[:-1], chamfer]))
-    part = Part(hull.vertices, hull.faces, hull.volume, hull)
+    part = Component((hull.vertices, hull.faces))
     simple = limit_part(part, NO_LIMITS)
     assert len(simple.hull.vertices) == 8 < len(hull.vertices)
     tight = Concavity(1e-7)  # the corner lies 4e-7 / sqrt(3) outside
@@ -257,7 +257,7 @@ def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() ->
     boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(5)]
 
     def united(work: float) -> list[tuple[int, float, float]]:
-        states = united_in_turn(boxes, Part.glued, Concavity(0.05), Work(work), Run(1))
+        states = united_in_turn(boxes, Concavity(0.05), Work(work), Run(1))
         return [(len(parts), sum(part.volume for part in parts), worst) for parts, worst in states]
 
     every = united(1e9)

@@ -55,8 +55,8 @@ def needles(mesh: trimesh.Trimesh, hulls: list[trimesh.Trimesh], far: float) -> 
     places = np.concatenate([trimesh.sample.sample_surface(hull, 2000, seed=1)[0] for hull in hulls])
     deepest = np.sort(depths(hulls, places), axis=0)
     places = np.ascontiguousarray(places[(deepest[-2] > -1e-6) & (deepest[-1] < 1e-6)])
-    inside = _native.Surface(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, np.int32))
-    deep = inside.distance(places)
+    surface = _native.Surface(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, np.int32))
+    deep = np.where(surface.winding(places) > 0.5, surface.distance(places), 0.0)
     return places[deep >= far], deep[deep >= far]
 
 

@@ -3,14 +3,13 @@
 #include "convex/hull.hpp"
 #include "core/mesh_measures.hpp"
 #include "shapes.hpp"
-#include "solid/filling.hpp"
-#include "solid/glue.hpp"
+#include "solid/against.hpp"
 #include "solid/pieces.hpp"
 #include "solid/reunite.hpp"
 
 using namespace rlacd;
 
-TEST_CASE("a cut closes both sides and loses no volume; the sides reunite and glue to the solid") {
+TEST_CASE("a cut closes both sides and loses no volume; the sides reunite to the solid") {
   Random random(9);
   for (const Mesh& solid : {box({1, 0.5, 0.7}), torus(0.7, 0.3), torus(0.7, 0.3, 61, 7)})
     for (int i = 0; i < 40; ++i) {
@@ -25,7 +24,6 @@ TEST_CASE("a cut closes both sides and loses no volume; the sides reunite and gl
         CHECK(sides[side]->hull_volume >= sides[side]->volume * (1 - 1e-9));
         for (const Vec3 p : sides[side]->mesh.vertices) CHECK((side == 0 ? 1 : -1) * plane.depth(p) > -1e-9);
       }
-      CHECK(mesh_area(glue(sides[0]->mesh, sides[1]->mesh)) == doctest::Approx(mesh_area(solid)).epsilon(1e-6));
       const auto whole = reunited({sides[0]->mesh, sides[1]->mesh});
       REQUIRE(whole);
       CHECK(is_closed(*whole));
@@ -43,14 +41,26 @@ TEST_CASE("beside the axis of a torus a cut leaves two pieces") {
 TEST_CASE("what a solid fills of a convex hull is what is left by cuts along its facets") {
   Random random(10);
   const Mesh solid = torus(0.7, 0.3);
-  const Filling filling(solid);
+  const Against against(solid);
   for (int i = 0; i < 40; ++i) {
     std::vector<Vec3> points;
     for (int n = 0; n < 12; ++n) points.push_back(random.point(1));
     const ConvexBody hull(hull_mesh(points));
-    const ClippedSolid clipped = filling.clipped(hull);
-    const Mesh cuts = inside_all(solid, hull.mesh());
-    CHECK(clipped.volume == doctest::Approx(mesh_volume(cuts)).epsilon(1e-6));
-    CHECK(mesh_volume(clipped.mesh) == doctest::Approx(clipped.volume));
+    CHECK(against.filled(hull) == doctest::Approx(mesh_volume(against.inside(hull))).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("a hull meets what is measured of it, and no less") {
+  Random random(11);
+  const Against against(torus(0.7, 0.3));
+  for (int i = 0; i < 40; ++i) {
+    std::vector<Vec3> points;
+    for (int n = 0; n < 12; ++n) points.push_back(random.point(1));
+    const ConvexBody hull(hull_mesh(points));
+    const Against::Fit fit = against.measure(hull, 1e-4, 0);
+    CHECK(fit.depth.lower <= fit.depth.upper);
+    CHECK(fit.reach.lower <= fit.reach.upper);
+    CHECK(against.meets(hull, 1.01 * std::max(fit.depth.upper, fit.reach.upper) + 1e-4));
+    CHECK_FALSE(against.meets(hull, 0.99 * std::max(fit.depth.lower, fit.reach.lower)));
   }
 }

@@ -35,6 +35,11 @@ REACH = 0.2
 """Parts farther apart than this (the longest side is 2) are not united: their joint hull would bridge the gap."""
 
 
+FILLED_BY_OTHERS = 2.0
+"""Unions that add more than so many times the tolerance to their own pieces are not tried. With 1, 12 meshes take 5 %
+more hulls by default; without a limit 7 % fewer, in twice the time."""
+
+
 @dataclass(frozen=True)
 class AddedVolume(Criterion):
     """The criterion "the hull adds at most this share of volume".
@@ -84,10 +89,10 @@ class AddedVolume(Criterion):
     def joint_volumes(
         self, whole: Component, hulls: Sequence[_native.ConvexBody], pairs: IntArray, volumes: FloatArray, threads: int
     ) -> FloatArray:
-        """Infinite where the joint hulls add too much."""
+        """Infinite where the joint hulls add so much to the pieces that other parts hardly fill it."""
         joint = super().joint_volumes(whole, hulls, pairs, volumes, threads)
         base = np.maximum(volumes if self.whole is None else self.whole, self.least)
-        return np.where(joint - volumes > self.tolerance * base, np.inf, joint)
+        return np.where(joint - volumes > FILLED_BY_OTHERS * self.tolerance * base, np.inf, joint)
 
     def is_met(self, part: Part) -> bool:
         """Whether the hull adds at most the tolerance."""

@@ -34,10 +34,11 @@ class _Pair(NamedTuple):
     second: int
 
 
-def merge_parts(parts: Sequence[Part], criterion: Criterion, run: Run, few: int = FEW_TO_PAIR) -> list[Part]:
+def merge_parts(parts: Sequence[Part], criterion: Criterion, run: Run, across: bool = True) -> list[Part]:
     """Unite pairs of parts, the cheapest first, as long as the union meets the criterion.
 
-    Pairs are tested in batches on all workers and united in order of cost, for any number of threads.
+    First neighbours, then parts across what lies between them. Pairs are tested in batches on all workers and united in
+    order of cost, for any number of threads.
 
     Parameters
     ----------
@@ -47,16 +48,16 @@ def merge_parts(parts: Sequence[Part], criterion: Criterion, run: Run, few: int 
         Every union meets it.
     run : Run
         When it stops, the parts reached so far are returned.
-    few : int
-        Up to this many parts, any pair may be united across other parts.
+    across : bool
+        Whether parts are united across others, too.
 
     Returns
     -------
     list of Part
         Parts that could not be united further, in the order of their first piece.
     """
-    near = _Merging(parts, criterion, run).united()
-    return _Merging(near, criterion, run, few).united()
+    near = _Merging(parts, criterion, run, across=False).united()
+    return _Merging(near, criterion, run, across=True).united() if across else near
 
 
 def joint_part(first: Part, second: Part, criterion: Criterion) -> tuple[Part | None, float]:
@@ -68,11 +69,11 @@ def joint_part(first: Part, second: Part, criterion: Criterion) -> tuple[Part | 
 class _Merging:
     """Parts that are being united."""
 
-    def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run, few: int | None = None) -> None:
+    def __init__(self, parts: Sequence[Part], criterion: Criterion, run: Run, across: bool) -> None:
         self._alive = NumberedParts(parts, criterion)
         self._criterion = criterion
         self._run = run
-        self._few = few
+        self._across = across
         self._origin = list(range(len(parts)))  # the number of the first piece
         self._queue: list[_Pair] = []
         self._next: list[_Pair] = []  # cheapest first
@@ -126,8 +127,8 @@ class _Merging:
     def _find(self, new: Sequence[int]) -> None:
         """Find the pairs of a new part and another that may be united; not all of them if the run's work runs out."""
         alive, criterion, run = self._alive, self._criterion, self._run
-        reach = np.inf if self._few is not None and len(alive.parts) <= self._few else criterion.reach
-        pairs = alive.boxes.pairs(new, reach, across=self._few is not None)
+        is_any = self._across and len(alive.parts) <= FEW_TO_PAIR
+        pairs = alive.boxes.pairs(new, np.inf if is_any else criterion.reach, across=self._across)
         for begin in range(0, len(pairs), PAIRS_AT_ONCE):
             some = pairs[begin : begin + PAIRS_AT_ONCE]
             vertices, volumes, credits = alive.sums(some)

@@ -204,5 +204,5 @@ class Model:
         with run.stage("transfer"):
             parts, worst = Transfer(self.solid, self.proxy, scaled, policy, run)(parts)
             if merge and run.stopped_by is None:  # the margin may have kept some from merging
-                parts = merge_parts(parts, scaled.scaled(worst), run, few=0)
+                parts = merge_parts(parts, scaled.scaled(worst), run)
         return parts

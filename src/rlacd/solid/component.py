@@ -129,6 +129,8 @@ class Component(Part):
         The solid, in the normalised frame; not flat. A surface [V, 3], [F, 3] has to be closed and oriented.
     threads : int
         Threads that prepare `against`.
+    whole : Component, optional
+        The solid that it is a piece of; itself by default.
 
     Attributes
     ----------
@@ -145,12 +147,12 @@ class Component(Part):
 
     volume: float
 
-    def __init__(self, solid: Shape, threads: int = 1) -> None:
+    def __init__(self, solid: Shape, threads: int = 1, whole: Component | None = None) -> None:
         vertices, faces = mesh_of(solid)
         hull = Hull.of(vertices)
         if hull is None:
             raise ValueError("a component has to have a volume")
-        self._take((vertices, faces, _native.mesh_volume(vertices, faces)), hull, None)
+        self._take((vertices, faces, _native.mesh_volume(vertices, faces)), hull, whole)
         self._threads = threads
 
     @classmethod
