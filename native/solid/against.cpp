@@ -14,6 +14,10 @@ namespace rlacd {
 namespace {
 
 constexpr double kInside = 0.5;
+
+// Points that are no farther from the surface lie on it.
+constexpr double kOn = 1e-9;
+
 constexpr double kBeyond = 1 + 1e-9;
 
 // Where a verdict is undecided, as a share of the threshold.
@@ -125,7 +129,7 @@ class SolidField {
     }
     const Bvh::Hit hit = surface_.bvh().closest(p, near, enough);
     const double distance = std::sqrt(hit.distance2);
-    if (distance <= enough || surface_.winding().of_closed(p) < kInside) return {distance, hit.slot};
+    if (distance <= std::max(enough, kOn) || surface_.winding().of_closed(p) < kInside) return {distance, hit.slot};
     balls_.push_back({p, distance, hit.slot});
     return {0, kFirstBall - static_cast<std::int32_t>(balls_.size() - 1)};
   }
@@ -209,7 +213,7 @@ Mesh Against::faces_inside(const ConvexBody& hull) const {
   return inside;
 }
 
-Mesh Against::inside(const ConvexBody& hull) const { return inside_all(solid_, hull.mesh()); }
+Mesh Against::inside(const ConvexBody& hull) const { return inside_all(solid_, hull.planes()); }
 
 double Against::feasible_volume(const ConvexBody& first, const ConvexBody& second, double threshold) const {
   constexpr double kNever = std::numeric_limits<double>::infinity();

@@ -179,11 +179,11 @@ std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::v
   return halves;
 }
 
-Mesh inside_all(Mesh mesh, const Mesh& hull) {
+Mesh inside_all(Mesh mesh, const ConvexPlanes& planes) {
   std::size_t fewest = mesh.faces.size();
-  for (const Triangle& f : hull.faces) {
-    const Vec3 normal = normalized(long_normal(hull, f));
-    const double offset = dot(normal, hull.vertices[f[0]]) + kApart;
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i) {
+    const Vec3 normal = planes.normal(i);
+    const double offset = planes.offset(i) + kApart;
     if (std::none_of(mesh.vertices.begin(), mesh.vertices.end(), [&](Vec3 p) { return dot(normal, p) > offset; }))
       continue;
     mesh = capped(std::move(cut_by_plane(mesh, normal, offset)[0]), normal);

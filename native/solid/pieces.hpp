@@ -35,8 +35,8 @@ std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::v
 // Nothing if all is one piece.
 std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least);
 
-// What is below all facet planes of a hull, cut by one after the other.
+// What is below all planes of a hull, cut by one after the other.
 // Empty if the solid crosses itself so often that cuts multiply its faces.
-Mesh inside_all(Mesh mesh, const Mesh& hull);
+Mesh inside_all(Mesh mesh, const ConvexPlanes& planes);
 
 }  // namespace rlacd
