@@ -262,17 +262,18 @@ def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[s
 
 
 def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
-    missing = {"hausdorff": {"under": 0.37}, "warnings": ["Some lies 0.37 outside: repair dropped it."]}
+    said = ["Some lies 3.7 mm outside: repair dropped it."]
+    missing = {"hausdorff": {"under": 0.37}, "missed": "3.7 mm", "warnings": said}
     assert [_status(report) for report in ({"warnings": ["a"]}, missing, {"warnings": []})] == [
         *("warned", "uncovered", "done")
     ]
     row = {"mesh": "spoon.obj", "status": "uncovered", **missing}
     status = Counter({"done": 27, "warned": 12, "uncovered": 1})
     summary = Summary(40, status=status, uncovered=[row], warnings=Counter({"Some lies … outside": 13}))
-    said = "\n".join(summary_lines(summary, "out"))
-    assert "out: 39 of 40 meshes are done, 12 of them with warnings, 1 uncovered\n" in said
-    assert "spoon.obj: hulls miss its surface by up to 0.37 (longest side = 2)" in said
-    assert "13 x warning: Some lies … outside" in said
+    shown = "\n".join(summary_lines(summary, "out"))
+    assert "out: 39 of 40 meshes are done, 12 of them with warnings, 1 uncovered\n" in shown
+    assert "spoon.obj: hulls miss its surface by up to 3.7 mm" in shown
+    assert "13 x warning: Some lies … outside" in shown
 
 
 @pytest.mark.slow

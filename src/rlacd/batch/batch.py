@@ -26,7 +26,7 @@ MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 Redo = Literal["none", "failed", "all"]
 
 
-_NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?")
+_NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?( (units|µm|mm|cm|m|ft)\b)?")
 
 WRITERS = 4
 """Results written concurrently; each waits for the disk, not for a processor."""
@@ -69,7 +69,7 @@ class Summary:
     uncovered: list[Row] = field(default_factory=list)
     """Rows of the meshes whose hulls miss some of the surface."""
     warnings: Counter[str] = field(default_factory=Counter)
-    """How many meshes have each kind of warning: its first clause, with numbers left out."""
+    """How many meshes have each kind of warning: its first clause, with numbers and units left out."""
     slowest: list[tuple[str, float]] = field(default_factory=list)
     """Names and seconds of the slowest meshes of this run."""
     others: Counter[str] = field(default_factory=Counter)

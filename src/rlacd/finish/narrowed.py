@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd.criteria.limited import LimitedCriterion, least_kept
 from rlacd.find_parts import Reached
+from rlacd.fit import Unit
 from rlacd.report import Passage
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, dots
@@ -148,17 +149,19 @@ def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]
         f"--keep-open, or a smaller {'threshold' if 'threshold' in options.numbers else 'tolerance'}, keeps more open"
     )
     return [
-        _narrows(lost, "" if found.is_every else "At least ", by, then)
+        _narrows(lost, "" if found.is_every else "At least ", by, then, reached.solid.frame.told_in)
         for lost, by, then in ((asked, "more than --keep-open allows", reason), (others, "over half", cure))
         if lost
     ]
 
 
-def _narrows(lost: list[Passage], at_least: str, share: str, then: str) -> str:
+def _narrows(lost: list[Passage], at_least: str, share: str, then: str, unit: Unit) -> str:
     closed = sum(one.left_abs == 0 for one in lost)
     lost = sorted(lost, key=lambda one: (one.left_abs / one.radius_abs, -one.radius_abs))
     each = ((", ".join(f"{x:.4g}" for x in one.at_abs), one) for one in lost[:MOST_NAMED])
-    named = [f"near ({at}) from a radius of {one.radius_abs:.4g} to {one.left_abs:.4g}" for at, one in each]
+    named = [
+        f"near ({at}) from a radius of {unit.words(one.radius_abs)} to {unit.words(one.left_abs)}" for at, one in each
+    ]
     more = "" if len(lost) <= MOST_NAMED else " and others (see `passages`)"
     return (
         f"{at_least}{len(lost)} passage{'s narrow' if len(lost) > 1 else ' narrows'} by {share}"
