@@ -259,7 +259,7 @@ def test_nothing_is_fetched(tmp_path, monkeypatch):
     path.write_bytes(reference("http://localhost:1/mesh.bin"))
     with pytest.raises(MeshFileError):
         load_mesh(path)
-    with pytest.raises(MeshFileError, match="http://localhost:1/mesh.stl is an address, and nothing is fetched"):
+    with pytest.raises(MeshFileError, match=r"http://localhost:1/mesh\.stl is an address, and nothing is fetched"):
         load_mesh("http://localhost:1/mesh.stl")
 
 
