@@ -204,7 +204,9 @@ def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     assert report.warnings == ()
     report = rlacd.decompose(trimesh_of(block), threshold=0.005, max_hulls=1, quality="fast", threads=1).report
     assert any(
-        said.startswith("1 passage narrows by") and "1 to nothing" in said and "from a radius of 0.5 units to 0 units;" in said
+        said.startswith("1 passage narrows by")
+        and "1 to nothing" in said
+        and "from a radius of 0.5 units to 0 units;" in said
         for said in report.warnings
     )
     assert rlacd.decompose(trimesh_of(block), threshold_abs=0.05, quality="fast", threads=1).report.passages == ()
