@@ -5,6 +5,7 @@ Lengths are in the frame, where the longest side of the input is 2; those ending
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -298,6 +299,12 @@ class Report:
     def schema(cls) -> dict[str, Any]:
         """Get the JSON schema (draft 2020-12) of the report as a file."""
         return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema_of(cls)}
+
+
+def kind_of(warning: str) -> str:
+    """What a warning is about: its first words, without numbers and plurals."""
+    words = [word.rstrip("s") for word in re.findall(r"[a-z]+", warning.lower().removeprefix("at least"))]
+    return " ".join([word for word in words if len(word) > 3][:4])
 
 
 def sizes_of(hulls: Sequence[Any]) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from rlacd.fit import ANY, Unit
 from rlacd.io.robots.decomposed import Checked
 from rlacd.io.robots.robot import Body, Collider, Results, Robot, Written
 from rlacd.plain_json import as_plain
+from rlacd.report import kind_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,19 +172,13 @@ def grouped(warnings: Sequence[tuple[str, str, float]]) -> list[str]:
     """One sentence for all warnings of a kind: the worst, by what it is about, what it says, and how bad that is."""
     kinds: dict[str, list[tuple[str, str, float]]] = {}
     for one in warnings:
-        kinds.setdefault(_kind(one[1]), []).append(one)
+        kinds.setdefault(kind_of(one[1]), []).append(one)
     sentences = []
     for each in kinds.values():
         name, said, _ = max(each, key=lambda one: one[2])
         others = {1: "", 2: " and 1 other"}.get(len(each), f" and {len(each) - 1} others")
         sentences.append(f"{name}{others}: {said}")
     return sentences
-
-
-def _kind(warning: str) -> str:
-    """The first words of a sentence without numbers and plurals."""
-    words = [word.rstrip("s") for word in re.findall(r"[a-z]+", warning.lower()) if len(word) > 3]
-    return " ".join(words[:4])
 
 
 def _widest(result: Decomposition) -> float:
