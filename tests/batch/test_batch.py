@@ -279,7 +279,10 @@ def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
 
 def test_warnings_are_counted_by_kind_whatever_their_numbers_and_units() -> None:
     one = ["1 hull sticks out by up to 0.3 m, more than 0.1 m: cut it.", "1 body became a shell (open at (1, 2, 3))."]
-    two = ["3 hulls stick out by up to 7 mm, more than 2.5e-06 mm: cut them.", "4 hulls stick out by up to 1 mm, more than 0.5 mm: so."]
+    two = [
+        "3 hulls stick out by up to 7 mm, more than 2.5e-06 mm: cut them.",
+        "4 hulls stick out by up to 1 mm, more than 0.5 mm: so.",
+    ]
     kinds = _kinds([one, two, []])
     assert kinds == {"… hull sticks out by up to …, more than …": 2, "… body became a shell": 1}
 

@@ -62,7 +62,7 @@ def lengths_in(said: str) -> tuple[str, set[str], list[float]]:
     return plain, {unit for _, unit, _ in found}, metres
 
 
-WAYS = {"50mm": "mm", "5cm": "cm", "0.05m": "m"}
+WAYS = {"50mm": "mm", "5cm": "cm", "0.05m": "m", f"{0.05 / 0.0254}in": "in"}
 """A length of 0.05 m, and the unit that it is typed in."""
 
 
@@ -96,6 +96,15 @@ def test_a_run_tells_all_lengths_in_one_unit(
         assert told("decompose all.glb " + common.replace("LENGTH", share))[1] == {"m"}
     if "--per-node" not in given:
         assert told("decompose all.stl " + common.replace("LENGTH", share))[1] == {"units"}
+
+
+def test_a_comparison_of_thresholds_is_in_their_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    creation.annulus(0.02, 0.3, 0.1, sections=24).export("ring.stl")
+    for typed, units in (("1cm --unit m", {"cm"}), ("10mm --unit m", {"mm"}), ("0.02", set()), ("5%", set())):
+        table = CliRunner().invoke(app, f"tradeoff ring.stl --threads 1 -t {typed}".split()).stdout
+        assert len(table.splitlines()) > 3
+        assert {unit for _, unit, _ in LENGTH.findall(table)} == units
 
 
 @pytest.mark.parametrize("typed", ["5mm", "0.5cm", "0.005m", "2%", "0.04"])

@@ -26,7 +26,7 @@ _ABSOLUTE = {*OPTION_NAMES, *(field.name for field in dataclasses.fields(Navigab
 
 LIKE = "The options and the seed of an earlier run, from the file that --report wrote; other options override them."
 
-_LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
+_LENGTH = re.compile(rf"([-+.\deE]+)\s*(%|{'|'.join(UNITS)})")
 
 
 @stated(panel="Processes")
