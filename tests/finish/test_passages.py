@@ -279,7 +279,7 @@ def test_a_share_and_a_radius_are_told_apart() -> None:
     assert decompose_options({"keep_open": "0.9"}) == decompose_options({"keep_open": "90%"}) == {"keep_open": 0.9}
     assert decompose_options({"keep_open": "2mm"}, metres=True) == {"keep_open_abs": 0.002}
     with pytest.raises(
-        OptionError, match=r"keep_open_abs \(--keep-open as a length\) is 0\.001; .* between 0\.002 and 1"
+        OptionError, match=r"keep_open_abs \(--keep-open as a length\) is 0\.1 % .* between 0\.2 % and 100 %"
     ):
         rlacd.decompose(trimesh.creation.box(), keep_open_abs=0.001)
     with pytest.raises(OptionError, match="keep_open_abs, a length"):

@@ -58,7 +58,7 @@ def read_cad(path: Path, content: bytes, fineness: Fineness) -> Contents:
     if deviation > sought:
         said.append(
             f"the triangles of {path.name} are up to {deviation / sought:.3g} times as far from its surfaces as a "
-            f"tenth of the threshold: that would take over {MOST_OF_CAD} of them"
+            f"tenth of the threshold: nearer ones would be over {MOST_OF_CAD}"
         )
     return contents._replace(warnings=(*contents.warnings, *said), up="z", deviation=deviation)
 
