@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import trimesh
 from scipy.spatial import ConvexHull
 
 import rlacd
@@ -44,8 +45,8 @@ LARGEST_FILE = 10_000
 MOST_FACES = 48
 """Of a small shape."""
 
-BALLS = 5
-"""One in so many small shapes is round, under limits on its corners."""
+BALLS, DENSE = 5, 200
+"""One in so many small shapes is round, under limits on its corners; one in so many has over 10,000 triangles, too."""
 
 MOST_OF_PLATES = 200
 """Faces of a plate with holes."""
@@ -118,7 +119,8 @@ class LightTrials:
     def shape(self, number: int) -> tuple[Shape, Options]:
         """Shape and options of a trial of the kind ``small``: the first of its shapes that is small enough."""
         if number % BALLS == 0:
-            return _under_limits(np.random.default_rng([self.seed, number, 22]))
+            random = np.random.default_rng([self.seed, number, 22])
+            return (_dense if number % DENSE == 0 else _balls)(random), _limits(random)
         for tries in range(100):
             shape = make_shape(self.seed * 10**12 + number * 100 + tries)
             if len(shape.faces) <= (MOST_FACES if len(shape.axes) == 0 else MOST_OF_PLATES):
@@ -269,8 +271,17 @@ def _chosen(trial: Trial) -> bool:
     return bool(np.random.default_rng([trial.seed, trial.number, 22]).random() < DECOMPOSED)
 
 
-def _under_limits(random: np.random.Generator) -> tuple[Shape, Options]:
-    """A few balls of up to 200 corners, stretched, under limits."""
+def _dense(random: np.random.Generator) -> Shape:
+    """A bumpy body, long, flat or round, and bent."""
+    ball = trimesh.creation.icosphere(5)
+    bumps = np.sin(np.array(ball.vertices) @ (3 * random.normal(size=(3, 3)))).sum(axis=1)
+    corners = ball.vertices * (1 + random.choice([0.0, 0.03, 0.1]) * bumps)[:, None] * random.uniform(0.05, 1, 3)
+    corners[:, 2] += random.uniform(0, 0.5) * np.sin(random.uniform(1, 5) * corners[:, 0])
+    return Shape(corners, np.array(ball.faces, dtype=np.int64), ("dense",), True)
+
+
+def _balls(random: np.random.Generator) -> Shape:
+    """A few balls of up to 200 corners, stretched."""
     balls = []
     for _ in range(int(random.integers(1, 4))):
         points = random.normal(size=(int(random.choice([20, 60, 200])), 3))
@@ -279,7 +290,11 @@ def _under_limits(random: np.random.Generator) -> tuple[Shape, Options]:
         faces = np.where(outwards[:, None] > 0, ball.simplices, ball.simplices[:, ::-1]).astype(np.int64)
         corners = ball.points * random.uniform(0.2, 1, 3) + random.choice([0.0, 0.5, 3.0], 3)
         balls.append(Shape(corners, faces, ("ball",), True))
-    shape = concatenated(balls)
+    return replace(concatenated(balls), is_closed=len(balls) == 1)
+
+
+def _limits(random: np.random.Generator) -> Options:
+    """Options with limits on hulls."""
     options: Options = {
         "threads": 1,
         "seed": 0,
@@ -291,7 +306,7 @@ def _under_limits(random: np.random.Generator) -> tuple[Shape, Options]:
             options[name] = int(random.choice([4, 5, 8, 16, 24, 32, 64] if name != "max_hulls" else [1, 2, 3]))
     if random.random() < 0.2:
         options["preset"] = str(random.choice(list(rlacd.PRESETS)))
-    return replace(shape, is_closed=len(balls) == 1), options
+    return options
 
 
 def _cheap(options: Options) -> Options:

@@ -66,7 +66,7 @@ def test_links_too_close_for_any_hulls_are_named_with_depth_and_joint_position(t
     assert (pair.meshes, pair.adjacent, pair.kept_clear) == (0, True, False)
     assert pair.new_depth > 1e-4
     (said,) = [warning for warning in done.warnings if "touch though the links do not" in warning]
-    assert said.startswith(f"Hulls of fork and lug touch though the links do not, up to {1000 * pair.new_depth:.3g} mm")
+    assert said.startswith(f"Hulls of fork and lug touch though the links do not, up to {pair.new_depth:.4g} m ")
     assert "lug_joint = " in said or "at rest" in said
 
 

@@ -79,7 +79,8 @@ def test_show_opens_a_page_in_the_browser(real: Decomposition, monkeypatch: pyte
 def test_it_describes_itself_in_one_line() -> None:
     cup = result(2)
     faces = sum(len(hull.faces) for hull in cup)
-    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} triangles, concavity at most 0.0312 (threshold 0.05)>"
+    fit = "concavity at most 0.07533 units (threshold 0.1207 units)"
+    assert repr(cup) == f"<Decomposition: 2 hulls of cup, {faces} triangles, {fit}>"
     assert "1 hull of" in repr(result(1))
     assert "stopped early by timeout" in repr(result(2, complete=False, stopped_by="timeout"))
     assert repr(Decomposition.of([], SOURCE)) == "<Decomposition: 0 hulls of mesh, 0 triangles>"

@@ -62,6 +62,15 @@ def test_what_was_promised_and_is_not_so_is_seen(
     assert any(seen in word for word in judge(wrong))
 
 
+def test_no_warning_excuses_what_lies_outside_where_repair_dropped_nothing() -> None:
+    good = case()
+    told = {**good.report, "parts": 1, "warnings": ["Some of the surface lies outside the hulls: repair dropped it."]}
+    wrong = replace(good, hulls=good.hulls[:1], report=told)
+    assert any("without a reason" in word for word in judge(wrong))
+    rows = [{**body, "step": "capped"} for body in told["repair"]]
+    assert not any("without a reason" in word for word in judge(replace(wrong, report={**told, "repair": rows})))
+
+
 def test_a_mass_with_its_cavity_and_a_corner_without_a_word_are_seen() -> None:
     inner = creation.box((0.5, 0.5, 0.5))
     hollow = trimesh.util.concatenate([creation.box(), trimesh.Trimesh(inner.vertices, inner.faces[:, ::-1])])

@@ -124,6 +124,19 @@ def test_a_file_is_read_or_refused_for_a_reason(light: LightTrials) -> None:
     assert f"| read | {ends.total()} | 0 | {ends['loaded']} | {ends['refused']} |" in totals(rows)
 
 
+def test_limits_and_dense_shapes_are_among_the_draws(light: LightTrials) -> None:
+    dense, options = light.shape(fuzz.light.DENSE)
+    assert len(dense.faces) > 10_000
+    assert is_limited(options)
+    balls = [light.shape(fuzz.light.BALLS * number) for number in range(1, 20)]
+    assert sum(is_limited(options) for _, options in balls) > 10
+    assert all(len(shape.faces) < 2000 for shape, _ in balls)
+
+
+def is_limited(options: dict[str, object]) -> bool:
+    return bool({"max_vertices", "max_faces", "max_hulls", "preset"} & {*options})
+
+
 def test_a_small_shape_is_decomposed_and_judged(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
     number = first_of(light, "small")
     trial = light.trial(number)

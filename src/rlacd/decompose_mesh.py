@@ -19,6 +19,7 @@ from rlacd.errors import DecompositionWarning, MissingExtraError, OptionError
 from rlacd.find_parts import Reached, covered, find_parts
 from rlacd.finish.finish import Finished, finish, misses_some
 from rlacd.finish.report import joint_report, missed
+from rlacd.fit import Unit
 from rlacd.io.read.contents import USUAL, Fineness
 from rlacd.io.read.load import load_mesh
 from rlacd.options import Options
@@ -86,12 +87,30 @@ def decompose(
     DecompositionWarning
         What ``report.warnings`` says, once a call.
     """
+    done = decompose_in(None, mesh, faces, file_type=file_type, progress=progress, **options)
+    if done.report.warnings:
+        said = f"{done.name}: {' '.join(done.report.warnings)}"
+        warnings.warn(said, DecompositionWarning, stacklevel=2)
+    return done
+
+
+def decompose_in(
+    told_in: Unit | None,
+    mesh: MeshLike,
+    faces: ArrayLike | None = None,
+    *,
+    file_type: str | None = None,
+    progress: ProgressCallback | None = None,
+    **options: Any,
+) -> Decomposition:
+    """Decompose as `decompose` does, but warn of nothing, and tell lengths in a unit; None for the input's own."""
     asked = Options.of(options)
     check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(asked.first_policy)  # reports a bad network before any work is done
     with Run(asked.threads, asked.timeout, progress) as run:
         with run.stage("load"):
             source = in_metres(load_mesh(mesh, faces, file_type, _fineness(asked)), asked)
+            source = replace(source, told_in=told_in)
             obstacles = tuple(_obstacle(one).scaled(source.factor) for one in asked.avoid)
         asked = replace(asked, avoid=obstacles)
         apart = asked.per_node and len(source.nodes) > 1
@@ -108,9 +127,6 @@ def decompose(
         deviation_abs=source.deviation,
         seconds={**run.seconds, "total": run.elapsed},
     )
-    if report.warnings:
-        said = f"{report.name}: {' '.join(report.warnings)}"
-        warnings.warn(said, DecompositionWarning, stacklevel=2)
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
     return Decomposition(done.hulls, report, surface, done.balls, source)
 
@@ -154,7 +170,7 @@ def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> R
 
 def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
-    frame = Frame.of(used_points(source.vertices, source.faces))
+    frame = Frame.of(used_points(source.vertices, source.faces), source.unit)
     scale = frame.scale
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()
@@ -166,7 +182,7 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     run.begin_finishing()
     done = [finish(one, run) for one in reached]
     names = [source.nodes[place].name for place in used]
-    said = [] if run.stopped_by is not None else _clear_of_each_other(names, meshes, each, done, run)
+    said = [] if run.stopped_by is not None else _clear_of_each_other(names, meshes, each, done, run, source.unit)
     bodies = 0
     for place, one in zip(used, done, strict=True):
         for hull in one.hulls:
@@ -187,7 +203,12 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
 
 
 def _clear_of_each_other(
-    names: Sequence[str], meshes: Sequence[InputMesh], options: Sequence[Options], done: list[Finished], run: Run
+    names: Sequence[str],
+    meshes: Sequence[InputMesh],
+    options: Sequence[Options],
+    done: list[Finished],
+    run: Run,
+    unit: Unit,
 ) -> list[str]:
     """Decompose nodes again whose hulls touch though they do not; returns what to say of those that still do."""
     from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
@@ -215,7 +236,7 @@ def _clear_of_each_other(
         return [f"Nodes were not checked against each other: {error}"]
     if cleared is None:
         return ["There was no time to check nodes against each other."]
-    return warnings_of(cleared, rest, lambda length: f"{length:.4g}")
+    return warnings_of(cleared, rest, unit.words)
 
 
 def in_metres(source: InputMesh, options: Options) -> InputMesh:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from rlacd.options.names import UNITS
 
@@ -13,6 +12,49 @@ RESOLVED = 1e-3
 
 COVERED = 5e-5
 """Hulls that miss no more than this of an input cover it."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit in which lengths are told: the one in which a length was given, else the input's own."""
+
+    name: str = "units"
+    """``mm``, ``m`` and the like; ``units`` where the input does not say its own."""
+    length_abs: float = 1.0
+    """Its length in the input's unit."""
+
+    @classmethod
+    def of(cls, metres: float | None) -> Unit:
+        """That of an input whose unit is so many metres; None if it does not say."""
+        return cls() if metres is None else cls(_NAMES.get(metres, cls.name))
+
+    @classmethod
+    def typed(cls, name: str | None) -> Unit | None:
+        """That in which a length was typed for an input in metres; None if it was a bare number or a share."""
+        return None if name is None else cls(name, UNITS[name])
+
+    def scaled(self, scale: float) -> Unit:
+        """The same for lengths in a frame, of which an input's unit is so many units."""
+        return Unit(self.name, self.length_abs * scale)
+
+    def words(self, length: float) -> str:
+        """A length with its unit."""
+        return f"{length / self.length_abs:.4g} {self.name}"
+
+    def cubic_words(self, volume_abs: float) -> str:
+        """A volume, in cubic units of the input, with its unit."""
+        return f"{volume_abs / self.length_abs**3:.4g} {self.name}³"
+
+    def apart(self, length: float, limit: float) -> tuple[str, str]:
+        """A length and its limit, with as many digits as `told_apart` takes."""
+        longest, most = told_apart(length / self.length_abs, limit / self.length_abs)
+        return f"{longest} {self.name}", f"{most} {self.name}"
+
+
+ANY = Unit()
+"""That of an input that does not say its unit."""
+
+_NAMES = {1e-6: "µm", 0.3048: "ft", **{metres: name for name, metres in UNITS.items()}}
 
 
 @dataclass(frozen=True)
@@ -102,47 +144,21 @@ class Fit(NamedTuple):
         """Unit of the measurement, where the unit of lengths is `scale`: 1 for a share of volume."""
         return 1.0 if self.name == "added_volume" else scale
 
-    def words(self, scale: float = 1.0) -> str | None:
-        """Say how well the hulls fit, with lengths in a unit that is `scale` units of the frame; None if unknown."""
+    def words(self, unit: Unit) -> str | None:
+        """Say how well the hulls fit, with lengths of the frame in a unit; None if unknown."""
         if self.name == "intrusion":
             if self.worst is None:
                 return f"there are {self.balls} balls"
             if self.worst <= 0:
                 return f"no hull touches any of the {self.balls} balls"
-            return f"hulls reach {self.worst / scale:.4g} into the {self.balls} balls"
+            return f"hulls reach {unit.words(self.worst)} into the {self.balls} balls"
         if self.worst is None or self.limit is None:
             return None
         if self.name == "added_volume":
             most, tolerance = told_apart(100 * self.worst, 100 * self.limit)
             return f"hulls add up to {most} % of volume (tolerance {tolerance} %)"
-        most, threshold = told_apart(self.worst / scale, self.limit / scale)
+        most, threshold = unit.apart(self.worst, self.limit)
         return f"{self.name} at most {most} (threshold {threshold}{', exceeded' * (self.worst > self.limit)})"
-
-
-def length_unit(options: Mapping[str, Any], scale: float, unit: str | None = None) -> tuple[float, str]:
-    """The unit in which a report's lengths are written: the threshold's, so that they can be compared.
-
-    Parameters
-    ----------
-    options : mapping
-        Those of the decomposition; its `threshold_abs` is read.
-    scale : float
-        Units of the frame per unit of the input.
-    unit : str, optional
-        In which the threshold was typed: ``%`` of the longest side, or of `UNITS` for an input in metres.
-
-    Returns
-    -------
-    float, str
-        Units of the frame per such unit, and what that is.
-    """
-    if unit == "%":
-        return 0.02, "in % of the longest side"
-    if unit is not None:
-        return scale * UNITS[unit], f"in {unit}"
-    if options.get("threshold_abs") is not None:
-        return scale, "in the input's unit"
-    return 1.0, "longest side = 2"
 
 
 def told_apart(value: float, limit: float) -> tuple[str, str]:

@@ -5,6 +5,7 @@ Lengths are in the frame, where the longest side of the input is 2; those ending
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd._version import __version__
-from rlacd.fit import COVERED, RESOLVED, Fit, LengthFit, SpaceFit, VolumeFit, length_unit
+from rlacd.fit import ANY, COVERED, RESOLVED, Fit, LengthFit, SpaceFit, Unit, VolumeFit
 from rlacd.plain_json import as_plain, if_asked, schema_of
 
 Point = tuple[float, float, float]
@@ -254,14 +255,16 @@ class Report:
     """No decomposition has fewer hulls if each stays within the threshold of the solid and they cover it to 0.001; null
     without a search; 1 where the criterion bounds no distance."""
     warnings: tuple[str, ...] = ()
-    """What to know, one sentence each; places are in the input's unit, with the `body` in `repair` if there are several
-    (counted within the node, with `per_node`)."""
+    """What to know, one sentence each; lengths are in `unit`, places in the input's, with the `body` in `repair` if
+    there are several (counted within the node, with `per_node`)."""
     provenance: tuple[Provenance, ...] = ()
     """For each hull, in the order of the hulls."""
     up: str = "z"
     """The axis that points up, as the input's format or file says."""
     metres: float | None = None
     """The input's unit of length, if its format or file says so."""
+    unit: Unit = ANY
+    """In which `warnings` and summaries tell lengths."""
     deviation_abs: float | None = None
     """How far the triangles that were decomposed may be from the surfaces of a STEP or IGES file."""
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -272,18 +275,20 @@ class Report:
         """How tight the hulls are, whatever the criterion; None if it is unknown."""
         return Fit.of(self)
 
-    def fit_words(self, unit: str | None = None) -> str:
-        """Say how well hulls fit, by the criterion, and how far they reach beyond the input; empty if it is unknown.
+    @property
+    def unit_in_frame(self) -> Unit:
+        """`unit`, for lengths in the frame."""
+        return self.unit.scaled(self.scale)
 
-        Lengths are in a unit that `rlacd.fit.length_unit` takes, by default in the threshold's.
-        """
-        scale, in_words = length_unit(self.options, self.scale, unit)
-        words = [said] if self.fit is not None and (said := self.fit.words(scale)) else []
+    def fit_words(self) -> str:
+        """Say how well hulls fit, by the criterion, and how far they reach beyond the input; empty if it is unknown."""
+        unit = self.unit_in_frame
+        words = [said] if self.fit is not None and (said := self.fit.words(unit)) else []
         over, under = self.hausdorff.over, self.hausdorff.under
         if over is not None and under is not None:
-            missed = "and cover it" if under <= COVERED else f"and miss it by {_length(under, scale)}"
-            words.append(f"hulls reach {_length(over, scale)} beyond the input {missed}")
-        return "; ".join(words) + (f" ({in_words})" if words else "")
+            missed = "and cover it" if under <= COVERED else f"and miss it by {_length(under, unit)}"
+            words.append(f"hulls reach {_length(over, unit)} beyond the input {missed}")
+        return "; ".join(words)
 
     def as_dict(self) -> dict[str, Any]:
         """Get plain values that ``json`` can write, as ``--report`` does; what was not asked for is left out."""
@@ -296,11 +301,17 @@ class Report:
         return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema_of(cls)}
 
 
+def kind_of(warning: str) -> str:
+    """What a warning is about: its first words, without numbers and plurals."""
+    words = [word.rstrip("s") for word in re.findall(r"[a-z]+", warning.lower().removeprefix("at least"))]
+    return " ".join([word for word in words if len(word) > 3][:4])
+
+
 def sizes_of(hulls: Sequence[Any]) -> dict[str, Any]:
     """How many hulls there are, and how many triangles and vertices they have."""
     faces, vertices = (sum(len(getattr(hull, what)) for hull in hulls) for what in ("faces", "vertices"))
     return {"parts": len(hulls), "faces": faces, "vertices": vertices}
 
 
-def _length(length: float, scale: float) -> str:
-    return f"{'at most ' * (length <= RESOLVED)}{length / scale:.4g}"
+def _length(length: float, unit: Unit) -> str:
+    return f"{'at most ' * (length <= RESOLVED)}{unit.words(length)}"

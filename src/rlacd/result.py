@@ -10,7 +10,6 @@ from typing import Any, TypeVar, overload
 import numpy as np
 import trimesh
 
-from rlacd.fit import length_unit
 from rlacd.options.fields import checked
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.output import Axis, OutputOptions
@@ -82,11 +81,10 @@ class Result:
     def facts(self) -> list[str]:
         """Say how many hulls and triangles there are and how well they fit, in words that are the same everywhere."""
         shapes, fit = Counter(each.kind for each in self.primitives if each is not None), self.report.fit
-        unit, _ = length_unit(self.report.options, self.report.scale)
         words = [f"{len(self)} hull{'s' * (len(self) != 1)}"]
         words += [f"{shapes[kind]} as {kind}" for kind in PRIMITIVE_KINDS if shapes[kind]]
         words.append(f"{sum(len(hull.faces) for hull in self.hulls)} triangles")
-        words += [said] if fit is not None and (said := fit.words(unit)) else []
+        words += [said] if fit is not None and (said := fit.words(self.report.unit_in_frame)) else []
         return words + ([] if self.report.complete else [f"stopped early by {self.report.stopped_by}"])
 
     def __repr__(self) -> str:

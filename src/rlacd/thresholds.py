@@ -18,6 +18,7 @@ from rlacd.decompose_mesh import MeshLike, in_metres
 from rlacd.errors import OptionError
 from rlacd.find_parts import Reached, find_parts_under
 from rlacd.finish.finish import cleaned_parts
+from rlacd.fit import ANY, Unit
 from rlacd.io.read.load import load_mesh
 from rlacd.options import FAST, Options
 from rlacd.options.fields import about, check_callback
@@ -61,6 +62,8 @@ class Tradeoff:
     which a finer threshold costs ever more hulls. None without choices."""
     complete: bool
     """False if there was no time for coarser thresholds."""
+    unit: Unit = ANY
+    """In which printing it tells lengths, if the thresholds are lengths."""
 
     def as_plain(self) -> dict[str, Any]:
         """Everything as values that ``json`` can write."""
@@ -75,12 +78,13 @@ class Tradeoff:
 
     def __str__(self) -> str:
         head = ("", self.option, "hulls", "triangles", "farthest", "volume added")
+        words = self.unit.words if self.option == "threshold_abs" else "{:.4g}".format
         marks = ["*" if i == self.pick else "" for i in range(len(self.choices))]
         lines = [
-            (mark, f"{c.threshold:.4g}", c.hulls, c.triangles, f"{c.farthest:.4g}", f"{100 * c.added:.3g} %")
+            (mark, words(c.threshold), c.hulls, c.triangles, words(c.farthest), f"{100 * c.added:.3g} %")
             for mark, c in zip(marks, self.choices, strict=True)
         ]
-        return "\n".join("{:1} {:>16} {:>6} {:>10} {:>9} {:>13}".format(*line) for line in (head, *lines))
+        return "\n".join("{:1} {:>16} {:>6} {:>10} {:>12} {:>13}".format(*line) for line in (head, *lines))
 
 
 def tradeoff(
@@ -135,7 +139,7 @@ def tradeoff(
             unit = 1.0 if chosen.threshold_abs is None else reached.solid.frame.scale
             choices.append(_choice(finest * factor, reached, unit, run))
         complete = run.stopped_by is None
-    return Tradeoff(Path(source.name).stem, name, choices, _pick(choices, max_hulls), complete)
+    return Tradeoff(Path(source.name).stem, name, choices, _pick(choices, max_hulls), complete, source.unit)
 
 
 def _choice(threshold: float, reached: Reached, unit: float, run: Run) -> Choice:

@@ -20,6 +20,7 @@ import trimesh
 from click.testing import CliRunner, Result
 
 from rlacd.batch import Summary, find_assets
+from rlacd.batch.batch import _kinds
 from rlacd.batch.mesh import _status
 from rlacd.cli.batch_screen import summary_lines
 from rlacd.cli.main import app
@@ -262,17 +263,28 @@ def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[s
 
 
 def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
-    missing = {"hausdorff": {"under": 0.37}, "warnings": ["Some lies 0.37 outside: repair dropped it."]}
+    said = ["Some lies 3.7 mm outside: repair dropped it."]
+    missing = {"hausdorff": {"under": 0.37}, "missed": "3.7 mm", "warnings": said}
     assert [_status(report) for report in ({"warnings": ["a"]}, missing, {"warnings": []})] == [
         *("warned", "uncovered", "done")
     ]
     row = {"mesh": "spoon.obj", "status": "uncovered", **missing}
     status = Counter({"done": 27, "warned": 12, "uncovered": 1})
     summary = Summary(40, status=status, uncovered=[row], warnings=Counter({"Some lies … outside": 13}))
-    said = "\n".join(summary_lines(summary, "out"))
-    assert "out: 39 of 40 meshes are done, 12 of them with warnings, 1 uncovered\n" in said
-    assert "spoon.obj: hulls miss its surface by up to 0.37 (longest side = 2)" in said
-    assert "13 x warning: Some lies … outside" in said
+    shown = "\n".join(summary_lines(summary, "out"))
+    assert "out: 39 of 40 meshes are done, 12 of them with warnings, 1 uncovered\n" in shown
+    assert "spoon.obj: hulls miss its surface by up to 3.7 mm" in shown
+    assert "13 x warning: Some lies … outside" in shown
+
+
+def test_warnings_are_counted_by_kind_whatever_their_numbers_and_units() -> None:
+    one = ["1 hull sticks out by up to 0.3 m, more than 0.1 m: cut it.", "1 body became a shell (open at (1, 2, 3))."]
+    two = [
+        "3 hulls stick out by up to 7 mm, more than 2.5e-06 mm: cut them.",
+        "4 hulls stick out by up to 1 mm, more than 0.5 mm: so.",
+    ]
+    kinds = _kinds([one, two, []])
+    assert kinds == {"… hull sticks out by up to …, more than …": 2, "… body became a shell": 1}
 
 
 @pytest.mark.slow

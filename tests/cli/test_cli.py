@@ -23,7 +23,7 @@ from rlacd.cli.terminal import summary
 from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
-from rlacd.fit import LengthFit, told_apart
+from rlacd.fit import ANY, LengthFit, Unit, told_apart
 from rlacd.report import Hausdorff
 from rlacd.run import Progress, ProgressCallback
 from tests.batch.trouble import write_ell
@@ -45,14 +45,16 @@ def rlacd(*words: object) -> Result:
 
 
 class StandIn:
-    """Takes the place of `rlacd.decompose` where a test needs it to be slow, stopped or broken."""
+    """Takes the place of `decompose_in` where a test needs it to be slow, stopped or broken."""
 
     def __init__(self) -> None:
         self.calls: list[dict[str, Any]] = []
         self.during: Callable[[], object] = lambda: None
         self.known: dict[str, Any] = {}
 
-    def __call__(self, mesh: Path, *, progress: ProgressCallback, **options: Any) -> Decomposition:
+    def __call__(
+        self, told_in: Unit | None, mesh: Path, *, progress: ProgressCallback, **options: Any
+    ) -> Decomposition:
         self.calls.append(options)
         complete = True
         for step in range(3):
@@ -70,6 +72,7 @@ class StandIn:
             "hausdorff": Hausdorff(0.02, float("nan")),
             "seconds": {"total": 0.3},
             "warnings": ("one body was open",),
+            "unit": told_in or ANY,
         }
         return Decomposition.of([hull_of(source.vertices)], source, **{**known, **self.known})
 
@@ -77,9 +80,9 @@ class StandIn:
 @pytest.fixture
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> StandIn:
     module = types.ModuleType("rlacd.decompose_mesh")
-    module.decompose = StandIn()  # type: ignore[attr-defined]
+    module.decompose_in = StandIn()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "rlacd.decompose_mesh", module)
-    return module.decompose
+    return module.decompose_in
 
 
 # --- what a good run says ---------------------------------------------------------------------------------------------
@@ -89,22 +92,16 @@ def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path,
     run = rlacd("decompose", mesh)
     assert (run.exit_code, run.stdout) == (0, "")
     assert len(trimesh.load_scene(mesh.with_name("ell_hulls.glb")).geometry) == 1
-    for words in ("ell_hulls.glb", "1 hull,", "concavity at most 0.01 (threshold 0.05)", "0.30 s", "one body was open"):
+    for words in ("ell_hulls.glb", "1 hull,", "(threshold 0.05 units)", "0.30 s", "one body was open"):
         assert words in run.stderr
     assert stand_in.calls == [{}], "defaults belong to rlacd.decompose"
 
 
-@pytest.mark.parametrize(
-    ("typed", "said"),
-    [
-        ("5mm", "concavity at most 4.98 (threshold 5); hulls reach 20 beyond the input and cover it (in mm)"),
-        ("2.5%", "concavity at most 2.49 (threshold 2.5); hulls reach 10 beyond the input and cover it (in %"),
-    ],
-)
-def test_lengths_are_said_in_the_unit_that_was_given(mesh: Path, stand_in: StandIn, typed: str, said: str) -> None:
+def test_lengths_are_said_in_the_unit_that_was_given(mesh: Path, stand_in: StandIn) -> None:
     stand_in.known = {"concavity": LengthFit(None, 0.0498, 0.05), "scale": 10.0, "hausdorff": Hausdorff(0.2, 0.0)}
     glb = trimesh.load(mesh).export(mesh.with_suffix(".glb")) and mesh.with_suffix(".glb")
-    assert said in rlacd("decompose", glb, "--threshold", typed).stderr
+    said = "concavity at most 4.98 mm (threshold 5 mm); hulls reach 20 mm beyond the input and cover it\n"
+    assert said in rlacd("decompose", glb, "--threshold", "5mm").stderr
 
 
 @pytest.mark.parametrize(
@@ -162,10 +159,10 @@ def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> N
     run = CliRunner().invoke(
         app, ["decompose", str(tmp_path / "ball.stl"), "-o", str(tmp_path / "b.glb"), "-t", "0.05"]
     )
-    reach = re.search(r"reach at most (0\.0\d+) beyond the input and cover it \(longest side = 2\)", run.stderr)
+    reach = re.search(r"reach at most (0\.0\d+) units beyond the input and cover it", run.stderr)
     assert reach is not None, run.stderr
     assert float(reach[1]) <= 0.05
-    assert "(threshold 0.05)" in run.stderr
+    assert "(threshold 0.05 units)" in run.stderr
 
 
 def test_the_summary_says_what_more_time_may_gain() -> None:

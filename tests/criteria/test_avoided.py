@@ -107,7 +107,7 @@ def test_limits_that_leave_no_way_are_said() -> None:
     (entered,) = done.report.avoid.entered
     assert entered.hulls == len(done) == 4
     assert entered.depth_abs == pytest.approx(depth, rel=0.01)
-    assert any(f"4 hulls enter a mesh, up to {entered.depth_abs:.4g} deep" in w for w in done.report.warnings)
+    assert any(f"4 hulls enter a mesh, up to {entered.depth_abs:.4g} units deep" in w for w in done.report.warnings)
 
 
 def test_lengths_and_scale_are_those_of_the_input(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_a_length_is_a_distance_unless_the_criterion_is_named(tmp_path: Path) ->
     assert "concavity at most" in said("--threshold", "5%")
     comb().export(path := tmp_path / "comb.stl")
     assert "its unit" in said("--threshold", "0.1mm")
-    assert "(threshold 0.1); hulls" in said("--threshold", "0.1mm", "--unit", "mm")
+    assert "(threshold 0.1 mm); hulls" in said("--threshold", "0.1mm", "--unit", "mm")
 
 
 @pytest.mark.parametrize("criterion", ["concavity", "distance", "volume"])

@@ -204,7 +204,9 @@ def test_a_slot_that_closes_is_one_passage_and_named() -> None:
     assert report.warnings == ()
     report = rlacd.decompose(trimesh_of(block), threshold=0.005, max_hulls=1, quality="fast", threads=1).report
     assert any(
-        said.startswith("1 passage narrows by") and "1 to nothing" in said and "from a radius of 0.5 to 0;" in said
+        said.startswith("1 passage narrows by")
+        and "1 to nothing" in said
+        and "from a radius of 0.5 units to 0 units;" in said
         for said in report.warnings
     )
     assert rlacd.decompose(trimesh_of(block), threshold_abs=0.05, quality="fast", threads=1).report.passages == ()
@@ -265,7 +267,7 @@ def test_where_a_limit_forbids_it_a_warning_says_so() -> None:
     report = rlacd.decompose(mesh, keep_open=0.95, max_hulls=2, quality="fast", threads=1).report
     (passage,) = report.passages
     at = ", ".join(f"{x:.4g}" for x in passage.at_abs)
-    size = f"from a radius of {passage.radius_abs:.4g} to {passage.left_abs:.4g}"
+    size = f"from a radius of {passage.radius_abs:.4g} units to {passage.left_abs:.4g} units"
     assert any(
         said.startswith("1 passage narrows by more than --keep-open allows")
         and said.endswith(f"near ({at}) {size}; limits on the hulls leave no other way.")
@@ -277,7 +279,7 @@ def test_a_share_and_a_radius_are_told_apart() -> None:
     assert decompose_options({"keep_open": "0.9"}) == decompose_options({"keep_open": "90%"}) == {"keep_open": 0.9}
     assert decompose_options({"keep_open": "2mm"}, metres=True) == {"keep_open_abs": 0.002}
     with pytest.raises(
-        OptionError, match=r"keep_open_abs \(--keep-open as a length\) is 0\.001; .* between 0\.002 and 1"
+        OptionError, match=r"keep_open_abs \(--keep-open as a length\) is 0\.1 % .* between 0\.2 % and 100 %"
     ):
         rlacd.decompose(trimesh.creation.box(), keep_open_abs=0.001)
     with pytest.raises(OptionError, match="keep_open_abs, a length"):

@@ -149,7 +149,7 @@ def test_no_file_becomes_more_triangles_than_can_be_handled(monkeypatch: pytest.
 @CAD
 def test_the_command_says_how_far_triangles_are_from_the_surface(tmp_path: Path) -> None:
     run = CliRunner().invoke(app, ["decompose", str(STAND), "-o", str(tmp_path / "out.glb"), "--threshold", "1mm"])
-    assert "triangles, up to 0.06 from the surface in the file (in mm)" in run.stderr
+    assert "triangles, up to 0.06 mm from the surface in the file" in run.stderr
     assert "triangles lie up to 6e-05 from" in CliRunner().invoke(app, ["info", str(STAND)]).output
 
 

@@ -233,13 +233,13 @@ def test_a_mesh_smaller_than_the_threshold_becomes_one_hull(tmp_path: Path) -> N
 
 def test_a_timeout_counts_for_each_mesh(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
-    whole = decomposed.decompose
+    whole = decomposed.decompose_in
 
     def watched(*words: object, **options: object) -> object:
         given.append(options["timeout"])
         return whole(*words, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(decomposed, "decompose", watched)
+    monkeypatch.setattr(decomposed, "decompose_in", watched)
     rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), timeout=50.0, threads=1)
     assert given == [50.0, 50.0]
 
@@ -281,7 +281,7 @@ def test_a_robot_is_rewritten_on_the_command_line(ear: Path) -> None:
     assert run.exit_code == 0, run.output
     assert ear.with_name("ear_hulls.urdf").is_file()
     assert "2 links" in run.stderr
-    assert re.search(r"tip +2 meshes +\d+ hulls? +farthest [\d.e-]+ mm", run.stderr)
+    assert re.search(r"tip +2 meshes +\d+ hulls? +farthest [\d.e-]+ m\n", run.stderr)
     assert [link["name"] for link in json.loads(run.stdout)["links"]] == ["base", "tip"]
     run = CliRunner().invoke(app, ["decompose", str(ear), "--link", "t.*=1mm", "--link", "base=0.5", "--per", "mesh"])
     assert run.exit_code == 0, run.output

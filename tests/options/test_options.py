@@ -254,7 +254,9 @@ def test_shares_that_no_object_can_have_are_refused(given: dict[str, float]) -> 
 
 @pytest.mark.parametrize("given", [{"radius_abs": 1e-320}, {"tolerance_abs": 1e300}, {"radius_abs": 1e-5}])
 def test_lengths_that_do_not_fit_the_object_are_refused(given: dict[str, float]) -> None:
-    with pytest.raises(OptionError, match=r"as a length\) is .* for this object it has to be between 0\.0001 and 10"):
+    with pytest.raises(
+        OptionError, match=r"is .* % of this object's longest side; it has to be between 0\.01 % and 1000 %"
+    ):
         rlacd.decompose(creation.box(), criterion=rlacd.NavigableSpace(**given))
 
 

@@ -124,7 +124,7 @@ def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> N
     shell = rlacd.decompose(walls, open="thin", quality="fast", threads=1)
     assert [body.step for body in shell.report.repair] == [SHEET]
     assert shell.report.mass.volume_abs == pytest.approx(5 * 0.2**2 * 2 * HALF_THICKNESS * 0.1, rel=0.02)
-    with pytest.warns(rlacd.ImplausibleBodyWarning, match=r"hollow shell .* walls 0.0002 thick"):
+    with pytest.warns(rlacd.ImplausibleBodyWarning, match=r"hollow shell .* walls 0.0002 units thick"):
         shell.save(tmp_path / "shell.xml")
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -81,7 +81,7 @@ def test_a_single_point_like_hull_and_a_sheet_as_input_can_be_drawn(tmp_path: Pa
 
 
 def test_the_caption_tells_the_numbers_that_are_known() -> None:
-    assert towers().facts() == ["4 hulls", "48 triangles", "concavity at most 0.04 (threshold 0.05)"]
+    assert towers().facts() == ["4 hulls", "48 triangles", "concavity at most 0.084 units (threshold 0.105 units)"]
     one = towers()
     bare = Decomposition.of(one.hulls[:1], one.source, complete=False, stopped_by="timeout")
     assert bare.facts() == ["1 hull", "12 triangles", "stopped early by timeout"]

@@ -251,7 +251,7 @@ def test_another_mesh_is_opened(viewer: ViewServer) -> None:
     settled(viewer, run=2)
     assert viewer.session.result[1].report.options["threshold"] == 0.05
     scene = ask(viewer, "GET", "/scene").json
-    assert (scene["name"], scene["up"], scene["unit"], len(scene["parts"])) == ("a ball", "y", "m", 1)
+    assert (scene["name"], scene["up"], scene["unit"]["name"], len(scene["parts"])) == ("a ball", "y", "m", 1)
     folder = viewer.subject.path.parent
     assert [path.name for path in folder.iterdir()] == ["a ball.glb"]
     command = shlex.split(ask(viewer, "POST", "/command", {}).json["command"])

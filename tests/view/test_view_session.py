@@ -191,4 +191,4 @@ def test_up_is_guessed_where_the_file_does_not_say_it(
     assert (subject.up, subject.up_is_guess) == (expected, is_guess)
     asked = read_subject(path, "x")
     assert (asked.up, asked.up_is_guess) == ("x", False)
-    assert subject.unit == {"glb": "m", "3mf": "mm"}.get(ending, "")
+    assert subject.mesh.unit.name == {"glb": "m", "3mf": "mm"}.get(ending, "units")

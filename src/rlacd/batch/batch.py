@@ -6,7 +6,7 @@ import re
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
@@ -20,13 +20,16 @@ from rlacd.batch.mesh import FAILED, Outcome, Task, Work, process
 from rlacd.batch.store import FolderStore, ResultStore, open_store
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.pool import Pool, ProcessLimits, WorkerDiedError
+from rlacd.report import kind_of
 
 MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 
 Redo = Literal["none", "failed", "all"]
 
 
-_NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?")
+_NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?( (units|µm|mm|cm|m|ft)\b)?")
+
+_CLAUSE = re.compile(r"[:;] | \(")
 
 WRITERS = 4
 """Results written concurrently; each waits for the disk, not for a processor."""
@@ -69,7 +72,7 @@ class Summary:
     uncovered: list[Row] = field(default_factory=list)
     """Rows of the meshes whose hulls miss some of the surface."""
     warnings: Counter[str] = field(default_factory=Counter)
-    """How many meshes have each kind of warning: its first clause, with numbers left out."""
+    """How many meshes have each kind of warning: the first clause of one, with numbers and units left out."""
     slowest: list[tuple[str, float]] = field(default_factory=list)
     """Names and seconds of the slowest meshes of this run."""
     others: Counter[str] = field(default_factory=Counter)
@@ -111,6 +114,17 @@ def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcom
         except BaseException:
             work.pool.close()  # threads wait for it
             raise
+
+
+def _kinds(warnings: Iterable[Sequence[str]]) -> Counter[str]:
+    """How many meshes have each kind of warning, by the first clause of one of them, with numbers left out."""
+    named: dict[str, str] = {}
+    count = Counter[str]()
+    for said in warnings:
+        kinds = {kind_of(sentence): sentence for sentence in reversed(said)}
+        for kind, sentence in sorted(kinds.items()):
+            count[named.setdefault(kind, _NUMBER.sub("…", _CLAUSE.split(sentence, maxsplit=1)[0]))] += 1
+    return count
 
 
 @dataclass(frozen=True)
@@ -193,8 +207,7 @@ class Batch:
         summary.status = Counter(row["status"] for row in rows)
         summary.failures = [row for row in rows if row["status"] in FAILED]
         summary.uncovered = [row for row in rows if row["status"] == "uncovered"]
-        kinds = [{_NUMBER.sub("…", said.partition(": ")[0]) for said in row.get("warnings", ())} for row in rows]
-        summary.warnings = Counter(kind for each in kinds for kind in each)
+        summary.warnings = _kinds([row.get("warnings", ()) for row in rows])
         summary.stopped = len(summary.seen) < len(assets)
         summary.others = other_files(self.assets, self.glob, Path(self.out))
         summary.seconds = time.monotonic() - start

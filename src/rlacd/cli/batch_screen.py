@@ -92,8 +92,7 @@ class Screen:
 def failure_line(row: Row) -> str:
     """Describe what is wrong with a mesh in one line."""
     if row["status"] == "uncovered":
-        missed = row["hausdorff"]["under"]
-        return printable(f"  {row['mesh']}: hulls miss its surface by up to {missed:.2g} (longest side = 2)")
+        return printable(f"  {row['mesh']}: hulls miss its surface by up to {row['missed']}")
     instead = " (given its convex hull)" if row["status"] == "fallback" else ""
     return printable(f"  {row['mesh']}: {row['error']}{instead}")
 

@@ -20,6 +20,7 @@ from rlacd.cli.lean import import_trimesh
 from rlacd.cli.options import decompose_options, how, link_lengths, unit_given
 from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
+from rlacd.fit import Unit
 from rlacd.io.read import READERS
 from rlacd.io.read.open_file import missing
 from rlacd.options.output import PAGES, OutputOptions
@@ -98,18 +99,18 @@ def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str
     if wanted.balls is not None and isinstance(options.get("criterion", ""), str):
         raise OptionError("--balls needs --criterion navigable.")
     run = partial(_rewrite, stage, RobotOptions(**link_lengths(robots, in_metres))) if robot else _write
-    return run(mesh, wanted, options, unit_given(how))
+    return run(mesh, wanted, options, Unit.typed(unit_given(how)))
 
 
-def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None) -> bool:
+def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: Unit | None) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
     from rlacd.cli.terminal import summary, watching, writing
-    from rlacd.decompose_mesh import decompose
+    from rlacd.decompose_mesh import decompose_in
     from rlacd.plain_json import to_json
 
     up, quiet = wanted.up, bool(wanted.quiet)
     with watching(quiet=quiet) as watch:
-        result = decompose(mesh, **options, progress=watch)
+        result = decompose_in(told_in, mesh, **options, progress=watch)
     place = str(wanted.output)
     names = ("file_format", "density", "mass", "one_mesh", "keep_input", "scene")
     written = chosen({name: getattr(wanted, name) for name in names})
@@ -118,7 +119,7 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], unit: str
         with file_for(place, wanted.file_format) as file:
             result.save(file, up=up, **written)
     if not quiet:
-        say(summary(result, "stdout" if place == STDIO else place, unit))
+        say(summary(result, "stdout" if place == STDIO else place))
     for doubt in doubts:
         say(f"  warning: {doubt.message}")
     extras: dict[str, tuple[str | None, Callable[[str], object]]] = {
@@ -154,11 +155,11 @@ def is_html(path: str) -> bool:
 
 
 def _rewrite(
-    stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any], unit: str | None
+    stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any], told_in: Unit | None
 ) -> bool:
     """Replace the collision meshes of a robot, or of a stage that has been read; returns whether all are complete."""
     from rlacd.cli.terminal import rewrite_summary, watching, writing
-    from rlacd.io.robots.rewrite import rewrite, rewrite_robot
+    from rlacd.io.robots.rewrite import rewrite, rewrite_in
     from rlacd.plain_json import to_json
 
     with watching(quiet=bool(wanted.quiet)) as watch:
@@ -168,9 +169,9 @@ def _rewrite(
             done = rewrite(stage, Path(place), options, how, keep_input=flat)
         else:
             given = {"package_dirs": wanted.package_dirs or (), "keep_input": flat, **vars(how)}
-            done = rewrite_robot(robot, place, **given, **options)
+            done = rewrite_in(told_in, robot, place, **given, **options)
     if not wanted.quiet:
-        say(rewrite_summary(done, unit))
+        say(rewrite_summary(done))
     if wanted.report is not None and is_html(wanted.report):
         with writing("report", wanted.report, quiet=bool(wanted.quiet)):
             done.save_report(wanted.report)

@@ -26,7 +26,7 @@ _ABSOLUTE = {*OPTION_NAMES, *(field.name for field in dataclasses.fields(Navigab
 
 LIKE = "The options and the seed of an earlier run, from the file that --report wrote; other options override them."
 
-_LENGTH = re.compile(r"([-+.\deE]+)\s*(%|m|cm|mm)")
+_LENGTH = re.compile(rf"([-+.\deE]+)\s*(%|{'|'.join(UNITS)})")
 
 
 @stated(panel="Processes")
@@ -166,9 +166,9 @@ def link_lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
 
 
 def unit_given(how: dict[str, Any]) -> str | None:
-    """The unit in which the threshold was given; None if in the frame or the input's own."""
-    found = _LENGTH.fullmatch(str(how.get("threshold") or "").strip())
-    return found[2] if found else None
+    """The unit in which a length was given, first of all the threshold; None if all are shares or bare numbers."""
+    found = (_LENGTH.fullmatch(str(how.get(name) or "").strip()) for name in LONGEST_SIDE)
+    return next((one[2] for one in found if one and one[2] in UNITS), None)
 
 
 def _number(word: str) -> float | None:

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 from rlacd._native import count_interrupts, forget_interrupts
 from rlacd.cli.exit_codes import ExitCode, say
 from rlacd.cli.lean import handling
-from rlacd.fit import length_unit
-from rlacd.options.names import UNITS
 from rlacd.run import Progress, ProgressCallback
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
 
     from rlacd.decomposition import Decomposition
+    from rlacd.fit import Unit
     from rlacd.io.robots import Rewritten
 
 
@@ -99,18 +98,17 @@ def writing(what: str, path: str, *, quiet: bool) -> Iterator[None]:
         say(f"  {what}: {path}")
 
 
-def summary(result: Decomposition, written: str, unit: str | None = None) -> str:
+def summary(result: Decomposition, written: str) -> str:
     """Summarise the result in a few lines: its size, its quality, and any warnings."""
     report = result.report
     triangles = sum(len(hull.faces) for hull in result)
     total = report.seconds.get("total")
     time = ("" if total is None else f", {total:.2f} s") + STOPPED[report.stopped_by]
     lines = [f"{written}: {counted(len(result), 'hull', 'hulls')}, {triangles} triangles{time}"]
-    lines += [f"  {fit}" for fit in [report.fit_words(unit)] if fit]
+    lines += [f"  {fit}" for fit in [report.fit_words()] if fit]
     if report.deviation_abs is not None:
-        scale, in_words = length_unit(report.options, report.scale, unit)
-        moved = report.deviation_abs * report.scale / scale
-        lines.append(f"  measured to triangles, up to {moved:.4g} from the surface in the file ({in_words})")
+        moved = report.unit.words(report.deviation_abs)
+        lines.append(f"  measured to triangles, up to {moved} from the surface in the file")
     least, parts = report.at_least or 1, report.parts
     if 1 < least <= parts:
         fewer = "fewer hulls" if least == parts else f"fewer than {least} hulls"
@@ -125,7 +123,7 @@ def summary(result: Decomposition, written: str, unit: str | None = None) -> str
     return "\n".join(lines)
 
 
-def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
+def rewrite_summary(done: Rewritten) -> str:
     """Summarise the result for a robot: a line for each link with collision meshes, and totals."""
     if not done.links:
         return "\n".join([f"{done.path}: written", *(f"  warning: {warning}" for warning in done.warnings)])
@@ -136,9 +134,9 @@ def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
     width = max(len(link.name) for link in done.links)
     for link in done.links:
         sizes = f"{counted(len(link.meshes), 'mesh', 'meshes'):>9}  {counted(len(link.files), 'hull', 'hulls'):>8}"
-        lines.append(f"  {link.name:{width}} {sizes}  {_farthest(link.farthest, done.metres, unit)}")
+        lines.append(f"  {link.name:{width}} {sizes}  {_farthest(link.farthest, done.unit)}")
     each = f"{hulls / len(done.links):.1f} hulls a link for {counted(meshes, 'mesh', 'meshes')}"
-    lines.append(f"  {each}; {_farthest(done.farthest, done.metres, unit)}")
+    lines.append(f"  {each}; {_farthest(done.farthest, done.unit)}")
     if done.samples:
         kept = sum(pair.kept_clear for pair in done.pairs)
         looked = (
@@ -149,12 +147,9 @@ def rewrite_summary(done: Rewritten, unit: str | None = None) -> str:
     return "\n".join(lines)
 
 
-def _farthest(length: float | None, metres: float, unit: str | None) -> str:
-    """How far hulls reach beyond the meshes, in a unit; in millimetres by default."""
-    if length is None:
-        return "not measured"
-    unit = unit if unit in UNITS else "mm"
-    return f"farthest {length * metres / UNITS[unit]:.3g} {unit}"
+def _farthest(length: float | None, unit: Unit) -> str:
+    """How far hulls reach beyond the meshes."""
+    return "not measured" if length is None else f"farthest {unit.words(length)}"
 
 
 def counted(count: int, one: str, many: str) -> str:

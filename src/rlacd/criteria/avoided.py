@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
+from rlacd.fit import Unit
 from rlacd.report import Avoids, Entered
 from rlacd.solid.arrays import FloatArray, dots
 from rlacd.solid.component import Part
@@ -100,13 +101,13 @@ class Avoided:
         return Avoids(tuple(kept.name for kept in told if kept.is_crossed), tuple(entered))
 
 
-def warnings_of(found: Avoids, reason: str) -> list[str]:
-    """A sentence for each obstacle that is entered all the same; `reason` ends it."""
+def warnings_of(found: Avoids, reason: str, unit: Unit) -> list[str]:
+    """A sentence for each obstacle that is entered all the same, with lengths in a unit; `reason` ends it."""
     return [
         *(f"The input itself crosses {name}, so hulls are not kept out of it there." for name in found.crossed),
         *(
             f"{one.hulls} hull{'s enter' if one.hulls > 1 else ' enters'} {one.name}, up to "
-            f"{one.depth_abs:.4g} deep: {reason}."
+            f"{unit.words(one.depth_abs)} deep: {reason}."
             for one in found.entered
         ),
     ]

@@ -21,7 +21,7 @@ import numpy as np
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.errors import OptionError
-from rlacd.fit import LengthFit, told_apart
+from rlacd.fit import ANY, LengthFit, Unit
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
@@ -70,7 +70,7 @@ class Distance(Criterion):
     threshold
         In the frame where the input's bounding box is centred and its longest side is 2.
     unit
-        Length in the frame of the unit in which warnings give lengths.
+        In which warnings tell lengths of the frame.
 
     Raises
     ------
@@ -89,7 +89,7 @@ class Distance(Criterion):
     """
 
     threshold: float = 0.05
-    unit: float = 1.0
+    unit: Unit = ANY
 
     name: ClassVar[str] = "distance"
     weight: ClassVar[float] = 0.0
@@ -103,8 +103,8 @@ class Distance(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Distance:
-        """Make the criterion; its warnings give lengths in the threshold's unit: the frame's or the input's."""
-        return cls(options.threshold, 1.0 if options.threshold_abs is None else solid.frame.scale)
+        """Make the criterion."""
+        return cls(options.threshold, solid.frame.unit)
 
     @property
     def reach(self) -> float:
@@ -140,7 +140,7 @@ class Distance(Criterion):
             sentence = f"There was no time to measure the {self.name} of the parts."
             return CriterionSummary({self.name: LengthFit(None, None, self.threshold)}, (sentence,))
         exceeding = [error for error in errors if error > self.threshold]
-        worst, threshold = told_apart(max(errors) / self.unit, self.threshold / self.unit)
+        worst, threshold = self.unit.apart(max(errors), self.threshold)
         exceed = f"{len(exceeding)} of {len(errors)} parts exceed the {self.name} {threshold}"
         warning = f"{exceed}; the worst has at most {worst}."
         found = LengthFit(tuple(errors), max(errors), self.threshold)

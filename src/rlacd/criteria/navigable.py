@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary
 from rlacd.errors import OptionError
-from rlacd.fit import Measured, SpaceFit
+from rlacd.fit import ANY, Measured, SpaceFit, Unit
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
@@ -80,6 +80,8 @@ class Navigable(Criterion):
         Sentences for the user.
     conflicts : Conflicts
         Changes that `settled` made to the balls.
+    unit : Unit
+        In which warnings tell lengths of the frame.
     hull : Hull or None
         The solid's hull, beyond which primitives may reach by the tolerance; without it there are none.
     """
@@ -91,6 +93,7 @@ class Navigable(Criterion):
     conflicts: Conflicts = Conflicts()
     hull: Hull | None = None
     allowance: float = 0.0
+    unit: Unit = ANY
 
     eliminates: ClassVar[bool] = True
     """Hulls are tested quickly against balls."""
@@ -151,7 +154,7 @@ class Navigable(Criterion):
         seeds = None
         if space.seeds is not None:
             seeds = solid.frame.to_frame(space.seeds)
-            _check_seeds(seeds, space.seeds, surface, planes, radius, scale)
+            _check_seeds(seeds, space.seeds, surface, planes, radius, solid.frame.unit)
         hull = Hull.of(solid.vertices)
         balls = NO_BALLS
         if radius >= 2:
@@ -167,7 +170,7 @@ class Navigable(Criterion):
             balls = Balls(
                 *_native.navigable_balls(surface, hull.body, *lengths, reachable, seeds, planes, pitch, threads)
             )
-        return cls(radius, tolerance, balls, tuple(warnings), hull=hull)
+        return cls(radius, tolerance, balls, tuple(warnings), hull=hull, unit=solid.frame.unit)
 
     @property
     def reach(self) -> float:
@@ -189,12 +192,13 @@ class Navigable(Criterion):
         if given_way:
             sentences.append(
                 f"No cut could keep the hulls off {given_way} balls, so {self.conflicts.shrunk} balls were shrunk and "
-                f"{self.conflicts.dropped} dropped; the largest loss of radius is {self.conflicts.most:.4g}."
+                f"{self.conflicts.dropped} dropped; the largest loss of radius is "
+                f"{self.unit.words(self.conflicts.most)}."
             )
         if errors is not None and exceeding:
             sentences.append(
                 f"{len(exceeding)} of {len(errors)} hulls reach into balls of the navigable space, "
-                f"up to {max(exceeding):.4g} deep."
+                f"up to {self.unit.words(max(exceeding))} deep."
             )
         found = Measured(None, None) if errors is None else Measured(tuple(errors), max(errors))
         space = SpaceFit(self.radius, self.tolerance, len(self.balls), **vars(self.conflicts), intrusion=found)
@@ -315,7 +319,7 @@ def _planes_in_frame(planes: Sequence[tuple[Point, float]], frame: Frame) -> Flo
 
 
 def _check_seeds(
-    seeds: FloatArray, given: ArrayLike, surface: _native.Surface, planes: FloatArray, radius: float, scale: float
+    seeds: FloatArray, given: ArrayLike, surface: _native.Surface, planes: FloatArray, radius: float, unit: Unit
 ) -> None:
     inside = surface.winding(seeds, accuracy=4.0) > 0.5
     distance = surface.distance(seeds)
@@ -325,11 +329,11 @@ def _check_seeds(
             raise OptionError(f"seed {i} at {seed.tolist()} lies inside the solid; put it where a ball can be.")
         if distance[i] < radius:
             raise OptionError(
-                f"seed {i} at {seed.tolist()} is {distance[i] / scale:.4g} away from the solid, which is less than the "
-                f"radius, {radius / scale:.4g}; put it where a ball has room."
+                f"seed {i} at {seed.tolist()} is {unit.words(distance[i])} away from the solid, which is less than "
+                f"the radius, {unit.words(radius)}; put it where a ball has room."
             )
         if above[i] < radius:
             raise OptionError(
-                f"seed {i} at {seed.tolist()} is nearer than the radius, {radius / scale:.4g}, to a closed plane or "
-                "beyond it; put it where a ball has room."
+                f"seed {i} at {seed.tolist()} is nearer than the radius, {unit.words(radius)}, to a closed plane "
+                "or beyond it; put it where a ball has room."
             )

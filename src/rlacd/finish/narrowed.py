@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rlacd import _native
 from rlacd.criteria.limited import LimitedCriterion, least_kept
 from rlacd.find_parts import Reached
+from rlacd.fit import Unit
 from rlacd.report import Passage
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, dots
@@ -108,32 +109,45 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[n
     squares = dots(ways, ways)
     near = np.argsort(squares, axis=1, kind="stable")[:, 1 : 1 + _NEIGHBOURS]
     pairs = np.stack([np.repeat(np.arange(len(balls)), near.shape[1]), near.ravel()])
-    joined = pairs[:, _have_a_way(balls, pairs, surface, threads)]
+    joined, blocked = pairs[:, _have_a_way(balls, pairs, surface, threads)], np.zeros(squares.shape, dtype=bool)
     while True:  # join passages whose nearest balls have a way between them, until none have
         passage = _native.components(len(balls), *joined)[1]
         pairs = np.array(np.nonzero(passage[:, None] < passage))
         pairs = pairs[:, np.argsort(squares[pairs[0], pairs[1]], kind="stable")]
         pairs = pairs[:, np.unique(passage[pairs[0]] * len(balls) + passage[pairs[1]], return_index=True)[1]]
+        pairs = pairs[:, ~blocked[pairs[0], pairs[1]]]
         meet = _have_a_way(balls, pairs, surface, threads)
         if not meet.any():
             return passage
+        blocked[pairs[0], pairs[1]] = ~meet
         joined = np.concatenate([joined, pairs[:, meet]], axis=1)
 
 
 def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface, threads: int) -> BoolArray:
-    """Whether, between each pair, a ball of half the larger radius goes straight and stays in the passage."""
-    larger, starts = balls.radii[pairs].max(axis=0), balls.centres[pairs[0]]
+    """Whether, between each pair, a ball of half the larger radius goes straight and stays in the passage.
+
+    Places on the way are looked at from the middle on: most ways are blocked, and not near their ends.
+    """
+    smaller, larger = np.sort(balls.radii[pairs], axis=0)
+    starts = balls.centres[pairs[0]]
     ways = balls.centres[pairs[1]] - starts
-    lengths, gone = np.sqrt(dots(ways, ways)), np.zeros(len(larger))
-    goes = gone < lengths
-    active = np.flatnonzero(goes)
-    while len(active):
-        at = starts[active] + (gone[active] / lengths[active])[:, None] * ways[active]
-        space = surface.distance(at, threads)
-        goes[active] = (space > larger[active] / 2) & (space < WIDER * larger[active])
-        gone[active] += larger[active] / 4
-        active = active[goes[active] & (gone[active] < lengths[active])]
+    lengths = np.sqrt(dots(ways, ways))
+    places = np.ceil(4 * lengths / larger).astype(np.int64)
+    goes: BoolArray = (places > 0) & (smaller > larger / 2)
+    depth = np.frexp(places)[1]  # of a tree of places, whose root is in the middle
+    for bits in np.unique(depth[goes]).tolist():
+        for place in _from_the_middle(bits):
+            active = np.flatnonzero(goes & (depth == bits) & (place < places))
+            at = starts[active] + (place * larger[active] / (4 * lengths[active]))[:, None] * ways[active]
+            space = surface.distance(at, threads)
+            goes[active] = (space > larger[active] / 2) & (space < WIDER * larger[active])
     return goes
+
+
+def _from_the_middle(bits: int) -> list[int]:
+    """The numbers of so many bits: the middle one, then those in the middle of each half, and so on; 0 last."""
+    strides = (1 << bit for bit in reversed(range(bits)))
+    return [*(place for stride in strides for place in range(stride, 1 << bits, 2 * stride)), 0]
 
 
 def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]:
@@ -148,17 +162,19 @@ def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]
         f"--keep-open, or a smaller {'threshold' if 'threshold' in options.numbers else 'tolerance'}, keeps more open"
     )
     return [
-        _narrows(lost, "" if found.is_every else "At least ", by, then)
+        _narrows(lost, "" if found.is_every else "At least ", by, then, reached.solid.frame.told_in)
         for lost, by, then in ((asked, "more than --keep-open allows", reason), (others, "over half", cure))
         if lost
     ]
 
 
-def _narrows(lost: list[Passage], at_least: str, share: str, then: str) -> str:
+def _narrows(lost: list[Passage], at_least: str, share: str, then: str, unit: Unit) -> str:
     closed = sum(one.left_abs == 0 for one in lost)
     lost = sorted(lost, key=lambda one: (one.left_abs / one.radius_abs, -one.radius_abs))
     each = ((", ".join(f"{x:.4g}" for x in one.at_abs), one) for one in lost[:MOST_NAMED])
-    named = [f"near ({at}) from a radius of {one.radius_abs:.4g} to {one.left_abs:.4g}" for at, one in each]
+    named = [
+        f"near ({at}) from a radius of {unit.words(one.radius_abs)} to {unit.words(one.left_abs)}" for at, one in each
+    ]
     more = "" if len(lost) <= MOST_NAMED else " and others (see `passages`)"
     return (
         f"{at_least}{len(lost)} passage{'s narrow' if len(lost) > 1 else ' narrows'} by {share}"

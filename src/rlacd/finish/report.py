@@ -17,7 +17,7 @@ from rlacd.criteria.avoided import FINEST_SHARE, warnings_of
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.finish.overlap import Seams
-from rlacd.fit import RESOLVED, length_unit, told_apart
+from rlacd.fit import RESOLVED
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
@@ -96,10 +96,10 @@ def make_report(
         missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
-        warnings += _shallow(seams, 2 * options.overlap / solid.frame.scale) if options.overlap > 0 else []
+        warnings += _shallow(seams, solid.frame.unit.words(2 * options.overlap)) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
         warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
-        warnings += warnings_of(entered, _why_entered(run)) if entered else []
+        warnings += warnings_of(entered, _why_entered(run), solid.frame.told_in) if entered else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return Report(
@@ -120,6 +120,7 @@ def make_report(
             search=reached.found,
             at_least=None if reached.found is None else min(reached.found.at_least, len(hulls)),
             warnings=tuple(warnings),
+            unit=solid.frame.told_in,
         )
 
 
@@ -159,14 +160,14 @@ def _overlap(seams: Seams | None, frame: Frame) -> Overlap:
     return Overlap(seams.count, len(short), tuple(short))
 
 
-def _shallow(seams: Seams | None, overlap_abs: float) -> list[str]:
+def _shallow(seams: Seams | None, overlap: str) -> list[str]:
     if seams is None:
         return ["There was no time to make hulls overlap."]
     if not seams.short:
         return []
     return [
-        f"{len(seams.short)} of {seams.count} seams between hulls overlap by less than {overlap_abs:.4g}: more would "
-        "break the criterion. A smaller overlap or a larger threshold helps."
+        f"{len(seams.short)} of {seams.count} seams between hulls overlap by less than {overlap}: more would break "
+        "the criterion. A smaller overlap or a larger threshold helps."
     ]
 
 
@@ -213,6 +214,7 @@ def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
         ),
         at_least=_sum_known([report.at_least for report in each]),
         warnings=tuple(f"{name}: {warning}" for name, report in reports for warning in report.warnings),
+        unit=first.unit,
     )
 
 
@@ -297,15 +299,15 @@ def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) ->
     return Missed(
         farthest,
         [
-            f"Faces that are only a point or an edge were left out: {corners} up to {farthest:.4g} outside the hulls "
-            f"(longest side = 2), farthest near {frame.place(points[distance.argmax()])}."
+            f"Faces that are only a point or an edge were left out: {corners} up to {frame.unit.words(farthest)} "
+            f"outside the hulls, farthest near {frame.place(points[distance.argmax()])}."
         ],
     )
 
 
 def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
     """How far hulls stick out because of limits on their vertices and triangles, where without them they would not."""
-    facets, limits, scale = reached.goal.of_facets, reached.options.hull_limits, reached.solid.frame.scale
+    facets, limits, unit = reached.goal.of_facets, reached.options.hull_limits, reached.solid.frame.unit
     if not math.isfinite(facets.outward_deviation):
         return []
     tight = [part for part in parts if part.exact and facets.is_met(part.with_hull(part.exact))]
@@ -314,9 +316,9 @@ def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
         return []
     counts = zip(limits, ("vertices", "triangles"), strict=True)
     most = " and ".join(f"{limit} {what}" for limit, what in counts if limit is not None)
-    farthest, allowed = told_apart(max(beyond) / scale, facets.outward_deviation / scale)
+    farthest, allowed = unit.apart(max(beyond), facets.outward_deviation)
     return [
-        f"{_hulls(len(beyond), 'sticks', 'stick')} out by up to {farthest}, more than {allowed} (in the input's unit): "
+        f"{_hulls(len(beyond), 'sticks', 'stick')} out by up to {farthest}, more than {allowed}: "
         f"with at most {most} they cannot fit closer unless there are many more."
     ]
 
@@ -325,16 +327,18 @@ def _unmeasured(solid: Solid) -> list[str]:
     sentences = ["There was no time to measure how far hulls and input are apart."]
     moved = max((body.deviation for body in solid.bodies), default=0.0)
     if moved > COVERAGE_TOLERANCE:
-        sentences.append(f"Some of the input's surface may lie {moved:.4g} from the hulls: repair moved it that far.")
+        far = solid.frame.unit.words(moved)
+        sentences.append(f"Some of the input's surface may lie {far} from the hulls: repair moved it that far.")
     return sentences
 
 
 def _coarse(solid: Solid) -> list[str]:
     if solid.frame.resolution <= COVERAGE_TOLERANCE / 2:
         return []
+    finest = solid.frame.unit.words(solid.frame.resolution)
     return [
-        f"So far from the origin, coordinates cannot resolve lengths below {solid.frame.resolution:.2g} (the longest "
-        "side is 2), so hulls thinner than that are made thicker: move the mesh to the origin."
+        f"So far from the origin, coordinates cannot resolve lengths below {finest}, so hulls thinner "
+        "than that are made thicker: move the mesh to the origin."
     ]
 
 
@@ -344,8 +348,9 @@ def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
     beyond = max(float(max((lower - hull.box[0]).max(), (hull.box[1] - upper).max())) for hull in hulls)
     if beyond <= COVERAGE_TOLERANCE:
         return []
+    out = solid.frame.unit.words(beyond)
     return [
-        f"The hulls extend up to {beyond:.4g} outside the solid's bounding box, where a ball may go: the limits on "
+        f"The hulls extend up to {out} outside the solid's bounding box, where a ball may go: the limits on "
         "vertices or faces allow no tighter ones."
     ]
 
@@ -372,8 +377,7 @@ def _early_end(run: Run) -> list[str]:
 
 def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
     """Say what hulls miss, and how far they reach out unless the criterion has reported that (`exceeds`)."""
-    options, scale = reached.options, reached.solid.frame.scale
-    unit, in_words = length_unit(vars(options), scale)
+    options, unit = reached.options, reached.solid.frame.unit
     sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
@@ -381,14 +385,14 @@ def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: 
         sentences.append(f"Nothing was searched: only uniting parts leads to as few hulls as {options.max_hulls}.")
     if distances is not None and distances.under > COVERAGE_TOLERANCE:
         sentences.append(
-            f"Some of the input's surface lies up to {distances.under / unit:.4g} ({in_words}) outside the hulls, "
+            f"Some of the input's surface lies up to {unit.words(distances.under)} outside the hulls, "
             f"farthest near {distances.under_at}: repair dropped what it could not make solid (see `deviation` in "
             "`repair`)."
         )
     sentences += distances.left_out.said if distances is not None else []
     if distances is not None and not exceeds and distances.over > reached.goal.outward_deviation + COVERAGE_TOLERANCE:
         sentences.append(
-            f"The hulls reach {distances.over / unit:.4g} ({in_words}) beyond the input's surface, more than the "
+            f"The hulls reach {unit.words(distances.over)} beyond the input's surface, more than the "
             f"threshold, farthest near {distances.over_at}: {_why_beyond(reached.solid, options)}."
         )
     return sentences

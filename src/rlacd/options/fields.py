@@ -335,7 +335,7 @@ def relative(name: str, length: float, scale: float, bounds: tuple[float, float]
     side = LONGEST_SIDE[name]
     number, (least, most) = length * scale * side / 2, bounds
     if not least <= number <= most:
-        unit, percent = scale * side / 2, f"{100 * least / side:g} % and {100 * most / side:g} % of its longest side"
-        given = f"{name}_abs (--{name.replace('_', '-')} as a length) is {length!r}; for this object it has to be"
-        raise OptionError(f"{given} between {least / unit:.4g} and {most / unit:.4g} ({percent}).")
+        given = f"{name}_abs (--{name.replace('_', '-')} as a length) is {100 * number / side:.3g} % of this object's"
+        allowed = f"between {100 * least / side:g} % and {100 * most / side:g} %"
+        raise OptionError(f"{given} longest side; it has to be {allowed}.")
     return number

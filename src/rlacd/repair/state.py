@@ -84,6 +84,7 @@ class State:
     ----------
     surface : SurfaceQuery
         The input.
+    frame : Frame
     wanted : Wanted
     bodies : int
     body_of_input : int64 [F]
@@ -111,7 +112,7 @@ class State:
     """
 
     def __init__(self, surface: SurfaceQuery, frame: Frame, wanted: Wanted) -> None:
-        self.surface, self.wanted, self._frame = surface, wanted, frame
+        self.surface, self.wanted, self.frame = surface, wanted, frame
         edges = Edges.of(surface.faces, len(surface.vertices))
         faces, origin = close_cracks(surface.vertices, surface.faces, edges, _WELDS)
         if faces is not surface.faces:
@@ -197,7 +198,7 @@ class State:
         return Solid(
             self.solid,
             (self.surface.vertices, self.surface.faces.astype(np.int32)),
-            self._frame,
+            self.frame,
             tuple(BodyRepair(i, OUTCOMES[step], *row) for i, (step, *row) in enumerate(rows)),
             (*warnings, *self.warnings),
             holes=tuple(self.holes),
@@ -212,10 +213,10 @@ class State:
         """Say which cavities were filled, unless that changes nothing but crevices between walls that nearly touch."""
         if self.cavities.walls is None or -volume_of(self.cavities.walls) < _CREVICES * self.volume:
             return
-        volume = -mass_of(*self.cavities.walls, self._frame).volume_abs
+        volume = self.frame.told_in.cubic_words(-mass_of(*self.cavities.walls, self.frame).volume_abs)
         said = "1 closed cavity was" if self.cavities.count == 1 else f"{self.cavities.count} closed cavities were"
         self.warnings.append(
-            f"{said} filled, as nothing can get in (volume {volume:.4g}, which the mass leaves out); --keep-cavities "
+            f"{said} filled, as nothing can get in (volume {volume}, which the mass leaves out); --keep-cavities "
             "(keep_cavities=True) keeps what is closed empty."
         )
 
@@ -225,8 +226,8 @@ class State:
         if any(hole.depth for hole in self.holes):
             depth = max(hole.depth for hole in self.holes)
             self.warnings.append(
-                f"Holes were closed although the caps lead up to {depth:.3f} (longest side = 2) away from the surface,"
-                f" at {self._places([hole for hole in self.holes if hole.is_closed])}."
+                f"Holes were closed although the caps lead up to {self.frame.unit.words(depth)} away from the surface, "
+                f"at {self._places([hole for hole in self.holes if hole.is_closed])}."
             )
         is_thin = self.has("slab")
         is_thin[[part.body for part in self.parts if not part.is_slab]] = False  # only fins of it are
@@ -244,7 +245,7 @@ class State:
         return named + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
 
     def _place(self, point: ArrayLike, body: int) -> str:
-        return self._frame.place(point, body if self.bodies > 1 else None)
+        return self.frame.place(point, body if self.bodies > 1 else None)
 
 
 def measure(state: State) -> Int64Array:

@@ -104,7 +104,7 @@ def wrap_all(state: State) -> None:
     state.parts = [Piece(state.solid, 0)]
     state.warnings.append(
         "The surface crosses itself too often to be united exactly, so the solid is what a ball of radius "
-        f"{gap:g} (longest side = 2) cannot reach from outside."
+        f"{state.frame.unit.words(gap)} cannot reach from outside."
     )
 
 

@@ -50,7 +50,7 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
     """
     with run.shielded():
         used = compacted(mesh.vertices, mesh.faces)[0] if len(mesh.faces) else mesh.vertices
-        frame = Frame.of(used)
+        frame = Frame.of(used, mesh.unit)
         vertices = frame.to_frame(mesh.vertices)
         faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
         bodies = _bodies(vertices, faces) if len(faces) else [frame.to_frame(used)]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rlacd import _native
+from rlacd.fit import ANY, Unit
 from rlacd.solid.arrays import FloatArray, heights
 
 SMALLEST = 1e-300
@@ -42,22 +43,30 @@ class Frame:
         ``[3]``, the centre of the input's bounding box, in the input's unit.
     scale
         Frame units per input unit: 2 divided by the longest side of the box, 1 when the box is a single point.
+    told_in
+        The unit in which lengths are told.
     """
 
     center: FloatArray
     scale: float
+    told_in: Unit = ANY
 
     @classmethod
-    def of(cls, points: ArrayLike) -> Frame:
+    def of(cls, points: ArrayLike, told_in: Unit = ANY) -> Frame:
         """Return the frame of finite points ``[N, 3]``; without points, the identity."""
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         if len(points) == 0:
-            return cls(np.zeros(3), 1.0)
+            return cls(np.zeros(3), 1.0, told_in)
         lower, upper = points.min(axis=0), points.max(axis=0)
         # Halve before adding: the sum of two coordinates near 1e308 would overflow.
         center = lower / 2 + upper / 2
         half = float((upper / 2 - lower / 2).max())
-        return cls(center, 1.0 / max(half, SMALLEST) if half > 0 else 1.0)
+        return cls(center, 1.0 / max(half, SMALLEST) if half > 0 else 1.0, told_in)
+
+    @property
+    def unit(self) -> Unit:
+        """The unit in which lengths are told, for lengths in the frame."""
+        return self.told_in.scaled(self.scale)
 
     @property
     def resolution(self) -> float:

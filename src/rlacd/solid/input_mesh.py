@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rlacd.fit import Unit
 from rlacd.options.output import Axis
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.topology import compacted
@@ -16,9 +17,6 @@ from rlacd.solid.topology import compacted
 def no_points() -> FloatArray:
     """An array of no points."""
     return np.empty((0, 3))
-
-
-_UNITS = {1e-6: "µm", 1e-3: "mm", 1e-2: "cm", 1.0: "m", 0.0254: "in", 0.3048: "ft"}
 
 
 @dataclass(frozen=True)
@@ -96,6 +94,8 @@ class InputMesh:
         ``[N, 3]``, where faces were that are a single point: they were left out.
     deviation
         How far the triangles may be from the curved surfaces that the input describes; None if it holds triangles.
+    told_in
+        The unit in which lengths are told; None for the input's own.
     """
 
     vertices: FloatArray
@@ -111,11 +111,12 @@ class InputMesh:
     left_out: tuple[SourceNode, ...] = ()
     specks: FloatArray = field(default_factory=no_points)
     deviation: float | None = None
+    told_in: Unit | None = None
 
     @property
-    def unit(self) -> str:
-        """The short name of the unit of length; empty if the input does not say it, or if it has none."""
-        return "" if self.metres is None else _UNITS.get(self.metres, "")
+    def unit(self) -> Unit:
+        """The unit in which lengths are told."""
+        return Unit.of(self.metres) if self.told_in is None else self.told_in
 
     def scaled(self, factor: float) -> InputMesh:
         """Multiply all coordinates."""

@@ -72,8 +72,6 @@ class Subject:
     """Shown on the page."""
     up: str
     """The axis that points up."""
-    unit: str
-    """The unit of length if the format defines one; else empty."""
     mesh: InputMesh
     """The mesh as first read."""
     up_is_guess: bool = False
@@ -93,7 +91,7 @@ def read_subject(mesh: str | os.PathLike[str], up: str | None = None) -> Subject
     read = load_mesh(mesh)
     guess = up is None and Path(mesh).suffix.lower() in SAY_NOTHING
     axis = up or (guessed_up(read) if guess else read.up)
-    return Subject(Path(mesh), Path(read.name).stem, axis, read.unit, read, up_is_guess=guess)
+    return Subject(Path(mesh), Path(read.name).stem, axis, read, up_is_guess=guess)
 
 
 SAY_NOTHING = (".obj", ".stl", ".ply", ".off", ".xyz")

@@ -35,10 +35,9 @@ def save_report_page(
 def report_page(decomposition: Result, *, up: str | None = None, picture: bool = True) -> str:
     """Build the text of the report; see `save_report_page`."""
     up = decomposition.up_axis(up)
-    unit = "" if decomposition.input is None else decomposition.input.unit
     # The heat map gets that many triangles, up to a few times as many: about half a megabyte.
     heat = heat_scene(heat_map(decomposition, triangles=16_000))
-    data: dict[str, Any] = {**scene(decomposition, up, unit=unit), "heat": heat}
+    data: dict[str, Any] = {**scene(decomposition, up), "heat": heat}
     if picture:
         try:
             png = picture_bytes(decomposition, width=1500, up=up, clear=True)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rlacd.fit import Unit
 from rlacd.result import Result
 from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
@@ -20,7 +21,7 @@ from rlacd.view.picture import disjoint
 from rlacd.view.robot import RobotResult, robot_scene
 
 
-def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, Any]:
+def scene(decomposition: Result, up: str = "z") -> dict[str, Any]:
     """Describe a decomposition for the page.
 
     Parameters
@@ -28,13 +29,12 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
     decomposition : Result
     up : {"x", "y", "z"}
         The axis of the input that points up.
-    unit : str
-        The input's unit of length, such as ``m``; empty if unknown.
 
     Returns
     -------
     dict
-        ``name``; ``up``; ``unit``; ``scale``, frame units per unit of the input; the unchanged ``report``; ``input``, a
+        ``name``; ``up``; ``unit``, the ``name`` and ``length`` in the frame of the unit in which lengths are told;
+        ``scale``, frame units per unit of the input; the unchanged ``report``; ``input``, a
         list of ``{vertices, faces}``: of each link of a robot, else one, or none for a cloud of points; ``parts``, a
         list of ``{vertices, faces, color, rank, error, volume, primitive, link}`` with ``rank`` the index of the hue,
         ``error`` the criterion's measurement (or None), ``volume`` in the normalised frame, ``primitive`` its kind (or
@@ -54,7 +54,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
         centres, radii = frame.to_frame(some.centres[:shown]), some.radii[:shown] * frame.scale
         balls = {"centres": floats(centres), "radii": floats(radii), "shown": shown, "of": len(decomposition.balls)}
     robot = decomposition if isinstance(decomposition, RobotResult) else None
-    bare = input_scene(decomposition.name, source.vertices, source.faces, up, unit=unit, frame=frame)
+    bare = input_scene(decomposition.name, source.vertices, source.faces, up, report.unit, frame)
     links: list[int] | list[None] = [None] * len(rgb) if robot is None else [*robot.link_of]
     return {
         **bare,
@@ -78,7 +78,7 @@ def scene(decomposition: Result, up: str = "z", *, unit: str = "") -> dict[str, 
 
 
 def input_scene(
-    name: str, vertices: ArrayLike, faces: ArrayLike, up: str = "z", *, unit: str = "", frame: Frame | None = None
+    name: str, vertices: ArrayLike, faces: ArrayLike, up: str, unit: Unit, frame: Frame | None = None
 ) -> dict[str, Any]:
     """Describe an input without hulls yet: as `scene`, without parts or report."""
     points, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
@@ -86,7 +86,7 @@ def input_scene(
     return {
         "name": name,
         "up": up,
-        "unit": unit,
+        "unit": {"name": unit.name, "length": unit.scaled(frame.scale).length_abs},
         "scale": frame.scale,
         "report": None,
         "input": [_mesh(frame.to_frame(points), corners)] if len(corners) else [],

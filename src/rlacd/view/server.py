@@ -174,9 +174,9 @@ class ViewServer(ThreadingHTTPServer):
         guess = {"upIsGuess": subject.up_is_guess}
         if result is None:
             mesh = subject.mesh
-            bare = input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, unit=subject.unit)
+            bare = input_scene(subject.name, mesh.vertices, mesh.faces, subject.up, mesh.unit)
             return to_json(bare | guess, indent=None).encode()
-        return self.once("scene", result[0], lambda: scene(result[1], subject.up, unit=subject.unit) | guess)
+        return self.once("scene", result[0], lambda: scene(result[1], subject.up) | guess)
 
     def once(self, what: str, version: int, make: Callable[[], dict[str, Any]]) -> bytes:
         """Return values as JSON; computed once per version."""

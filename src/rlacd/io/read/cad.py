@@ -57,8 +57,8 @@ def read_cad(path: Path, content: bytes, fineness: Fineness) -> Contents:
     deviation, sought = answer.values["deviation"], answer.values["sought"]
     if deviation > sought:
         said.append(
-            f"the triangles of {path.name} are up to {deviation:.4g} m from its surfaces, more than a tenth of the "
-            f"threshold: {sought:.4g} m would take over {MOST_OF_CAD} of them"
+            f"the triangles of {path.name} are up to {deviation / sought:.3g} times as far from its surfaces as a "
+            f"tenth of the threshold: nearer ones would be over {MOST_OF_CAD}"
         )
     return contents._replace(warnings=(*contents.warnings, *said), up="z", deviation=deviation)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -25,9 +24,10 @@ from rlacd.clear import (
     link_pairs,
     warnings_of,
 )
-from rlacd.decompose_mesh import decompose
+from rlacd.decompose_mesh import decompose_in
 from rlacd.decomposition import Decomposition
-from rlacd.errors import DecompositionWarning, MeshError, MissingExtraError, OptionError
+from rlacd.errors import MeshError, MissingExtraError, OptionError
+from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
 from rlacd.options import LENGTHS, Options
 from rlacd.options.fields import LONGEST_SIDE, shown
@@ -110,7 +110,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         tell(LINK + body.name, number)
         for collider in body.colliders:
             if (key := (collider.key, own.get("threshold_abs"))) not in done:
-                done[key] = decomposed(body, collider, own)
+                done[key] = decomposed(body, collider, own, robot.unit)
             results[collider] = done[key]
     if robot.is_alone:
         return Checked(results)
@@ -119,7 +119,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
         tell(LINK + bodies[number].name, number)
-        again = results | _clear_of(obstacles, bodies[number], results, each[number])
+        again = results | _clear_of(obstacles, bodies[number], results, each[number], robot.unit)
         hulls = _moving(bodies[number], again).hulls
         if len(hulls) > most:
             return None
@@ -134,7 +134,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         if asked.exclude or asked.srdf:
             raise
         return Checked(results, [f"Links were not checked against each other: {error}"])
-    found = warnings_of(cleared, motion, robot.in_mm)
+    found = warnings_of(cleared, motion, robot.unit.words)
     more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
     ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in motion.warnings]
     return Checked(results, [*said, *ranges, *found[:MOST_SAID], *more], motion, cleared)
@@ -191,13 +191,11 @@ def _relative_to_robot(options: Mapping[str, Any], robot: Robot) -> dict[str, An
     return given
 
 
-def decomposed(body: Body, collider: Collider, options: Mapping[str, Any]) -> Decomposition:
-    """Decompose one collider of a body, with lengths that are larger than it cut to it."""
+def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit: Unit) -> Decomposition:
+    """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DecompositionWarning)  # they are told of links, and once for all of a kind
-            return decompose((mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
+        return decompose_in(unit, (mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
@@ -235,7 +233,7 @@ def _moving(body: Body, results: Results) -> Moving:
 
 
 def _clear_of(
-    obstacles: Sequence[Obstacle], body: Body, results: Results, options: Mapping[str, Any]
+    obstacles: Sequence[Obstacle], body: Body, results: Results, options: Mapping[str, Any], unit: Unit
 ) -> dict[Collider, Decomposition]:
     """Decompose the colliders of a body again that come near obstacles."""
     again = {}
@@ -244,7 +242,7 @@ def _clear_of(
         placed = [Obstacle(o.name, moved(back, o.vertices), o.faces, o.margin, is_told=False) for o in obstacles]
         near = [obstacle for obstacle in placed if _is_near(obstacle, results[collider])]
         if near:
-            again[collider] = decomposed(body, collider, {**options, "avoid": near})
+            again[collider] = decomposed(body, collider, {**options, "avoid": near}, unit)
     return again
 
 

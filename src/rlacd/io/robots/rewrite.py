@@ -7,11 +7,12 @@ import os
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
+from rlacd.fit import Unit
 from rlacd.io.robots.decomposed import check_options, decomposed_robot
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
 from rlacd.io.robots.rewritten import Rewritten, rewritten
@@ -76,6 +77,26 @@ def rewrite_robot(
     DecompositionWarning
         What ``warnings`` of the result says, once a call.
     """
+    done = rewrite_in(
+        None, robot, output, package_dirs=package_dirs, keep_input=keep_input, progress=progress, **options
+    )
+    if done.warnings:
+        said = f"{os.path.basename(robot)}: {' '.join(done.warnings)}"
+        warnings.warn(said, DecompositionWarning, stacklevel=2)
+    return done
+
+
+def rewrite_in(
+    told_in: Unit | None,
+    robot: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    *,
+    package_dirs: Sequence[str] = (),
+    keep_input: bool = False,
+    progress: ProgressCallback | None = None,
+    **options: Any,
+) -> Rewritten:
+    """Rewrite as `rewrite_robot` does, but warn of nothing, and tell lengths in a unit; None for the robot's own."""
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     check_names("rewrite_robot", options, inspect.signature(rewrite_robot).parameters, ELSEWHERE)
     own = {field.name for field in fields(RobotOptions)}
@@ -85,11 +106,8 @@ def rewrite_robot(
     check_places(source, place, asked, keep_input=keep_input)
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     began = time.perf_counter()
-    description = read_robot(source, packages, apart=asked.per == "mesh")
-    done = rewrite(description, place, options, asked, keep_input=keep_input, began=began)
-    if done.warnings:
-        warnings.warn(f"{source.name}: {' '.join(done.warnings)}", DecompositionWarning, stacklevel=2)
-    return done
+    description = replace(read_robot(source, packages, apart=asked.per == "mesh"), told_in=told_in)
+    return rewrite(description, place, options, asked, keep_input=keep_input, began=began)
 
 
 def rewrite(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,9 +14,11 @@ import trimesh
 from rlacd.clear import LinkPair
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError
+from rlacd.fit import ANY, Unit
 from rlacd.io.robots.decomposed import Checked
 from rlacd.io.robots.robot import Body, Collider, Results, Robot, Written
 from rlacd.plain_json import as_plain
+from rlacd.report import kind_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,8 @@ class Rewritten:
     """The longest side of the box around all meshes that were replaced, with all joints at zero."""
     metres: float = 1.0
     """The robot's unit of length."""
+    unit: Unit = ANY
+    """In which lengths are told."""
     pairs: Sequence[LinkPair] = ()
     """What each two of the links do at the joint positions that were looked at; empty if none were."""
     samples: int = 0
@@ -131,7 +134,9 @@ def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began:
     said = [] if links else [f"{robot.source} has no collision mesh, so this is a copy."]
     said += [*robot.warnings, *written.warnings, *warnings_of(robot, done.results), *done.warnings]
     seconds, of_links = time.perf_counter() - began, (done.pairs, done.samples)
-    return Rewritten(place, written.folder, links, said, seconds, robot.size, robot.metres, *of_links, (robot, done))
+    return Rewritten(
+        place, written.folder, links, said, seconds, robot.size, robot.metres, robot.unit, *of_links, (robot, done)
+    )
 
 
 def warnings_of(robot: Robot, results: Results) -> list[str]:
@@ -149,9 +154,8 @@ def warnings_of(robot: Robot, results: Results) -> list[str]:
         links = name if len(far) == 1 else f"{len(far)} solids, the worst {name},"
         many = sum(count for _, _, count, _ in far)
         hulls = "1 hull of" if many == 1 else f"{many} hulls of"
-        said.append(
-            f"{hulls} {links} exceed the tolerance of {robot.in_mm(asked)}, by up to {robot.in_mm(worst - asked)}."
-        )
+        allowed, by = robot.unit.words(asked), robot.unit.words(worst - asked)
+        said.append(f"{hulls} {links} exceed the tolerance of {allowed}, by up to {by}.")
     return said
 
 
@@ -168,19 +172,13 @@ def grouped(warnings: Sequence[tuple[str, str, float]]) -> list[str]:
     """One sentence for all warnings of a kind: the worst, by what it is about, what it says, and how bad that is."""
     kinds: dict[str, list[tuple[str, str, float]]] = {}
     for one in warnings:
-        kinds.setdefault(_kind(one[1]), []).append(one)
+        kinds.setdefault(kind_of(one[1]), []).append(one)
     sentences = []
     for each in kinds.values():
         name, said, _ = max(each, key=lambda one: one[2])
         others = {1: "", 2: " and 1 other"}.get(len(each), f" and {len(each) - 1} others")
         sentences.append(f"{name}{others}: {said}")
     return sentences
-
-
-def _kind(warning: str) -> str:
-    """The first words of a sentence without numbers and plurals."""
-    words = [word.rstrip("s") for word in re.findall(r"[a-z]+", warning.lower()) if len(word) > 3]
-    return " ".join(words[:4])
 
 
 def _widest(result: Decomposition) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -20,6 +20,7 @@ import trimesh
 from rlacd.clear import LinkPair, Motion
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
+from rlacd.fit import Unit
 from rlacd.options.output import Axis
 from rlacd.options.robots import RobotOptions
 from rlacd.solid.arrays import FloatArray, Int64Array
@@ -149,6 +150,7 @@ class Robot(ABC):
     warnings: list[str]  # what of it is left unchanged, and why
     metres: float  # its unit of length
     up: Axis
+    told_in: Unit | None = field(default=None, kw_only=True)  # the unit in which lengths are told; None for its own
 
     @abstractmethod
     def motion(self, samples: int, seed: int) -> Motion:
@@ -184,9 +186,10 @@ class Robot(ABC):
         used = [used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh in moving]
         return float(np.ptp(np.concatenate(used), axis=0).max()) if used else 0.0
 
-    def in_mm(self, length: float) -> str:
-        """A length in words."""
-        return f"{1000 * self.metres * length:.3g} mm"
+    @property
+    def unit(self) -> Unit:
+        """The unit in which lengths are told."""
+        return Unit.of(self.metres) if self.told_in is None else self.told_in
 
 
 def colliders(body: str, uses: Sequence[tuple[Hashable | None, PlacedMesh, Found]]) -> dict[Collider, list[Found]]:

@@ -49,7 +49,7 @@ def read_viewed(path: Path, up: str | None = None, package_dirs: Sequence[str] =
     if not robot.bodies:
         raise MeshFileError(f"{path} has no collision mesh, so there is nothing to show.")
     mesh = _whole(robot, robot.meshes(), robot.warnings)
-    return Subject(path, path.stem, up or robot.up, mesh.unit, mesh, is_robot=True)
+    return Subject(path, path.stem, up or robot.up, mesh, is_robot=True)
 
 
 def decompose_viewed(mesh: Path, *, package_dirs: Sequence[str] = (), **options: Any) -> Result:
@@ -110,7 +110,7 @@ def _contacts(robot: Robot, cleared: Cleared, motion: Motion, values: list[float
 
 
 def _deep(robot: Robot, depth: float) -> str:
-    return f"{robot.in_mm(depth)} deep, though their meshes do not" if depth else "as their meshes do"
+    return f"{robot.unit.words(depth)} deep, though their meshes do not" if depth else "as their meshes do"
 
 
 def _places(robot: Robot, done: Checked, motion: Motion) -> list[Place]:

@@ -136,7 +136,7 @@ def hollow(result: Result) -> str | None:
     sheets = sum(body.faces_in for body in bodies if body.step == SHEET)
     if 2 * sheets <= sum(body.faces_in for body in bodies):
         return None
-    walls = f"walls {2 * HALF_THICKNESS / result.report.scale:.3g} thick"
+    walls = f"walls {result.report.unit_in_frame.words(2 * HALF_THICKNESS)} thick"
     return f"{result.name} is a hollow shell of open sheets, weighed as {walls}: mass= (--mass) sets its mass."
 
 

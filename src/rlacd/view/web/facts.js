@@ -96,7 +96,7 @@ export function warnings(report) {
   return (report.warnings ?? []).map((text) => make("p", { class: "warning" }, text));
 }
 
-/** How well the hulls fit: lengths in the input's unit, and as shares of its longest side. */
+/** How well the hulls fit: lengths in the scene's unit, and as shares of its longest side. */
 export function fitTable(report, scene) {
   const rows = [];
   const add = (name, value, hint) => {

@@ -111,10 +111,10 @@ function measureView(pixels) {
   const bar = at("scalebar");
   bar.hidden = !shown;
   if (!shown) return;
-  const unit = pixels * shown.scale; // pixels to a unit of the file
+  const unit = pixels * shown.unit.length; // pixels to a unit
   const length = roundLength(140 / unit);
   bar.querySelector("i").style.width = `${length * unit}px`;
-  bar.querySelector("span").textContent = measure(length * shown.scale, shown);
+  bar.querySelector("span").textContent = measure(length * shown.unit.length, shown);
 }
 
 function picture({ picture: address, note }) {

@@ -53,8 +53,11 @@ export const digits = (value, count = 3) =>
 export const column = (value, count = 2) =>
   value === 0 || Math.abs(value) < 1e-4 ? digits(value) : Math.abs(value) >= 10 ** count ? value.toFixed(0) : value.toPrecision(count);
 
-/** A length of the frame in the input's unit, in plain words: "0.0226 m", or "0.0226 units" where the file does not say which. */
-export const measure = (value, { scale, unit }, count = 3) =>
-  value == null ? "–" : `${value / scale < 1e-4 && value > 0 ? (value / scale).toExponential(1) : digits(value / scale, count)}\u00a0${unit || "units"}`;
+/** A length of the frame in plain words, in the unit of a scene: "0.0226 m", or "0.0226 units" where the file does not say which. */
+export function measure(value, { unit }, count = 3) {
+  if (value == null) return "–";
+  const told = value / unit.length;
+  return `${told < 1e-4 && told > 0 ? told.toExponential(1) : digits(told, count)}\u00a0${unit.name}`;
+}
 
 export const plural = (count, word) => `${count.toLocaleString("en")} ${word}${count === 1 ? "" : "s"}`;
