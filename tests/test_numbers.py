@@ -32,7 +32,7 @@ from rlacd.pool import ProcessLimits
 from rlacd.pool.on_ray import MACHINES
 from rlacd.repair import distance, holes, state, wraps
 from rlacd.report import Report
-from rlacd.search.search import LEAST_WORK, MOST_WORK, PATIENCE, TIMES_FIRST_PASS
+from rlacd.search.levels import LEAST_WORK, MOST_WORK, PATIENCE, TIMES_FIRST_PASS
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.passages import FACES

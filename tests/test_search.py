@@ -24,9 +24,9 @@ from rlacd.merge import merge_parts
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
+from rlacd.search.levels import search
 from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
 from rlacd.search.operators import Exchange, give, redistribute
-from rlacd.search.search import search
 from rlacd.solid.component import Component, Part, Plane, reunite
 from tests.hulls import assert_same_hulls
 from tests.shapes import bent_bar, box, depth_outside, own_volume, stacks, strangers, together, trimesh_of
@@ -234,7 +234,7 @@ def test_cancelling_a_search_keeps_what_it_has_reached(corpus: Path) -> None:
 
 @pytest.mark.nightly
 def test_time_does_not_make_the_best_level_worse_than_balanced(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = import_module("rlacd.search.search")  # as an attribute, that name is the function
+    module = import_module("rlacd.search.levels")  # as an attribute, that name is the function
     monkeypatch.setattr(module, "BEST_SECONDS", 0.01)
     balanced, best = (rlacd.decompose(corpus / SHAPES[0], quality=quality) for quality in ("balanced", "best"))
     assert len(best) <= len(balanced)
