@@ -23,9 +23,11 @@ from click.testing import CliRunner
 
 from rlacd.cli.main import app
 from rlacd.errors import OptionError, TrainingError, WeightsError
-from rlacd.learn.meshes import Solids
+from rlacd.learn.meshes import Solids, list_once
 from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
 from rlacd.policies import make_policy
+from rlacd.policies.network import KIND, load_network
+from rlacd.policies.plane_features import FEATURES
 from rlacd.pool import Answer, Pool, Request, WorkerDiedError
 from rlacd.pool.local import InProcessPool, LocalPool
 from rlacd.solid.arrays import Float32Array
@@ -415,10 +417,33 @@ def test_damaged_checkpoints_and_folders_without_meshes_are_reported(meshes: Pat
     with pytest.raises(TrainingError, match="is damaged"):
         run(meshes, tmp_path / "run", resume=True, validation=0)
     (tmp_path / "empty").mkdir()
-    with pytest.raises(TrainingError, match="holds 0 meshes"):
+    with pytest.raises(TrainingError, match="holds no meshes to learn on"):
         run(tmp_path / "empty", tmp_path / "other")
     with pytest.raises(TrainingError, match="there is no folder"):
         run(tmp_path / "nowhere", tmp_path / "another")
+
+
+def test_a_maker_is_held_out_and_small_folders_are_learned_from(meshes: Path, tmp_path: Path) -> None:
+    def split(name: str, *how: Any) -> tuple[set[str], set[str]]:
+        found = list_once(meshes, tmp_path / name, *how)
+        assert json.loads((tmp_path / name / "meshes.json").read_text())["unreadable"] == 1
+        return set(found.training), set(found.validation)
+
+    every = {path.relative_to(meshes).as_posix() for path in meshes.rglob("*.ply")} - {"broken.ply"}
+    assert split("maker", 500, 16, "deeper", 0) == (every - {"deeper/table.ply"}, {"deeper/table.ply"})
+    learned, held_out = split("all", 500, 16, "", 0)
+    assert (learned | held_out, len(held_out)) == (every, len(every) // 2)
+    for folder in ("deep", "nowhere"):
+        with pytest.raises(TrainingError, match=f"holds no meshes in {folder} to hold out"):
+            split(folder, 500, 16, folder, 0)
+
+
+def test_a_policy_that_is_written_again_is_read_again(meshes: Path, tmp_path: Path) -> None:
+    one, other = (run(meshes, tmp_path / str(seed), seed=seed, validation=0, env_steps=40) for seed in (0, 1))
+    read = load_network(one, KIND, FEATURES, 1)
+    assert load_network(one, KIND, FEATURES, 1) is read
+    shutil.copy(other, one)
+    assert load_network(one, KIND, FEATURES, 1).to_bytes() == other.read_bytes() != read.to_bytes()
 
 
 def test_another_folder_of_meshes_is_refused_at_once_and_does_no_harm(meshes: Path, tmp_path: Path) -> None:

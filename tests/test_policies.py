@@ -13,6 +13,7 @@ from typing import Any
 import manifold3d
 import numpy as np
 import pytest
+from benchmarks.learned.compare import policy_of
 from manifold3d import Manifold
 
 import rlacd
@@ -24,8 +25,8 @@ from rlacd.planes.candidates import reflex_edge_planes
 from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import make_policy
 from rlacd.policies.greedy import Greedy, RandomShortlist, excess_norm, hull_sum, paper_planes_and_edges
-from rlacd.policies.learned import PROMISING
-from rlacd.policies.network import KIND, QPolicy, load_network
+from rlacd.policies.learned import NAMES, PROMISING
+from rlacd.policies.network import KIND, QPolicy, load_network, parse_network
 from rlacd.policies.plane_features import FEATURES, PLANES, sweep_features
 from rlacd.solid.component import Component
 from tests.hulls import assert_same_hulls
@@ -87,6 +88,17 @@ def test_the_shipped_policy_takes_one_of_greedys_best_planes_and_ignores_what_wa
     policy = make_policy("learned", scale=0.01)
     policy.choose(component.cut(chosen)[0])
     assert policy.choose(rlacd.Component(hollow_table())) == chosen
+
+
+def test_the_comparison_takes_networks_of_a_folder(tmp_path: Path) -> None:
+    component, chosen = rlacd.Component(hollow_table()), {}
+    for sign in (1, -1):
+        for name in NAMES:
+            network = parse_network((files("rlacd.policies") / name).read_bytes())
+            network.layers[-1] = tuple(sign * array for array in network.layers[-1])
+            (tmp_path / name).write_bytes(network.to_bytes())
+        chosen[sign] = policy_of(f"learned:{tmp_path}", 0.01).choose(component)
+    assert chosen[1] == make_policy("learned", scale=0.01).choose(component) != chosen[-1]
 
 
 def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:

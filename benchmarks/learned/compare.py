@@ -1,9 +1,10 @@
-"""Compare policies on meshes: `python benchmarks/learned/compare.py MESHES OUT.jsonl [--split test] [--count 150] ...`.
+"""Compare policies on meshes: `python benchmarks/learned/compare.py MESHES OUT.jsonl [--split test] [--sets SET] ...`.
 
 For each mesh, policy and criterion: parts before merging, after merging neighbours (as NavACD does) and after all
 merging, and the CPU seconds of cutting. A criterion is a concavity threshold, or radius and tolerance of navigable
-space: ``0.05,0.01``. A policy is a name that ``decompose`` takes, or the paper's deployment of a network with other
-planes, ``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``. A run that was interrupted goes on where it
+space: ``0.05,0.01``. A policy is a name that ``decompose`` takes; ``learned:FOLDER``, with the networks that ``fit.py``
+wrote there; or the paper's deployment of a network with other planes,
+``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``. A run that was interrupted goes on where it
 stopped. In the end, means, and geometric means of the ratios to the first policy's numbers with 95 % intervals by
 resampling meshes.
 """
@@ -30,6 +31,7 @@ from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
 from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import Policy, make_policy
 from rlacd.policies.greedy import least_hulls
+from rlacd.policies.learned import Learned, networks_in
 from rlacd.policies.network import SHORTLIST, QFunction, best_planes, q_values
 from rlacd.repair.repair import repair
 from rlacd.run import Run
@@ -51,6 +53,8 @@ def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
 
 def policy_of(name: str, length: float | None) -> Policy:
     """Get a policy by its name, or a deployment."""
+    if name.startswith("learned:"):
+        return Learned(scale=length, networks=networks_in(Path(name.removeprefix("learned:"))))
     if not name.startswith("planes:"):
         return make_policy(name, scale=length)
     _, *words, path = name.split(":")
@@ -124,6 +128,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("meshes", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--split", default="test")
+    parser.add_argument("--sets", nargs="+", help="collections; all of the split by default")
     parser.add_argument("--count", type=int, default=10**6)
     parser.add_argument("--faces", type=int, default=10**6)
     parser.add_argument("--merge", action="store_true")
@@ -136,7 +141,7 @@ def main() -> None:
     """Measure what is missing and print the summary."""
     args = parser().parse_args()
     with open(args.meshes / "index.csv", encoding="utf-8") as file:
-        listed = [r for r in csv.DictReader(file) if r["split"] == args.split]
+        listed = [r for r in csv.DictReader(file) if r["split"] == args.split and r["set"] in (args.sets or [r["set"]])]
     names = sorted((int(r["faces"]), r["file"]) for r in listed if int(r["faces"]) <= args.faces)
     names = [names[i] for i in np.sort(np.random.default_rng(0).permutation(len(names))[: args.count])]
     rows = [json.loads(line) for line in args.out.read_text().splitlines()] if args.out.exists() else []

@@ -19,7 +19,7 @@ from torch import nn
 
 from rlacd.planes.candidates import Candidates
 from rlacd.planes.sweep import Sweep
-from rlacd.policies.learned import KIND, LEAST_GAIN, NETWORKS
+from rlacd.policies.learned import KIND, LEAST_GAIN, NAMES
 from rlacd.policies.network import Network
 from rlacd.policies.plane_features import plane_features
 
@@ -110,7 +110,7 @@ def cross_validated(labels: Labels) -> NDArray[np.float64]:
     fold = np.random.default_rng(0).permutation(labels.mesh.max() + 1)[labels.mesh] % FOLDS
     gains = []
     for k in range(FOLDS):
-        networks = [fit(labels, np.flatnonzero(fold != k), seed) for seed in range(NETWORKS)]
+        networks = [fit(labels, np.flatnonzero(fold != k), seed) for seed in range(len(NAMES))]
         predicted = np.mean([n(labels.features.astype(np.float32))[:, 0] for n in networks], axis=0)
         gains.append(gain(labels, predicted, np.flatnonzero(fold == k)))
     return np.concatenate(gains)
@@ -127,9 +127,8 @@ def main() -> None:
     print(f"{len(labels.parts)} planes of {len(labels.mesh)} components of {labels.mesh.max() + 1} meshes")
     every = cross_validated(labels)
     print(f"held out: log(parts) {every.mean():+.4f} +- {every.std() / len(every) ** 0.5:.4f} against greedy's plane")
-    for seed in range(NETWORKS) if args.out else ():
-        network = fit(labels, np.arange(len(labels.mesh)), seed)
-        (args.out / f"learned_{seed}.npz").write_bytes(network.to_bytes())
+    for seed, name in enumerate(NAMES if args.out else ()):
+        (args.out / name).write_bytes(fit(labels, np.arange(len(labels.mesh)), seed).to_bytes())
 
 
 if __name__ == "__main__":

@@ -40,13 +40,15 @@ class MeshList:
     too_large: int
 
 
-def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> MeshList:
-    """Find the meshes below a folder; `validation` of them, chosen by the seed, are held out.
+def list_meshes(folder: Path, max_faces: int, validation: int, held_out: str, seed: int) -> MeshList:
+    """Find the meshes below a folder; `validation` of them, at most half, are chosen by the seed and held out.
+
+    With a folder in it, `held_out`, those are chosen there, and its other meshes are not learned from either.
 
     Raises
     ------
     TrainingError
-        No meshes are left for training.
+        No meshes are left for training, or none are in `held_out`.
     """
     names, unreadable, too_large = [], 0, 0
     for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS and p.is_file()):
@@ -59,16 +61,19 @@ def list_meshes(folder: Path, max_faces: int, validation: int, seed: int) -> Mes
             too_large += 1
         else:
             names.append(path.relative_to(folder).as_posix())
-    if len(names) <= validation:
-        left_out = f"{unreadable} cannot be read, {too_large} have more than {max_faces} triangles"
-        said = f"{folder} holds {len(names)} meshes to learn on ({left_out})"
-        raise TrainingError(f"{said}; more than {validation} are needed: that many are held out for validation.")
     drawn = [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
-    return MeshList(tuple(sorted(drawn[validation:])), tuple(sorted(drawn[:validation])), unreadable, too_large)
+    inside = [name for name in drawn if name.startswith(f"{held_out.rstrip('/')}/")] if held_out else drawn
+    chosen = inside[: validation if held_out else min(validation, len(names) // 2)]
+    training = sorted({*names} - {*(inside if held_out else chosen)})
+    left_out = f"{unreadable} cannot be read, {too_large} have more than {max_faces} triangles"
+    for kind, found in (("meshes to learn on", training), (f"meshes in {held_out} to hold out", inside)):
+        if not found:
+            raise TrainingError(f"{folder} holds no {kind} ({left_out}); give another folder.")
+    return MeshList(tuple(training), tuple(sorted(chosen)), unreadable, too_large)
 
 
-def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: int) -> MeshList:
-    """List the meshes at the start of a run; resumed runs read that list, so that new files change nothing.
+def list_once(meshes: Path, run: Path, *how: Any) -> MeshList:
+    """`list_meshes` at the start of a run; resumed runs read that list, so that new files change nothing.
 
     Raises
     ------
@@ -85,7 +90,7 @@ def list_once(meshes: Path, run: Path, max_faces: int, validation: int, seed: in
         if missing:
             raise TrainingError(f"{meshes} lacks {missing[0]}, which the run began with; give the same folder.")
         return MeshList(tuple(names[0]), tuple(names[1]), **listed)
-    found = list_meshes(meshes, max_faces, validation, seed)
+    found = list_meshes(meshes, *how)
     run.mkdir(parents=True, exist_ok=True)
     kept.write_text(json.dumps(dataclasses.asdict(found), indent=1), encoding="utf-8")
     return found

@@ -77,7 +77,9 @@ class TrainOptions:
     validate_every: int = option(10_000, least=1)
     """Cuts between validations."""
     validation: int = option(16, least=0)
-    """Meshes held out for validation; 0 validates on the first 16 training meshes."""
+    """Meshes held out for validation, at most half; 0 validates on the first 16 training meshes."""
+    held_out: str = option("")
+    """A folder in that of the meshes, such as those of one maker, to validate with and not to learn from."""
     checkpoint_seconds: float = option(300.0, least=0)
     """Seconds between checkpoints."""
 

@@ -79,7 +79,8 @@ def train(
     torch.set_num_threads(options.threads)
     if (run / "checkpoint.npz").exists() and not resume:
         raise OptionError(f"{run} holds a run already; use --resume to go on with it, or another folder.")
-    listed = list_once(meshes, run, options.max_faces, options.validation, options.seed)
+    how = options.max_faces, options.validation, options.held_out, options.seed
+    listed = list_once(meshes, run, *how)
     write_file(run / "options.json", json.dumps(dataclasses.asdict(options), indent=1).encode())
     left_out = f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
     say(f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; {left_out}")

@@ -6,8 +6,10 @@ greedy ends in after each of several planes (`learned.md` beside the weights).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from importlib.resources import as_file, files
+from pathlib import Path
 
 import numpy as np
 
@@ -19,8 +21,8 @@ from rlacd.solid.component import Component, Plane
 
 KIND = "learned"
 
-NETWORKS = 4
-"""Size of the ensemble."""
+NAMES = tuple(f"learned_{number}.npz" for number in range(4))
+"""Files of the ensemble's networks."""
 
 PROMISING = 40
 """Number of planes of least excess, and of least hull sum, among which the networks choose: training saw few others."""
@@ -47,12 +49,19 @@ class Learned:
         Provides the 150 planes and those of reflex edges.
     scale : float, optional
         The criterion's length in the frame, if it has one.
+    networks : sequence of Network, optional
+        In place of the shipped ones.
     """
 
-    def __init__(self, sweeps: SweepCache | None = None, scale: float | None = None) -> None:
+    def __init__(
+        self,
+        sweeps: SweepCache | None = None,
+        scale: float | None = None,
+        networks: Sequence[Network] | None = None,
+    ) -> None:
         self._sweeps = sweeps or SweepCache()
         self._scale = scale
-        self._networks = shipped_networks()
+        self._networks = networks or shipped_networks()
         self._greedy = Greedy("hull-sum", sweeps=self._sweeps)
 
     def choose(self, component: Component, threads: int = 1) -> Plane | None:
@@ -79,7 +88,12 @@ class Learned:
 def shipped_networks() -> list[Network]:
     """The networks in the package."""
     found = []
-    for number in range(NETWORKS):
-        with as_file(files("rlacd.policies") / f"learned_{number}.npz") as path:
-            found.append(load_network(str(path), KIND, FEATURES, 1))
+    for name in NAMES:
+        with as_file(files("rlacd.policies") / name) as path:
+            found += networks_in(path.parent, [name])
     return found
+
+
+def networks_in(folder: Path, names: Sequence[str] = NAMES) -> list[Network]:
+    """Read the networks that benchmarks/learned/fit.py wrote to a folder; raises as `load_network`."""
+    return [load_network(folder / name, KIND, FEATURES, 1) for name in names]

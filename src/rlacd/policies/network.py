@@ -87,28 +87,31 @@ class Network:
 
 
 def load_network(path: str | os.PathLike[str], kind: str, inputs: int, outputs: int) -> Network:
-    """Read a network of a kind; the last four are cached.
+    """Read a network of a kind; the last four are cached, by their content.
 
     Raises
     ------
     WeightsError
         The file is missing, damaged, or not a network of this kind.
     """
-    network = _read(os.fspath(path))
+    return _of_kind(_read(path), path, kind, inputs, outputs)
+
+
+def _of_kind(network: Network, path: str | os.PathLike[str], kind: str, inputs: int, outputs: int) -> Network:
     shape = network.layers[0][0].shape[1], network.layers[-1][0].shape[0]
     if network.about.get("kind") != kind or shape != (inputs, outputs):
         raise WeightsError(f"{path} is not a network of this kind ({kind}, {inputs} inputs); give another path.")
     return network
 
 
-@lru_cache(maxsize=4)
-def _read(path: str) -> Network:
+def _read(path: str | os.PathLike[str]) -> Network:
+    """Read a network; what a file holds may change, as that of a training does."""
     try:
         content = read_file(path)
     except OSError as error:
         raise WeightsError(f"The policy {path} cannot be read ({error}); give another path.") from error
     try:
-        return parse_network(content)
+        return _parsed(content)
     except DAMAGE as error:
         raise WeightsError(DAMAGED.format(path)) from error
 
@@ -138,6 +141,8 @@ def parse_network(content: bytes) -> Network:
         raise ValueError
     return network
 
+
+_parsed = lru_cache(maxsize=4)(parse_network)
 
 SHORTLIST = 10
 """Number of planes of greatest value from which the paper takes the one with the least sum of hull volumes."""
@@ -201,17 +206,21 @@ def q_values(path: str, scale: float | None = None, encoder: Encoder | None = No
     MissingExtraError
         The encoder needs torch.
     """
-    own = _read(path).about.get("encoder")
+    file = _read(path)
+    own = file.about.get("encoder")
     if isinstance(own, str) and (encoder is None or encoder.digest != own):
         raise OptionError(f"{path} needs an encoder of your own ({own}); give it to load_policy of rlacd.learn.train.")
-    sees = encoder or named_encoder(path, scale)
-    network = load_network(path, KIND, sees.dim, sees.outputs)
+    sees = encoder or _encoder_of(file, path, scale)
+    network = _of_kind(file, path, KIND, sees.dim, sees.outputs)
     return lambda component: network(sees.describe(component)).reshape(-1)
 
 
 def named_encoder(path: str, scale: float | None = None) -> Encoder:
     """Get the encoder that a network's file names; raises as `q_values`."""
-    file = _read(path)
+    return _encoder_of(_read(path), path, scale)
+
+
+def _encoder_of(file: Network, path: str, scale: float | None) -> Encoder:
     try:
         return _stored_encoder(file, file.threshold if scale is None else scale)
     except DAMAGE as error:
