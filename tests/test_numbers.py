@@ -69,7 +69,8 @@ LIMITS = {
         f"merging at {MOST_MERGING / 1e6:g} million",
         f"more than {MANY_COMPONENTS:,} pieces",
         f"at most {DENSE:,} triangles",
-        f"if a {ORDINALS[1 / grow.CROSSING]} of the parts",
+        f"if in {100 * grow.CROSSING:g} % of the hulls",
+        f"fills {100 * (grow.SHARED - 1):.0f} % more",
     ],
     "docs/repair.md": [
         f"within {state._WELDS[0] * 1e5:g}·10⁻⁵ (else {state._WELDS[1] * 1e4:g}·10⁻⁴)",
