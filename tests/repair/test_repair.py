@@ -289,6 +289,19 @@ def test_corners_of_faces_without_an_area_are_covered_or_named(name: str) -> Non
     assert not said or f"lie{'s' if '1 corner ' in said[0] else ''} up to {away} units outside" in said[0]
 
 
+@pytest.mark.parametrize("width", [1e-9, 1e-6, 1e-4, 1e-3, 1e-2])
+@pytest.mark.promise("covered")
+def test_needles_apart_are_kept_though_they_are_narrower_than_cracks(width: float) -> None:
+    needles = np.array([[[3, 0, 0], [5, 1, 0], [5, 1 + width, 0]], [[0, -4, width], [1, -2, 2], [0, -4, 0]]])
+    corners = np.concatenate([BOX.vertices, needles.reshape(-1, 3)])
+    faces = np.concatenate([BOX.faces, [[8, 9, 10], [11, 12, 13]]])
+    result = rlacd.decompose((corners, faces), quality="fast", threads=1)
+    outside = [trimesh.proximity.signed_distance(hull, corners[8:]) * -1 for hull in result]
+    assert np.min(outside, axis=0).max() <= 2e-3 / result.report.scale
+    assert result.report.hausdorff.under <= 1e-3
+    assert {body.step for body in result.report.repair} == {"closed", "slab"}
+
+
 @pytest.mark.parametrize("per_node", [False, True])
 def test_a_node_without_size_is_named_if_hulls_miss_it(per_node: bool) -> None:
     speck = trimesh.Trimesh([[3, 0, 0]] * 3, [[0, 1, 2]], process=False)

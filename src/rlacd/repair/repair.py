@@ -24,7 +24,7 @@ from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes, may_have_holes
 from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
-from rlacd.repair.union import CrossingsError, hull_of_points, one_body, unite
+from rlacd.repair.union import CrossingsError, hull_of_points, one_body, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
 from rlacd.repair.wraps import (
@@ -83,16 +83,21 @@ def _take_hull(state: State) -> None:
 
 
 def _keep_lost(state: State) -> None:
-    """Add slabs of the faces that the solid leaves outside: a skin that crosses itself, or a wrap, loses some."""
-    faces = measure(state)
-    body = state.body_of_input[faces]
-    soup = Soup(state.surface.vertices, state.surface.faces[faces], body).in_patches()
-    if not 0 < bodies_of(soup.faces, soup.edges)[0] <= MOST_PATCHES:  # a plant's leaves would take too many cuts
+    """Add slabs of the faces that the solid leaves outside: a skin that crosses itself, or a wrap, loses some.
+
+    So does closing cracks, of needles.
+    """
+    lost, own = measure(state), state.surface
+    body, is_gone = state.body_of_input[lost], state.is_gone[lost]
+    walls, needles = own.faces[lost[~is_gone]], np.unique(body[is_gone]).tolist()
+    soup = Soup(own.vertices, walls, body[~is_gone]).in_patches()
+    patches = bodies_of(soup.faces, soup.edges)[0] if len(walls) else 0
+    if not 0 < patches + len(needles) <= MOST_PATCHES:  # a plant's leaves would take too many cuts
         return
-    slabs = skins(soup)
     try:
-        shapes = [state.solid, *(slab.shape for slab in slabs)]
-        state.solid = unite(shapes, keep_cavities=state.wanted.keep_cavities)
+        slabs = skins(soup)
+        slabs += [Piece(slab_of_faces(own.vertices, own.faces[lost[body == one]]), one, True) for one in needles]
+        state.solid = unite([state.solid, *(slab.shape for slab in slabs)], keep_cavities=state.wanted.keep_cavities)
     except CrossingsError:  # they stay lost
         return
     state.parts += slabs

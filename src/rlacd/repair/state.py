@@ -89,6 +89,8 @@ class State:
     bodies : int
     body_of_input : int64 [F]
         The body of each face of the input.
+    is_gone : bool [F]
+        Whether a face of the input is narrower than the cracks that were closed, and went with them.
     step : int64 [bodies]
         The step that changed a body most, an index of `OUTCOMES`.
     beyond, lost : float64 [bodies]
@@ -120,6 +122,7 @@ class State:
         self.bodies, body = bodies_of(faces, edges)
         self.body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
         self.body_of_input[origin] = body
+        self.is_gone = ~marked(origin, len(surface.faces))
         self.step = np.zeros(self.bodies, dtype=np.int64)
         self.beyond, self.lost = np.zeros((2, self.bodies))
         self.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
@@ -158,6 +161,17 @@ class State:
     def volume(self) -> float:
         """Volume of the solid."""
         return volume_of(self.solid)
+
+    def set_apart(self, faces: Int64Array) -> None:
+        """Make bodies of their own of faces of the input, which become slabs."""
+        if len(faces) == 0:
+            return
+        corners = self.surface.faces[faces].astype(np.int64)
+        count, body = bodies_of(corners, Edges.of(corners, len(self.surface.vertices)))
+        self.body_of_input[faces] = self.bodies + body
+        self.bodies += count
+        self.step = np.append(self.step, np.full(count, OUTCOMES.index("slab")))
+        self.beyond, self.lost = (np.append(lengths, np.zeros(count)) for lengths in (self.beyond, self.lost))
 
     def unite_parts(self) -> None:
         """Unite all parts and fill their cavities, or keep them.
@@ -251,7 +265,7 @@ class State:
 def measure(state: State) -> Int64Array:
     """Record how far the solid and changed bodies deviate; returns the input's faces that lead out of the solid."""
     surface, solid = state.surface, state.query()
-    if state.step.max() < OUTCOMES.index("outer skin"):
+    if state.step.max() < OUTCOMES.index("outer skin") and not state.is_gone.any():
         return np.empty(0, dtype=np.int64)
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
@@ -262,16 +276,18 @@ def measure(state: State) -> Int64Array:
     closest, face = surface.closest(points)
     np.maximum.at(state.beyond, state.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
-    replaced = np.flatnonzero((state.step[state.body_of_input] >= OUTCOMES.index("outer skin")) & ~taken_over)
+    is_replaced = (state.step[state.body_of_input] >= OUTCOMES.index("outer skin")) & ~taken_over
+    replaced = np.flatnonzero(is_replaced | state.is_gone)
     faces = surface.faces[replaced]
     spacing = affordable(DEFAULT_GAP, float(face_areas(surface.vertices, faces).sum()))
     points, on = points_covering(surface.vertices, faces, spacing)
     distance = solid.distance(points)
     lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)  # the middle of a slab is half as far from its surface
     lost = lost[~solid.inside(points[lost])]
-    np.maximum.at(state.lost, state.body_of_input[replaced[on[lost]]], distance[lost])
     corners = np.unique(faces[_native.longest_edges(surface.vertices, faces) <= spacing])  # the first of the points
     is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
     leads_out = np.asarray(is_out[faces].any(axis=1))
     leads_out[on[lost]] = True
+    state.set_apart(replaced[leads_out & state.is_gone[replaced]])
+    np.maximum.at(state.lost, state.body_of_input[replaced[on[lost]]], distance[lost])
     return replaced[leads_out]
