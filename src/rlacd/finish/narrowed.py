@@ -136,18 +136,19 @@ def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface,
     goes: BoolArray = (places > 0) & (smaller > larger / 2)
     depth = np.frexp(places)[1]  # of a tree of places, whose root is in the middle
     for bits in np.unique(depth[goes]).tolist():
-        for place in _from_the_middle(bits):
-            active = np.flatnonzero(goes & (depth == bits) & (place < places))
-            at = starts[active] + (place * larger[active] / (4 * lengths[active]))[:, None] * ways[active]
+        for level in _from_the_middle(bits):
+            way, place = np.meshgrid(np.flatnonzero(goes & (depth == bits)), level, indexing="ij")
+            way, place = way[place < places[way]], place[place < places[way]]
+            at = starts[way] + (place * larger[way] / (4 * lengths[way]))[:, None] * ways[way]
             space = surface.distance(at, threads)
-            goes[active] = (space > larger[active] / 2) & (space < WIDER * larger[active])
+            goes[way[(space <= larger[way] / 2) | (space >= WIDER * larger[way])]] = False
     return goes
 
 
-def _from_the_middle(bits: int) -> list[int]:
+def _from_the_middle(bits: int) -> list[NDArray[np.int64]]:
     """The numbers of so many bits: the middle one, then those in the middle of each half, and so on; 0 last."""
     strides = (1 << bit for bit in reversed(range(bits)))
-    return [*(place for stride in strides for place in range(stride, 1 << bits, 2 * stride)), 0]
+    return [*(np.arange(stride, 1 << bits, 2 * stride) for stride in strides), np.zeros(1, dtype=np.int64)]
 
 
 def too_narrow(found: Narrowed, reached: Reached, is_stopped: bool) -> list[str]:

@@ -115,7 +115,7 @@ def _taken(
 ) -> list[Part]:
     """Parts of what each intersection of half-spaces holds, if they meet the criterion, and parts of the rest.
 
-    Empty if most do not.
+    Empty if most do not, or if the rest comes apart.
     """
     rest, parts = list(pieces), list[Part]()
     for tried, spaces in enumerate(grown):
@@ -133,6 +133,8 @@ def _taken(
         if criterion.is_met(part):
             parts.append(part)
             rest = outside
+        if len(rest) > 2 * len(pieces):  # what is beside grown hulls comes apart
+            return []
     return [*parts, *rest]
 
 
