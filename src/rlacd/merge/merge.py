@@ -132,9 +132,13 @@ class _Merging:
         for begin in range(0, len(pairs), PAIRS_AT_ONCE):
             some = pairs[begin : begin + PAIRS_AT_ONCE]
             vertices, volumes, credits = alive.sums(some)
-            if not run.may_continue() or not run.work.pay(work.screening(vertices.sum(), len(some))):
+            price = work.screening if self._across else work.joining
+            if not run.may_continue() or not run.work.pay(price(vertices.sum(), len(some))):
                 break
-            joint = criterion.joint_volumes(alive.whole, alive.bodies, some, volumes, run.threads)
+            if self._across:
+                joint = criterion.joint_volumes(alive.whole, alive.bodies, some, volumes, run.threads)
+            else:  # most neighbours may be united, or are gone before it is their turn
+                joint = _native.joint_hull_volumes(alive.bodies, some, run.threads)
             may = np.isfinite(joint)
             for pair in map(_Pair, (joint - credits)[may].tolist(), *some[may].T.tolist()):
                 heapq.heappush(self._queue, pair)
