@@ -158,7 +158,7 @@ class Distance(Criterion):
 
         False if it is larger, or if it is within 0.1 % of the threshold and branch and bound cannot decide.
         """
-        return self._is_full(part) and part.whole.against.meets(part.hull.body, self.threshold)
+        return part.whole.against.meets(part.hull.body, self.threshold) and self._is_full(part)
 
     def _is_full(self, part: Part) -> bool:
         """Whether ``0.3 R_v`` is at most the threshold, if it counts; the part's own volume mostly shows it."""
