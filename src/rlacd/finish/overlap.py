@@ -88,7 +88,7 @@ def overlap_parts(
     for first, second in pairs:
         near[first].add(second)
         near[second].add(first)
-    surface = _native.Surface(solid.vertices, solid.faces)
+    surface = solid.against.surface
     seams: list[_Seam] = []
     for first, second in pairs:
         _native.poll_stop()

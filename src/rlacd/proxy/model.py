@@ -126,14 +126,12 @@ class Transfer:
     def _cut_again(self, failing: _Moved) -> list[_Moved]:
         """Cut a part on the solid; the second time to a tighter goal, as the hulls of its pieces may grow.
 
-        What the solid fills of its hull may have a hull that is tight enough, without cuts.
+        What the solid fills of its hull may have a hull that is tight enough: then it takes no cut.
         """
         inside = self.solid.inside(failing.part.hull)
         cuts = failing.cuts + 1
         if inside is None:
             return [replace(failing, cuts=cuts)]
-        if failing.cuts == 0 and self.goal.is_met(inside):
-            return [_Moved(inside, True)]
         tree = CutTree(inside, self.policy, self.run)
         tighter = 1 - failing.cuts * self.proxy.margin(self.goal)
         new = cut_and_merge(tree, self.goal.scaled(tighter), self.run).parts
