@@ -115,7 +115,7 @@ class Distance(Criterion):
         """The part's volume: the rest of the hull is what lies between the surfaces."""
         return part.volume
 
-    def least_error(self, volume: float, hull_volume: float) -> float:
+    def volume_error(self, volume: float, hull_volume: float) -> float:
         """``0.3 R_v``."""
         return self.weight * volume_radius(volume, hull_volume) if self.weight else 0.0
 

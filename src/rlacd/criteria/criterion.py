@@ -55,7 +55,7 @@ class Criterion(Protocol):
         """Volume credited to a part; a pair costs |CH| - the credits of both, and the cheapest merges first."""
         return part.piece_hulls
 
-    def least_error(self, volume: float, hull_volume: float) -> float:
+    def volume_error(self, volume: float, hull_volume: float) -> float:
         """The error that the volumes of a part and its hull alone give it."""
         return 0.0
 

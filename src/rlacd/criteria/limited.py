@@ -136,9 +136,9 @@ class LimitedCriterion(Criterion):
         """That of the underlying criterion."""
         return self.criterion.credit(part)
 
-    def least_error(self, volume: float, hull_volume: float) -> float:
+    def volume_error(self, volume: float, hull_volume: float) -> float:
         """That of the underlying criterion."""
-        return self.criterion.least_error(volume, hull_volume)
+        return self.criterion.volume_error(volume, hull_volume)
 
     def joint_volumes(
         self, whole: Component, hulls: Sequence[_native.ConvexBody], pairs: IntArray, volumes: FloatArray, threads: int

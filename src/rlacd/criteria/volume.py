@@ -82,7 +82,7 @@ class AddedVolume(Criterion):
         """The part's volume: the rest of the hull is what the criterion counts."""
         return part.volume
 
-    def least_error(self, volume: float, hull_volume: float) -> float:
+    def volume_error(self, volume: float, hull_volume: float) -> float:
         """The error itself."""
         return self.share(volume, hull_volume)
 

@@ -219,7 +219,7 @@ def _bounded_pairs(
 ) -> list[_BoundedPair]:
     pairs = alive.boxes.pairs(new, reach)
     volumes, hulls = alive.sums(pairs)[1], _native.joint_hull_volumes(alive.bodies, pairs, run.threads)
-    errors = map(criterion.least_error, volumes.tolist(), hulls.tolist())
+    errors = map(criterion.volume_error, volumes.tolist(), hulls.tolist())
     queue = [_BoundedPair(error, i, j, None) for error, (i, j) in zip(errors, pairs.tolist(), strict=True)]
     heapq.heapify(queue)
     return queue
