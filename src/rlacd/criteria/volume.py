@@ -36,8 +36,8 @@ REACH = 0.2
 
 
 FILLED_BY_OTHERS = 2.0
-"""Unions that add more than so many times the tolerance to their own pieces are not tried. With 1, 12 meshes take 5 %
-more hulls by default; without a limit 7 % fewer, in twice the time."""
+"""Unions across others that add more than so many times the tolerance to their own pieces are not tried. With 1, 12
+meshes take 1.4 % more hulls by default; without a limit 3 % fewer, in 1.3 times the time."""
 
 
 @dataclass(frozen=True)
