@@ -109,12 +109,12 @@ def test_valid_planes_need_no_sweep_and_are_valid_by_it() -> None:
 
 def test_unreadable_meshes_are_left_out_and_counted(tmp_path: Path) -> None:
     meshes = write_meshes(tmp_path / "meshes")
-    listed = list_meshes(meshes, max_faces=1000, validation=2, seed=0)
+    listed = list_meshes(meshes, max_faces=1000, validation=2, held_out="", seed=0)
     assert listed.unreadable == 1
     assert len(listed.training) == 3
     assert len(listed.validation) == 2
     assert "deeper/table.ply" in listed.training + listed.validation
-    assert list_meshes(meshes, max_faces=12, validation=0, seed=0).training == ("box.ply",)
+    assert list_meshes(meshes, max_faces=12, validation=0, held_out="", seed=0).training == ("box.ply",)
 
 
 def test_dual_state_target_by_hand() -> None:

@@ -11,6 +11,7 @@ import pytest
 import trimesh
 
 from rlacd.errors import MeshFileError
+from rlacd.fit import Unit
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots.usd import read_stage
 
@@ -69,7 +70,7 @@ def test_what_is_rendered_is_read_where_it_stands(tmp_path: Path, ending: str) -
         "guides and proxies were left out: 2",
         "shapes other than meshes and plain primitives were left out: 1",
     }
-    assert (mesh.up, mesh.metres, mesh.unit) == ("y", 0.01, "cm")
+    assert (mesh.up, mesh.metres, mesh.unit) == ("y", 0.01, Unit("cm", 1.0))
     assert len(mesh.faces) == 12 + 2
     box = mesh.of_node(0).vertices
     assert np.allclose([box.min(axis=0), box.max(axis=0)], [[1 - 2, 2 + 9, 0], [1 + 2, 2 + 11, 6]], atol=1e-6)
