@@ -24,9 +24,9 @@ from rlacd.merge import merge_parts
 from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
+from rlacd.search.divide import Exchange, divide
 from rlacd.search.levels import search
 from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
-from rlacd.search.operators import Exchange, give, redistribute
 from rlacd.solid.component import Component, Part, Plane, reunite
 from tests.hulls import assert_same_hulls
 from tests.shapes import bent_bar, box, depth_outside, own_volume, stacks, strangers, together, trimesh_of
@@ -129,7 +129,7 @@ def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Cri
 
 def test_a_part_is_divided_between_its_neighbours() -> None:
     left, middle, right = bent_bar()
-    found = [redistribute(middle, [left, right], CRITERION, np.random.default_rng(seed), Run(1)) for seed in range(5)]
+    found = [divide(middle, [left, right], CRITERION, np.random.default_rng(seed), Run(1)) for seed in range(5)]
     assert any(found)
     for exchange in found:
         if exchange is not None:
@@ -142,26 +142,26 @@ def test_a_part_gives_what_the_others_can_take_and_keeps_the_rest(seed: int) -> 
     boxes = box((0, 0, 0), (1, 1, 0.2)), box((1, 0, 0), (3, 1, 0.2)), box((2.9, 0, 0.2), (3, 1, 1.5))
     slab, *rest = together([Component(solid) for solid in boxes])
     bent = Part.joint(*rest)
-    exchange = give(bent, [slab], Concavity(0.5), np.random.default_rng(seed), Run(1))
+    exchange = divide(bent, [slab], Concavity(0.5), np.random.default_rng(seed), Run(1), keeps_rest=True)
     assert exchange is not None
     assert exchange.gain == 0
     assert own_volume(exchange.into) == pytest.approx(own_volume(exchange.out), rel=1e-6)
     assert all(Concavity(0.5).is_met(part) for part in exchange.into)
     taker = max(exchange.into, key=lambda part: part.volume)
     assert taker.hull.volume > 1.5 * slab.hull.volume
-    assert give(bent, [], CRITERION, np.random.default_rng(seed), Run(1)) is None
+    assert divide(bent, [], CRITERION, np.random.default_rng(seed), Run(1), keeps_rest=True) is None
 
 
 @settings(max_examples=30, deadline=None)
 @given(stacks(), st.integers(0, 2**32 - 1))
 def test_nothing_is_lost(stack: list[Component], seed: int) -> None:
     part, *around = sorted(stack, key=lambda part: part.hull.volume)
-    once, again = (redistribute(part, around, CRITERION, np.random.default_rng(seed), Run(1)) for _ in range(2))
+    once, again = (divide(part, around, CRITERION, np.random.default_rng(seed), Run(1)) for _ in range(2))
     assert (once is None) == (again is None)
     if once is not None and again is not None:
         check(once, part, around, CRITERION)
         assert [p.volume for p in once.into] == [p.volume for p in again.into]
-    given = give(part, around, CRITERION, np.random.default_rng(seed), Run(1))
+    given = divide(part, around, CRITERION, np.random.default_rng(seed), Run(1), keeps_rest=True)
     if given is not None:
         assert own_volume(given.into) == pytest.approx(own_volume(given.out), rel=1e-6)
         assert all(CRITERION.is_met(new) for new in given.into)
@@ -261,5 +261,5 @@ def test_a_part_that_stands_for_more_than_its_members_is_not_divided() -> None:
     unknown = Part(left.hull, (), left.whole)
     for part in (unknown, Part.joint(unknown, right), Part.joint(right, unknown)):
         assert part.members == ()
-        assert redistribute(part, [other], CRITERION, np.random.default_rng(0), Run(1)) is None
-        assert give(part, [other], CRITERION, np.random.default_rng(0), Run(1)) is None
+        assert divide(part, [other], CRITERION, np.random.default_rng(0), Run(1)) is None
+        assert divide(part, [other], CRITERION, np.random.default_rng(0), Run(1), keeps_rest=True) is None

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
 from rlacd.run import Run, work
@@ -103,36 +102,29 @@ class CutTree:
         done: list[Component] = []
         left: list[Component] = []
         frontier = [self.root]
-        while frontier:
-            if not run.work.pay(sum(work.judging(c.size, len(c.hull.faces)) for c in frontier)):
-                return done, left + frontier
-            unmet = frontier
-            try:
-                verdicts = self._run.map(criterion.is_met, frontier)
-                done += [c for c, met in zip(frontier, verdicts, strict=True) if met]
-                unmet = [c for c, met in zip(frontier, verdicts, strict=True) if not met]
-                if not run.step(len(done), None, len(done) + len(left) + len(unmet)):
-                    return done, left + unmet
-                count, spent = len(done) + len(left) + 2 * len(unmet), run.work.done - begin  # each becomes two
+        with run.until_stopped():
+            while frontier:
+                if not run.work.pay(sum(work.judging(c.size, len(c.hull.faces)) for c in frontier)):
+                    break
+                verdicts = dict(zip(frontier, run.map(criterion.is_met, frontier), strict=True))
+                done += [c for c in frontier if verdicts[c]]
+                frontier = [c for c in frontier if not verdicts[c]]
+                if not run.step(len(done), None, len(done) + len(left) + len(frontier)):
+                    break
+                count, spent = len(done) + len(left) + 2 * len(frontier), run.work.done - begin  # each becomes two
                 if count > most or spent > units:
-                    return done, left + unmet
-                if unmet and count > many:
+                    break
+                if frontier and count > many:
                     if (parts := self._by_second(criterion, FAR_FEWER * count, FAR_FEWER * spent)) is not None:
                         return parts, []
                     many = math.inf
-                new = [c for c in unmet if c not in self._children]
+                new = [c for c in frontier if c not in self._children]
                 if not run.work.pay(sum(work.choosing(c.size) + work.cutting(c.size) for c in new)):
-                    return done, left + unmet
+                    break
                 self._divide(new)
-            except Stopped:
-                run.note_stop()
-                return done, left + unmet
-            frontier = []
-            for component in unmet:
-                frontier += self._children[component]
-                if not self._children[component]:
-                    left.append(component)
-        return done, left
+                left += [c for c in frontier if not self._children[c]]
+                frontier = [child for c in frontier for child in self._children[c]]
+        return done, left + frontier
 
     def _by_second(self, criterion: Criterion, most: float, units: float) -> list[Component] | None:
         """Cut by the second policy, which takes over if it finishes within the limits; None if it does not."""

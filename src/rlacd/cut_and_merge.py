@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.merge import merge_parts
@@ -81,11 +80,9 @@ def cut_and_merge(
         pieces: list[Part] = [*done, *left]
         if len(pieces) + len(left) > most:  # each that is left would become two
             return Pass(pieces, [*left], pieces, criterion, is_too_many=True)
-        try:
-            if run.stopped_by is None:
+        if run.stopped_by is None:
+            with run.until_stopped():
                 criterion = criterion.settled(pieces)
-        except Stopped:
-            run.note_stop()
         if run.stopped_by is not None and not strict:
             left = _pieces(left, run)
             pieces = [*done, *left]

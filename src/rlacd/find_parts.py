@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import NamedTuple
 
-from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
@@ -77,21 +76,21 @@ class Reached(NamedTuple):
 
 def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     """Decompose a mesh until done or stopped."""
-    try:
-        solid, options, goal, root, sides = _prepared(source, options, run)
-    except Stopped:
-        run.note_stop()
+    problem = None
+    with run.until_stopped():
+        problem = _Problem.of(source, options, run)
+    if problem is None:
         return covered(source, options, run)
+    solid, options, root = problem.solid, problem.options, problem.root
     if options.max_hulls == 1:
-        return Reached(solid, options, goal, [root], None, root)
-    decomposer = _Decomposer.of(_model(solid, root, goal, run), solid, goal, options, run)
-    states, goal, found = decomposer.decompose(goal)
-    limited, most, parts = LimitedCriterion(goal, options.hull_limits, sides=sides), options.max_hulls, states[-1]
+        return Reached(solid, options, problem.goal, [root], None, root)
+    decomposer = _Decomposer.of(problem, run)
+    states, goal, found = decomposer.decompose(problem.goal)
+    limited, most, parts = problem.limited(goal), options.max_hulls, states[-1]
     if most is not None and len(parts) > most:
         parts = at_most(most, decomposer.coarser(states, goal), root, limited, run)
     elif any(options.hull_limits):
-        with run.stage("limit"):
-            parts = cut_to_limits(parts, limited, root, options, run)
+        parts = cut_to_limits(parts, limited, root, options, run)
     before = tuple(state for state in states if most is None or len(state) <= most)
     return Reached(solid, options, goal, parts, found, root, before)
 
@@ -101,39 +100,56 @@ def find_parts_under(source: InputMesh, options: Options, factors: Sequence[floa
 
     Factors ascend from 1. Those that there is no time for are left out.
     """
-    try:
-        solid, options, goal, root, sides = _prepared(source, options, run)
-        decomposer = _Decomposer.of(_model(solid, root, goal, run), solid, goal, options, run)
-    except Stopped:
-        run.note_stop()
-        return
-    for factor in factors:
-        (*_, parts), reached, found = decomposer.decompose(goal.scaled(factor))
-        if any(options.hull_limits):
-            limited = LimitedCriterion(reached, options.hull_limits, sides=sides)
-            with run.stage("limit"):
-                parts = cut_to_limits(parts, limited, root, options, run)
-        if run.stopped_by is not None:
-            return
-        yield Reached(solid, options, reached, parts, found, root)
-        if len(parts) <= 1:
-            return
+    with run.until_stopped():
+        problem = _Problem.of(source, options, run)
+        decomposer = _Decomposer.of(problem, run)
+        options = problem.options
+        for factor in factors:
+            (*_, parts), goal, found = decomposer.decompose(problem.goal.scaled(factor))
+            if any(options.hull_limits):
+                parts = cut_to_limits(parts, problem.limited(goal), problem.root, options, run)
+            if run.stopped_by is not None:
+                break
+            yield Reached(problem.solid, options, goal, parts, found, problem.root)
+            if len(parts) <= 1:
+                break
 
 
-def _prepared(source: InputMesh, options: Options, run: Run) -> tuple[Solid, Options, Criterion, Component, FloatArray]:
-    """The solid, the options and the goal in its frame, what is cut, and the sides that limited hulls keep."""
-    with run.stage("repair"):
-        solid = _repaired(source, options, run)
-    options = options.at_scale(solid.frame.scale)
-    goal = LimitedCriterion.prepare(options, solid, run)
-    root = Component(solid.shape, run.threads)
-    return solid, options, goal, root, resting_sides(root) if any(options.hull_limits) else NO_SIDES
+class _Problem(NamedTuple):
+    """What is decomposed.
 
+    Attributes
+    ----------
+    solid : Solid
+        The repaired mesh.
+    options : Options
+        With lengths relative to the solid's size.
+    goal : Criterion
+        In its frame.
+    root : Component
+        The solid, to be cut.
+    sides : float64 [P, 4]
+        Half-spaces on whose planes it rests: limited hulls stay in them.
+    """
 
-def _model(solid: Solid, root: Component, goal: Criterion, run: Run) -> Model:
-    model = Model.of(root, solid.pieces, goal, run)
-    solid.pieces.clear()
-    return model
+    solid: Solid
+    options: Options
+    goal: Criterion
+    root: Component
+    sides: FloatArray
+
+    @classmethod
+    def of(cls, source: InputMesh, options: Options, run: Run) -> _Problem:
+        with run.stage("repair"):
+            solid = _repaired(source, options, run)
+        options = options.at_scale(solid.frame.scale)
+        goal = LimitedCriterion.prepare(options, solid, run)
+        root = Component(solid.shape, run.threads)
+        return cls(solid, options, goal, root, resting_sides(root) if any(options.hull_limits) else NO_SIDES)
+
+    def limited(self, goal: Criterion) -> LimitedCriterion:
+        """A goal that limited hulls have to meet, too."""
+        return LimitedCriterion(goal, self.options.hull_limits, sides=self.sides)
 
 
 def covered(source: InputMesh, options: Options, run: Run) -> Reached:
@@ -149,31 +165,31 @@ class _Decomposer:
 
     Attributes
     ----------
+    problem : _Problem
     model : Model
-    solid : Solid
-    options : Options
     run : Run
     sweeps : SweepCache
         The sweeps of the cuts, which the search goes on to use.
     tree : CutTree
     """
 
+    problem: _Problem
     model: Model
-    solid: Solid
-    options: Options
     run: Run
     sweeps: SweepCache
     tree: CutTree
 
     @classmethod
-    def of(cls, model: Model, solid: Solid, goal: Criterion, options: Options, run: Run) -> _Decomposer:
-        """Prepare to decompose a model."""
+    def of(cls, problem: _Problem, run: Run) -> _Decomposer:
+        """Prepare to decompose a solid."""
+        solid, options = problem.solid, problem.options
+        model = Model.of(problem.root, solid.pieces, problem.goal, run)
+        solid.pieces.clear()
         is_default = options.first_policy == options.default_policy
         sweeps = SweepCache(seed=(options.seed,) if is_default and options.seed else None)
         second = Greedy("hull-sum", sweeps=sweeps) if is_default else None
-        policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(goal)))
-        tree = CutTree(model.component, policy, run, second=second)
-        return cls(model, solid, options, run, sweeps, tree)
+        policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(problem.goal)))
+        return cls(problem, model, run, sweeps, CutTree(model.component, policy, run, second=second))
 
     def decompose(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         """Cut, merge, search and transfer.
@@ -184,16 +200,17 @@ class _Decomposer:
         states, settled, found = self._decomposed(goal)
         if len(states[-1]) <= self._few:
             return states, settled, found
-        return [self.run.if_in_time(lambda: slabs(self.solid, self.run), lambda: states[-1])], goal, None
+        return [self.run.if_in_time(lambda: slabs(self.problem.solid, self.run), lambda: states[-1])], goal, None
 
     @property
     def _few(self) -> float:
         """More parts are too many: the number of faces of sheets."""
-        return len(self.solid.surface[1]) if self.solid.is_sheets else math.inf
+        solid = self.problem.solid
+        return len(solid.surface[1]) if solid.is_sheets else math.inf
 
     def _cut(self, goal: Criterion) -> Pass:
         most = PIECES_A_FACE * self._few
-        return cut_and_merge(self.tree, goal, self.run, merge=self.options.merge, most=most)
+        return cut_and_merge(self.tree, goal, self.run, merge=self.problem.options.merge, most=most)
 
     def _decomposed(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         with self.run.limited():
@@ -231,8 +248,8 @@ class _Decomposer:
     def _transferred(self, parts: list[Part], goal: Criterion, factor: float = 1.0) -> list[Part]:
         if self.model.proxy is None:
             return parts
-        policy = make_policy(self.options.first_policy, SweepCache(), _scale(goal))
-        return self.model.transfer(parts, goal, factor, policy, self.run, merge=self.options.merge)
+        policy = make_policy(self.problem.options.first_policy, SweepCache(), _scale(goal))
+        return self.model.transfer(parts, goal, factor, policy, self.run, merge=self.problem.options.merge)
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion
@@ -241,35 +258,30 @@ class _Decomposer:
 
         `asked` is the solid's unscaled goal.
         """
-        options, run, found, states = self.options, self.run, None, [parts]
+        options, run, found, states = self.problem.options, self.run, None, [parts]
         policy, root = options.first_policy, self.model.component
         context = SearchContext(root, goal, options.seed)
         assert options.quality is not None, "filled in by the options"
         most = math.inf if options.max_hulls is None else TIMES_TOO_MANY * options.max_hulls + TOO_MANY
         goes_on = options.merge and policy not in AS_PUBLISHED
-        eliminates = goes_on and goal.eliminates
         if run.stopped_by is not None:
             return states, None
-        try:
-            if options.quality == FAST or len(parts) > most or self.solid.is_apart:
+        with run.until_stopped():
+            if options.quality == FAST or len(parts) > most or self.problem.solid.is_apart:
                 if goes_on:
                     with run.stage("merge"), run.limited(run.work.done):
                         states = [parts := grow_cover(parts, goal, run)]
-                if eliminates and run.stopped_by is None:
+                if goes_on and goal.eliminates and run.stopped_by is None:
                     with run.stage("search"):
                         states = [eliminate_parts(context, parts, run)]
-                return states, None
-            with run.stage("search"):
-                if eliminates and goal.obstacles is not None:
-                    states = [parts := eliminate_parts(context, parts, run)]
-                    if run.stopped_by is not None:
-                        return states, None
-                bound = run.start(partial(at_least, self.model.solid, parts, asked.outward_deviation, run))
-                enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
-                context = replace(context, enough=enough)
-                states, found = search(context, parts, run, options.quality, options.budget, options.search_steps)
-        except Stopped:
-            run.note_stop()
+            else:
+                with run.stage("search"):
+                    if goes_on and goal.eliminates and goal.obstacles is not None:
+                        states = [parts := eliminate_parts(context, parts, run)]
+                    bound = run.start(partial(at_least, self.model.solid, parts, asked.outward_deviation, run))
+                    enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
+                    context = replace(context, enough=enough)
+                    states, found = search(context, parts, run, options.quality, options.budget, options.search_steps)
         return states, found
 
 

@@ -7,12 +7,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from rlacd._native import Stopped
 from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, cut_and_merge
 from rlacd.merge import merge_parts
-from rlacd.merge.merge import united_in_turn
+from rlacd.merge.unite import united_in_turn
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
@@ -49,8 +48,9 @@ def cut_to_limits(
     First with hulls kept within the sides on which the solid rests, then without: the criterion comes first.
     """
     most = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf))
-    for goal in (limited, replace(limited, sides=NO_SIDES)) if len(limited.sides) else (limited,):
-        parts = _cut_for(goal, parts, most - len(parts), solid, options, run)
+    with run.stage("limit"):
+        for goal in (limited, replace(limited, sides=NO_SIDES)) if len(limited.sides) else (limited,):
+            parts = _cut_for(goal, parts, most - len(parts), solid, options, run)
     return parts
 
 
@@ -65,7 +65,7 @@ def _cut_for(
     if extra < 1 or len(parts) == 1:
         return parts
     cut = parts
-    try:
+    with run.until_stopped():
         met = run.map(limited.is_met, parts)
         with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_SHARE)):
             pieces: dict[Part, list[Part]] = {}
@@ -84,8 +84,6 @@ def _cut_for(
                 cut = merge_parts(cut, limited, run)
                 context = SearchContext(solid, limited, options.seed)
                 cut = eliminate_parts(context, cut, run)
-    except Stopped:
-        run.note_stop()
     return cut
 
 
@@ -125,7 +123,7 @@ def at_most(
     run : Run
     """
     best, least, errors = [whole], math.inf, dict[Part, float]()
-    try:
+    with run.until_stopped():
         for parts in itertools.chain([[whole]], few_enough(decompositions, most)):
             for state, error in united_in_turn(parts, limited.criterion, Work(MOST_CUTTING), run):
                 if error > NEARLY_EQUAL * least:
@@ -136,8 +134,6 @@ def at_most(
                 errors.update(zip(new, run.map(limited.error, new), strict=True))
                 if (error := max(errors[part] for part in state)) < least:
                     best, least = state, error
-    except Stopped:
-        run.note_stop()
     return best
 
 

@@ -21,7 +21,7 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.finish.finish import limit_part
 from rlacd.limit import few_enough
-from rlacd.merge.merge import united_in_turn
+from rlacd.merge.unite import united_in_turn
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run, Work
 from rlacd.solid.component import Component

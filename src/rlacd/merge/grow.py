@@ -13,9 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import merge_parts
+from rlacd.merge.unite import merge_parts
 from rlacd.run import Run, work
 from rlacd.solid.arrays import BoolArray, FloatArray, heights
 from rlacd.solid.component import DENSE, Component, Part, Plane, is_thin
@@ -59,11 +58,9 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]
         return merged
     if merged[0].whole.size > DENSE or sum(map(_shares, merged)) < CROSSING * len(merged):
         return merged
-    try:
+    parts = merged
+    with run.until_stopped():
         parts = _regrown(merged, criterion, run)
-    except Stopped:
-        run.note_stop()
-        return merged
     return parts if len(parts) <= WORTH * len(merged) and not run.is_over else merged
 
 
@@ -76,8 +73,7 @@ def _regrown(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]:
     """Parts grown from the pieces and merged; the merged parts if samples show that growing saves none."""
     whole = merged[0].whole
     pieces = [member for part in merged for member in part.members]
-    corners = sum(len(piece.hull.vertices) for piece in pieces)
-    if not run.work.pay(sum(work.growing(len(piece.hull.vertices), corners) for piece in pieces)):
+    if not run.work.pay(sum(work.uniting(len(piece.hull.vertices)) for piece in pieces)):
         return merged
     depth = DEPTH * criterion.outward_deviation
     grown = run.map(lambda piece: whole.against.grown(piece.hull.body, depth), pieces)

@@ -37,6 +37,7 @@ class NumberedParts:
         self.bodies: list[_native.ConvexBody] = []
         self.boxes = _native.Boxes([])
         self._criterion = criterion
+        self._first: list[int] = []  # of each part: the number of the first one united in it
         self.whole = parts[0].whole
         self._summands = np.empty((3, 2 * len(parts)))  # uniting pairs makes fewer than twice as many
         for part in parts:
@@ -49,6 +50,7 @@ class NumberedParts:
             self._summands = np.concatenate([self._summands, np.empty((3, number + 1))], axis=1)
         self._summands[:, number] = len(hull.vertices), part.volume, self._criterion.credit(part)
         self.parts[number] = part
+        self._first.append(number)
         self.bodies.append(hull.body)
         self.boxes.add(number, hull.body)
         return number
@@ -58,6 +60,17 @@ class NumberedParts:
         for number in numbers:
             del self.parts[number]
         self.boxes = self.boxes.without([*numbers])
+
+    def unite(self, first: int, second: int, union: Part) -> int:
+        """Replace two parts by their union, and get its number."""
+        self.remove([first, second])
+        number = self.add(union)
+        self._first[number] = min(self._first[first], self._first[second])
+        return number
+
+    def in_order(self) -> list[Part]:
+        """The parts, ordered by the first that was united in each."""
+        return [self.parts[number] for number in sorted(self.parts, key=self._first.__getitem__)]
 
     def sums(self, pairs: IntArray) -> FloatArray:
         """Sums over both parts of each pair [P, 2]: hull vertices, volumes, and credited volumes [3, P]."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rlacd._native import Stopped
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
@@ -94,16 +93,14 @@ class Transfer:
         parts : sequence of Part
             They cover the proxy. Those that meet their criterion on it only are cut again.
         """
-        covering: list[Part] = []
-        try:
+        reached: tuple[list[Part], float] | None = None
+        with self.run.until_stopped():
             moved = [self._begun(limit_hull(part.hull, tolerance=SIMPLE_FIRST)) for part in parts]
             self._cover(moved)
-            covering = [each.part for each in moved]
-            return self._tested(moved)
-        except Stopped:
-            self.run.note_stop()
+            reached = [each.part for each in moved], 1.0
+            reached = self._tested(moved)
         with self.run.shielded():
-            return covering or self._covering(parts), 1.0
+            return reached or (self._covering(parts), 1.0)
 
     def _begun(self, hull: Hull) -> _Moved:
         return _Moved(Part(hull, (), self.solid))
@@ -175,11 +172,8 @@ class Model:
         """Make the model of a solid; `pieces` are closed solids whose union it is (see `simplify`)."""
         proxy = None
         if math.isfinite(goal.outward_deviation) and len(solid.faces) >= DENSE:
-            try:
-                with run.stage("simplify"):
-                    proxy = simplify(solid, goal.outward_deviation, run.threads, pieces)
-            except Stopped:
-                run.note_stop()
+            with run.until_stopped(), run.stage("simplify"):
+                proxy = simplify(solid, goal.outward_deviation, run.threads, pieces)
         return cls(solid, proxy)
 
     @property

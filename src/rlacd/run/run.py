@@ -79,8 +79,7 @@ class Run:
     """Threads, time and work of one decomposition; a context that has to be entered before it is used.
 
     Work stops in two ways: between steps, `step` returns False; within a step, kernels and all other code that calls
-    `rlacd._native.poll_stop` raise `Stopped`. Code that can continue with the result of earlier steps catches it and
-    calls `note_stop`.
+    `rlacd._native.poll_stop` raise `Stopped`. Only `until_stopped` and `if_in_time` catch it.
 
     Parameters
     ----------
@@ -232,10 +231,14 @@ class Run:
         """Report the last step again; True if the work may continue."""
         return self.step(self._done, self._total, self._parts)
 
-    def note_stop(self) -> None:
-        """Record that a step was interrupted."""
-        if self.stopped_by is None:
-            self._stop_by("timeout")
+    @contextmanager
+    def until_stopped(self) -> Iterator[None]:
+        """Leave what is inside when a stop interrupts it, and record that; what it reached so far is gone on with."""
+        try:
+            yield
+        except Stopped:
+            if self.stopped_by is None:
+                self._stop_by("timeout")
 
     @contextmanager
     def shielded(self) -> Iterator[None]:

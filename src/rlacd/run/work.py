@@ -64,24 +64,14 @@ def cutting(faces: int) -> float:
     return 145 + 0.73 * faces
 
 
-def joining(vertices: float, pairs: int = 1) -> float:
-    """Compute the joint hulls of pairs of parts whose hulls have `vertices` vertices in total."""
-    return 18 * pairs + 0.8 * vertices
-
-
 def screening(vertices: float, pairs: int = 1) -> float:
-    """Test the joint hulls of pairs of parts against the solid, quickly; most are rejected at once."""
+    """Compute the joint hulls of pairs of hulls of `vertices` vertices in total, unless a test rejects them."""
     return 45 * pairs + 1.3 * vertices
 
 
 def uniting(vertices: int) -> float:
     """Unite parts, and hold the joint hull against the solid."""
     return 360 + 8.5 * vertices
-
-
-def growing(vertices: int, points: int) -> float:
-    """Grow a hull through the solid, and find which of some points are in what has grown."""
-    return 160 + 7 * vertices + 0.1 * points
 
 
 def limiting(vertices: int) -> float:

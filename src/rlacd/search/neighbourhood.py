@@ -1,11 +1,9 @@
 """Large-neighbourhood search over the parts of a decomposition.
 
-A state is a set of parts, all of which meet the criterion. Two operators change it:
+A state is a set of parts, all of which meet the criterion. One operator changes it: a part is divided among the parts
+around it and disappears, or gives them what they can take and stays as a smaller part.
 
-- redistribute: a part is divided among the parts around it and disappears.
-- give: the parts around take what they can of a part, and a smaller part stays.
-
-The next trial is always one of the operator that has done the least work since it last saved a part.
+Of the two, the next trial is always the one that has done the least work since it last saved a part.
 
 Source: P. Shaw, "Using Constraint Programming and Local Search Methods to Solve Vehicle Routing Problems", CP 1998.
 """
@@ -17,16 +15,15 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from rlacd._native import Stopped
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.numbered import NumberedParts
 from rlacd.run import Apart, Run
-from rlacd.search.operators import Exchange, give, redistribute
+from rlacd.search.divide import Exchange, divide
 from rlacd.solid.component import Component, Part
 
 
@@ -59,18 +56,10 @@ MOST_TRIES = 3
 """How often a part is divided between the same parts: of 470 further trials none saved one."""
 
 
-class Operator(Enum):
-    """How a trial changes the parts."""
+class _Trial(NamedTuple):
+    """Division of a part among those around it; where it `gives`, what none of them can take stays."""
 
-    REDISTRIBUTE = "a part is divided among those around"
-    GIVE = "a part gives to those around what they can take"
-
-
-@dataclass(frozen=True)
-class _Trial:
-    """An operator, and the number of the part it changes."""
-
-    operator: Operator
+    gives: bool
     part: int
 
 
@@ -106,8 +95,8 @@ class Neighbourhood:
         self._around: dict[int, tuple[int, ...]] = {}
         self._begun: deque[tuple[_Trial, Apart[Exchange | None]]] = deque()
         self._again: deque[_Trial] = deque()  # to be repeated: what they found came too late
-        self._tries: dict[tuple[Operator, int, tuple[int, ...]], int] = {}
-        self._in_vain = dict.fromkeys(Operator, 0)  # units since each last saved a part
+        self._tries: dict[tuple[_Trial, tuple[int, ...]], int] = {}
+        self._in_vain = dict.fromkeys((False, True), 0)  # units since trials that give, or do not, last saved a part
 
     @property
     def parts(self) -> list[Part]:
@@ -121,18 +110,18 @@ class Neighbourhood:
 
     def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
         """Search until the run or `most` trials are over, `patience` units save nothing, or no fewer parts can do."""
-        self._in_vain = dict.fromkeys(Operator, 0)
+        self._in_vain = dict.fromkeys((False, True), 0)
         self._make(self._trials(patience), most)
 
     def redistribute_all(self) -> None:
         """Offer each part to those around, the smallest first."""
-        self._make(_Trial(Operator.REDISTRIBUTE, which) for which in self._by_size())
+        self._make(_Trial(False, which) for which in self._by_size())
         self.steps = 0
 
     def _trials(self, patience: float) -> Iterator[_Trial]:
-        """Trials of the operator that has done the least work in vain."""
+        """Trials of the kind that has done the least work in vain."""
         while sum(self._in_vain.values()) < patience and not self.is_least:
-            found = map(self._least_tried, sorted(Operator, key=self._in_vain.__getitem__))
+            found = map(self._least_tried, sorted(self._in_vain, key=self._in_vain.__getitem__))
             trial = next((trial for trial in found if trial is not None), None)
             if trial is not None:
                 yield trial
@@ -141,12 +130,12 @@ class Neighbourhood:
             else:
                 return
 
-    def _least_tried(self, operator: Operator) -> _Trial | None:
+    def _least_tried(self, gives: bool) -> _Trial | None:
         """The part tried least often between the same neighbours; the smallest of several."""
         around = self._neighbours()
-        tries = {i: self._tries.get((operator, i, around[i]), 0) for i in self._by_size() if around[i]}
+        tries = {i: self._tries.get((_Trial(gives, i), around[i]), 0) for i in self._by_size() if around[i]}
         which = min(tries, key=tries.__getitem__, default=None)
-        return None if which is None or tries[which] == MOST_TRIES else _Trial(operator, which)
+        return None if which is None or tries[which] == MOST_TRIES else _Trial(gives, which)
 
     def _by_size(self) -> list[int]:
         parts = self._now.parts
@@ -164,33 +153,37 @@ class Neighbourhood:
 
     def _exchange(self, trial: _Trial) -> Callable[[Run], Exchange | None] | None:
         """Make the function that finds the exchange of a trial; None if the trial's part has gone."""
-        parts, context, operator = self._now.parts, self._context, trial.operator
+        parts, context = self._now.parts, self._context
         if trial.part not in parts:
             return None
         near = self._neighbours()[trial.part]
-        key = operator, trial.part, near
-        tries = self._tries[key] = self._tries.get(key, 0) + 1
-        random = np.random.default_rng(int(self._random.integers(2**32)))
-        divide = give if operator is Operator.GIVE else partial(redistribute, again=tries > 1)
-        return partial(divide, parts[trial.part], [parts[i] for i in near], context.criterion, random)
+        tries = self._tries[trial, near] = self._tries.get((trial, near), 0) + 1
+        return partial(
+            divide,
+            parts[trial.part],
+            [parts[i] for i in near],
+            context.criterion,
+            np.random.default_rng(int(self._random.integers(2**32))),
+            keeps_rest=trial.gives,
+            again=trial.gives or tries > 1,
+        )
 
     def _make(self, trials: Iterator[_Trial], most: float = math.inf) -> None:
         """Make trials, `LAG` at a time, and apply what they find, until there are `most`."""
         run = self._run
-        try:
-            while self.steps < most and run.step(self.steps, None, len(self.best)):
-                trial = self._again.popleft() if self._again else next(trials, None)
-                if trial is None and not self._begun:
-                    return
-                if trial is not None and (exchange := self._exchange(trial)) is not None:
-                    self._begun.append((trial, run.apart(exchange, run.work.left)))
-                if trial is None or len(self._begun) == LAG:
-                    self._settle()
-        except Stopped:  # raised between two exchanges: the best state so far is kept
-            run.note_stop()
-        finally:
-            run.abandon(apart for _, apart in self._begun)
-            self._begun.clear()
+        with run.until_stopped():
+            try:
+                while self.steps < most and run.step(self.steps, None, len(self.best)):
+                    trial = self._again.popleft() if self._again else next(trials, None)
+                    if trial is None and not self._begun:
+                        break
+                    if trial is not None and (exchange := self._exchange(trial)) is not None:
+                        self._begun.append((trial, run.apart(exchange, run.work.left)))
+                    if trial is None or len(self._begun) == LAG:
+                        self._settle()
+            finally:
+                run.abandon(apart for _, apart in self._begun)
+                self._begun.clear()
 
     def _settle(self) -> None:
         """Apply what the first trial under way has found, or make it again if parts that it changes have gone."""
@@ -200,7 +193,7 @@ class Neighbourhood:
         if apart.account.is_spent:  # it was given all that was left
             self._run.work.close()
         self.steps += 1
-        self._in_vain[trial.operator] += apart.account.done
+        self._in_vain[trial.gives] += apart.account.done
         if exchange is None:
             return
         if not self._apply(exchange):
@@ -208,7 +201,7 @@ class Neighbourhood:
             return
         self.accepted += 1
         if exchange.gain > 0:
-            self._in_vain[trial.operator] = 0
+            self._in_vain[trial.gives] = 0
         if cost(self.parts) < cost(self.best):
             if len(self.parts) < len(self.best):
                 self.gained = time.perf_counter()

@@ -7,7 +7,6 @@ import itertools
 import numpy as np
 from manifold3d import Manifold
 
-from rlacd._native import Stopped
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, heights, length
 from rlacd.solid.component import DENSE, Component, Part
@@ -97,15 +96,9 @@ def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
 
 
 def _hull(points: FloatArray, run: Run) -> Hull:
-    try:
-        exact = Hull.of(points)
-        if exact is not None:
-            return exact
-    except Stopped:
-        with run.shielded():
-            return _touching(points) if len(points) > DENSE else _box(points)
+    exact = run.if_in_time(lambda: Hull.of(points), lambda: _touching(points) if len(points) > DENSE else _box(points))
     with run.shielded():
-        return Hull.of(thickened(points)) or _box(points)
+        return exact or Hull.of(thickened(points)) or _box(points)
 
 
 def _touching(points: FloatArray) -> Hull:

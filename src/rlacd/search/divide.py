@@ -1,9 +1,8 @@
-"""The operators of the search, which exchange parts for fewer.
+"""The operator of the search, which exchanges parts for fewer.
 
-- redistribute: a part is divided until the parts around have taken all of it, or some piece cannot go. Hulls may
-  overlap, so a taker need not end where the part began: it takes a piece if their joint hull meets the criterion. A
-  piece that no part can take is halved, and the halves are offered again.
-- give: the same, but what no part can take stays a part.
+A part is divided until the parts around have taken all of it, or some piece cannot go. Hulls may overlap, so a taker
+need not end where the part began: it takes a piece if their joint hull meets the criterion. A piece that no part can
+take is halved, and the halves are offered again. What is left of a part may stay a part.
 """
 
 from __future__ import annotations
@@ -14,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.merge import feasible_unions, joint_part
+from rlacd.merge.unite import feasible_unions, joint_part
 from rlacd.run import Run, work
+from rlacd.solid.arrays import length
 from rlacd.solid.component import Component, Part, reunite
 
 
@@ -54,12 +54,14 @@ MIDDLE = 0.1
 """A piece is halved within this share of its length from the middle, at random, so each trial divides differently."""
 
 
-def redistribute(
+def divide(
     part: Part,
     around: Sequence[Part],
     criterion: Criterion,
     random: np.random.Generator,
     run: Run,
+    *,
+    keeps_rest: bool = False,
     again: bool = False,
 ) -> Exchange | None:
     """Divide a part among the parts around it.
@@ -67,7 +69,6 @@ def redistribute(
     Parameters
     ----------
     part : Part
-        The part to eliminate.
     around : sequence of Part
         Parts near it; each that takes a piece still meets the criterion.
     criterion : Criterion
@@ -75,54 +76,34 @@ def redistribute(
         Draws where pieces are halved.
     run : Run
         Give up when it is over.
+    keeps_rest : bool
+        What no part can take stays a part, if that meets the criterion; otherwise all of it has to go.
     again : bool
         Whether it was tried before: then pieces are halved along random axes, not between the parts that can take most.
 
     Returns
     -------
     Exchange or None
-        An exchange that saves one part; None if some piece cannot be taken, or the part is more than its pieces.
+        An exchange that saves one part, or with `keeps_rest` none; None if nothing can be taken, or not enough.
     """
-    if not part.members:
-        return None
     division = _Division(around, criterion, random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
-    if not all(division.takers(piece) or division.may_go(piece) for piece in pieces):
+    if not keeps_rest and not all(map(division.may_go, pieces)):
         return None  # a quick test that ends most trials
-    if any(division.left_of(piece, stop=True) for piece in pieces):
-        return None
-    return _exchanged(part, around, division.now, criterion)
-
-
-def give(
-    part: Part,
-    around: Sequence[Part],
-    criterion: Criterion,
-    random: np.random.Generator,
-    run: Run,
-) -> Exchange | None:
-    """Let the parts around a part take what they can of it (see `redistribute`).
-
-    Returns
-    -------
-    Exchange or None
-        Equally many parts or one fewer; None if nothing can be taken, or what is left does not meet the criterion.
-    """
-    division = _Division(around, criterion, random, run, again=True)
-    left = [component for member in part.members for component in division.left_of(_Piece(member))]
-    if run.is_over or all(now is before for now, before in zip(division.now, around, strict=True)):
+    left: list[Component] = []
+    for piece in pieces:
+        left += division.left_of(piece, stop=not keeps_rest)
+        if left and not keeps_rest:
+            return None
+    changes = [*zip(division.now, around, strict=True)]
+    if run.is_over or all(now is before for now, before in changes):
         return None
     rest = [Part.joint(*left)] if left else []
     for whole in rest:
         if not run.work.pay(work.uniting(len(whole.hull.vertices))) or not criterion.is_met(whole):
             return None
-    return _exchanged(part, around, [*division.now, *rest], criterion)
-
-
-def _exchanged(part: Part, around: Sequence[Part], after: Sequence[Part], criterion: Criterion) -> Exchange:
-    """The exchange of parts before and after giving; changed parts of many components are reunited."""
-    known = {id(other) for other in around}
-    return Exchange.between([part, *around], [p if id(p) in known else _mended(p, criterion) for p in after])
+    after = [now if now is before else _mended(now, criterion) for now, before in changes]
+    return Exchange.between([part, *around], [*after, *rest])
 
 
 def _mended(part: Part, criterion: Criterion) -> Part:
@@ -159,18 +140,22 @@ class _Division:
         return [i for i, _ in sorted(feasible, key=lambda found: found[1] - self.now[found[0]].hull.volume)[:TAKERS]]
 
     def may_go(self, piece: _Piece, halvings: int = PIECE_HALVINGS) -> bool:
-        """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger may."""
-        smaller = self._halves(piece) if halvings > 0 else []
-        return all(self.may_go(half, halvings - 1) for half in smaller) if smaller else bool(self.takers(piece))
+        """Whether the piece, or each of those it is halved into, may be taken by some part."""
+        takers = self.takers(piece)
+        if takers or halvings == 0:
+            return bool(takers)
+        halves = self._halves(piece, takers)
+        return len(halves) > 0 and all(self.may_go(half, halvings - 1) for half in halves)
 
     def left_of(self, piece: _Piece, halvings: int = PIECE_HALVINGS, stop: bool = False) -> list[Component]:
         """Give parts what they can take of a piece; returns the rest, or with `stop` the first of the rest."""
-        for i in self.takers(piece):
-            union, price = joint_part(self.now[i], piece.component, self._criterion)
-            if self._run.work.pay(price) and union is not None:
+        takers = self.takers(piece)
+        for i in takers:
+            union = joint_part(self.now[i], piece.component, self._criterion, self._run.work)
+            if union is not None:
                 self.now[i] = union
                 return []
-        halves = self._halves(piece) if halvings > 0 else []
+        halves = self._halves(piece, takers) if halvings > 0 else []
         if not halves:
             return [piece.component]
         left: list[Component] = []
@@ -180,15 +165,20 @@ class _Division:
                 break
         return left
 
-    def _halves(self, piece: _Piece) -> list[_Piece]:
+    def _halves(self, piece: _Piece, takers: Sequence[int]) -> list[_Piece]:
         if piece.halves is None:
             may_cut = self._run.step(0, None, len(self.now)) and self._run.work.pay(work.cutting(piece.component.size))
-            piece.halves = [_Piece(half) for half in self._halved(piece.component)] if may_cut else []
+            piece.halves = [_Piece(half) for half in self._halved(piece.component, takers)] if may_cut else []
         return piece.halves
 
-    def _halved(self, component: Component) -> list[Component]:
-        """Cut near the middle; the smaller half comes first."""
+    def _halved(self, component: Component, takers: Sequence[int]) -> list[Component]:
+        """Cut near the middle, first from the one to the other of the best takers; the smaller half comes first.
+
+        Around a round hole that follows the hole, which no axis does.
+        """
         share = self._random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-        if not self._again:
-            return component.halved_between(share, [part.hull for part in self.now])
-        return component.halved(share, self._random.random() >= 0.5)
+        if not self._again and len(takers) > 1:
+            along = np.subtract(*(self.now[i].hull.vertices.mean(axis=0) for i in takers[1::-1]))
+            if length(along) > 0:
+                return component.halved(share, along[None] / length(along))
+        return component.halved(share, np.eye(3) if self._random.random() < 0.5 else component.principal_axes)
