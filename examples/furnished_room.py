@@ -67,7 +67,7 @@ def main(folder: Path) -> None:
         name = f"room_radius_{round(100 * radius)}_percent"
         result.save(folder / f"{name}.glb")
         result.save_balls(folder / f"{name}_balls.glb")
-        result.picture(folder / f"{name}.png", width=1200)
+        result.save_picture(folder / f"{name}.png", width=1200)
         print(f"{name}: {result}")
 
 

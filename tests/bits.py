@@ -103,8 +103,8 @@ CASES: dict[str, tuple[Callable[[], Shape], dict[str, Any]]] = {
     "hills, volume": (hills, {**FAST, "criterion": "volume"}),
     "hills, distance in full": (hills, {**FAST, "criterion": "distance", "detail": "full"}),
     "torn": (torn, FAST),
-    "torn, thin": (torn, {**FAST, "open": "thin"}),
-    "torn, solid": (torn, {**FAST, "open": "solid", "resolution": 60, "gap": 0.03}),
+    "torn, thin": (torn, {**FAST, "openings": "thin"}),
+    "torn, solid": (torn, {**FAST, "openings": "solid", "resolution": 60, "gap": 0.03}),
     **{f"hills, {policy}": (hills, {**FAST, "policy": policy}) for policy in POLICIES},
 }
 

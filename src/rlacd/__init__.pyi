@@ -17,8 +17,8 @@ from rlacd.errors import MissingExtraError as MissingExtraError
 from rlacd.errors import OptionError as OptionError
 from rlacd.errors import OutputError as OutputError
 from rlacd.errors import RlacdError as RlacdError
-from rlacd.io.robots import Rewritten as Rewritten
-from rlacd.options import DetailName, OpenName, QualityName, RelativeTo, UnitName, VolumeOf
+from rlacd.io.robots import RewrittenRobot as RewrittenRobot
+from rlacd.options import DetailName, OpeningsName, QualityName, RelativeTo, UnitName, VolumeOf
 from rlacd.options.names import PrimitiveKind
 from rlacd.options.navigable import NavigableSpace as NavigableSpace
 from rlacd.options.presets import PRESETS as PRESETS
@@ -34,9 +34,10 @@ from rlacd.run import ProgressCallback
 from rlacd.solid.component import Component as Component
 from rlacd.solid.component import Plane as Plane
 from rlacd.solid.primitive import Primitive as Primitive
-from rlacd.thresholds import Choice as Choice
 from rlacd.thresholds import Tradeoff as Tradeoff
+from rlacd.thresholds import TradeoffRow as TradeoffRow
 from rlacd.thresholds import tradeoff as tradeoff
+from rlacd.view_file import view as view
 
 def decompose(
     mesh: MeshLike,
@@ -62,7 +63,7 @@ def decompose(
     merge: bool | None = True,
     policy: str | Policy | None = None,
     resolution: int | None = 100,
-    open: OpenName | None = "auto",
+    openings: OpeningsName | None = "auto",
     keep_cavities: bool | None = False,
     gap: float | None = 0.015,
     seed: int | None = 0,
@@ -154,7 +155,7 @@ def decompose(
         learned with --no-merge.
     resolution : int
         Grid cells along the longest side, used to repair bodies that are not closed. Default: 100.
-    open : OpenName
+    openings : OpeningsName
         Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
         others thin shells; solid fills all that enclose a space; thin fills none. Default: auto.
     keep_cavities : bool
@@ -251,7 +252,7 @@ def rewrite_robot(
     merge: bool | None = None,
     policy: str | Policy | None = None,
     resolution: int | None = None,
-    open: OpenName | None = None,
+    openings: OpeningsName | None = None,
     keep_cavities: bool | None = None,
     gap: float | None = None,
     seed: int | None = None,
@@ -265,7 +266,7 @@ def rewrite_robot(
     relative_to: RelativeTo | None = None,
     unit: UnitName | None = None,
     scale: float | None = None,
-) -> Rewritten:
+) -> RewrittenRobot:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
 
     Parameters
@@ -308,7 +309,7 @@ def rewrite_robot(
 
     Returns
     -------
-    Rewritten
+    RewrittenRobot
 
     Raises
     ------

@@ -192,10 +192,10 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
         bodies += len(one.report.repair)
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
     said, distances = [*report.warnings, *said], report.hausdorff
-    if distances.under is not None:
+    if distances.missed is not None:
         found = [hull for part in done for h in part.hulls if (hull := Hull.of(frame.to_frame(h.vertices))) is not None]
         left_out = missed(frame.to_frame(source.specks), found, frame, run)
-        distances = replace(distances, under=max(distances.under, left_out.distance))
+        distances = replace(distances, missed=max(distances.missed, left_out.distance))
         said[len(report.warnings) : len(report.warnings)] = left_out.said
     told = (*source.warnings, *said)
     joint = replace(report, options=options.as_plain(), hausdorff=distances, warnings=told)

@@ -150,8 +150,8 @@ def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -
 def test_a_report_on_stdout_is_json_and_nothing_else(mesh: Path, stand_in: StandIn) -> None:
     run = rlacd("decompose", mesh, "--report", "-")
     report = json.loads(run.stdout)
-    assert report["parts"] == 1
-    assert report["hausdorff"]["under"] is None, "NaN is not JSON"
+    assert report["hulls"] == 1
+    assert report["hausdorff"]["missed"] is None, "NaN is not JSON"
 
 
 def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_the_summary_says_what_more_time_may_gain() -> None:
     assert 0 <= search.last_gain <= search.seconds
     idle = search.seconds - search.last_gain
     said = f"saved no hull in the last {idle:.1f} of {search.seconds:.1f} s"
-    assert (said in summary(best, "out.xml")) == (best.report.at_least < len(best))
+    assert (said in summary(best, "out.xml")) == (best.report.lower_bound < len(best))
     assert "saved no hull" not in summary(decompose(frame, threads=1), "out.xml")
 
 
@@ -296,7 +296,7 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
         ("view {dir}/ell.stl --threshold -1", "threshold is -1"),
         ("view {dir}/ell.stl --criterion beauty", "distance, volume or navigable"),
         ("view {dir}/ell.stl --criterion volume --threshold 0.05", "threshold is 0.05; it has to be left out"),
-        ("view {dir}/ell.stl --open wide", "auto, solid, thin"),
+        ("view {dir}/ell.stl --openings wide", "auto, solid, thin"),
         ("info -", "only rlacd decompose reads stdin"),
         ("view {dir}/ell.stl --threshold 2mm", "it has to be a number or a share such as 2%"),
         ("decompose {dir}/no/chair.glb", "{dir}/no/chair.glb does not exist: check the spelling and the folder"),
@@ -462,7 +462,7 @@ def test_a_real_run_in_a_pipe(mesh: Path) -> None:
     assert run.returncode == 0, run.stderr
     report = json.loads(run.stdout)
     read = trimesh.load_scene(mesh.with_name("out.obj"), split_objects=True)
-    assert len(read.geometry) == report["parts"] == len(report["concavity"]["per_part"])
+    assert len(read.geometry) == report["hulls"] == len(report["concavity"]["per_part"])
     assert read.bounds == pytest.approx(trimesh.load(mesh).bounds, abs=1e-6)
     assert report["complete"] is True
     assert "\x1b" not in run.stderr, "no colours or bars in a pipe"

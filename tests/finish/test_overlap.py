@@ -99,7 +99,7 @@ def test_the_threshold_holds_and_each_hull_contains_its_own() -> None:
     flush, result = (rlacd.decompose(stool(), quality="fast", threads=1, overlap=depth / 2) for depth in (0.0, OVERLAP))
     assert len(flush) == len(result)
     assert result.report.concavity.max <= 0.05
-    assert result.report.hausdorff.over <= 0.05
+    assert result.report.hausdorff.added <= 0.05
     for before, after in zip(flush, result, strict=True):
         assert depths([after], before.vertices).min() > -1e-9
     assert sum(hull.volume for hull in result) > sum(hull.volume for hull in flush)
@@ -144,7 +144,7 @@ def test_a_seam_without_room_is_told() -> None:
     assert len(overlap.short_seams) == overlap.short
     for seam in overlap.short_seams:
         place = np.array([seam.at_abs])
-        between = depths([result[part] for part in seam.parts], place)
+        between = depths([result[part] for part in seam.hulls], place)
         assert between.max() == pytest.approx(seam.depth_abs, abs=1e-3)
         assert between.min() > -0.003 / result.report.scale, "a place on both hulls"
         assert seam.depth_abs < 0.1 / result.report.scale

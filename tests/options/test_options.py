@@ -129,13 +129,13 @@ def result() -> rlacd.Decomposition:
 @pytest.mark.slow
 @pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
 def test_options_of_what_is_written_are_checked(odd: Any, result: rlacd.Decomposition, tmp_path: Path) -> None:
-    for name in ("file_format", "density", "up", "one_mesh"):
+    for name in ("file_type", "density", "up", "one_mesh"):
         assert_accepted_or_told(lambda name=name: result.save(tmp_path / "box.urdf", **{name: odd}), RlacdError)
     for place in (tmp_path / "box.png", odd):
         for name in ("width", "up"):  # a wrong ending, so that no picture is drawn
             given = {name: odd}
             assert_accepted_or_told(
-                lambda p=place, g=given: result.picture(Path(str(p) + "x") if p is not odd else p, **g), RlacdError
+                lambda p=place, g=given: result.save_picture(Path(str(p) + "x") if p is not odd else p, **g), RlacdError
             )
     assert_accepted_or_told(lambda: result.save_report(tmp_path / "no folder" / "a.html", up=odd), RlacdError)
 

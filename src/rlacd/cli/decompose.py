@@ -23,7 +23,7 @@ from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.read import READERS
 from rlacd.io.read.open_file import missing
-from rlacd.options.output import PAGES, OutputOptions
+from rlacd.options.output import REPORTS, OutputOptions
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Progress, ProgressCallback
 
@@ -38,9 +38,6 @@ MESH = (
 
 LOG_EVERY = 30.0
 """Seconds between two lines in a log about a robot that takes long, as between those of a batch."""
-
-REPORTS = (".json", *PAGES)
-"""Endings of reports."""
 
 FROM = "What stdin holds, if IN is -: obj, stl, ...  [default: told from its content]"
 
@@ -59,7 +56,7 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
       rlacd decompose chair.glb
       rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
       rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
-      rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
+      rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .hulls
       rlacd decompose chair.glb -o chair.xml --preset mujoco
       rlacd decompose robot.urdf -o robot_acd.urdf
       cat chair.obj | rlacd decompose - --from obj -o - --format stl > hulls.stl
@@ -112,11 +109,11 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: 
     with watching(quiet=quiet) as watch:
         result = decompose_in(told_in, mesh, **options, progress=watch)
     place = str(wanted.output)
-    names = ("file_format", "density", "mass", "one_mesh", "keep_input", "scene")
+    names = ("file_type", "density", "mass", "one_mesh", "keep_input", "scene")
     written = chosen({name: getattr(wanted, name) for name in names})
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", ImplausibleBodyWarning)
-        with file_for(place, wanted.file_format) as file:
+        with file_for(place, wanted.file_type) as file:
             result.save(file, up=up, **written)
     if not quiet:
         say(summary(result, "stdout" if place == STDIO else place))
@@ -125,33 +122,16 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: 
     extras: dict[str, tuple[str | None, Callable[[str], object]]] = {
         "report": (wanted.report, partial(result.save_report, up=up)),
         "balls": (wanted.balls, result.save_balls),
-        "picture": (wanted.picture, partial(result.picture, up=up)),
+        "picture": (wanted.picture, partial(result.save_picture, up=up)),
     }
-    if wanted.report is None or not is_html(wanted.report):
-        _write_report(wanted, to_json(result.report))
+    if wanted.report == STDIO:
+        give(to_json(result.report))
         del extras["report"]
     for what, (path, write) in extras.items():
         if path is not None:
             with writing(what, path, quiet=quiet):
                 write(path)
     return result.report.complete
-
-
-def _write_report(wanted: OutputOptions, text: str) -> None:
-    """Write measurements where they were asked for, if they were."""
-    from rlacd.cli.terminal import writing
-    from rlacd.io.write import write_file
-
-    if wanted.report == STDIO:
-        give(text)
-    elif wanted.report is not None:
-        with writing("report", wanted.report, quiet=bool(wanted.quiet)):
-            write_file(Path(wanted.report), text.encode())
-
-
-def is_html(path: str) -> bool:
-    """Tell from its name whether a report should be a page; here, since `rlacd.view` takes time to load."""
-    return Path(path).suffix.lower() in PAGES
 
 
 def _rewrite(
@@ -172,11 +152,11 @@ def _rewrite(
             done = rewrite_in(told_in, robot, place, **given, **options)
     if not wanted.quiet:
         say(rewrite_summary(done))
-    if wanted.report is not None and is_html(wanted.report):
+    if wanted.report == STDIO:
+        give(to_json(done.as_dict()))
+    elif wanted.report is not None:
         with writing("report", wanted.report, quiet=bool(wanted.quiet)):
             done.save_report(wanted.report)
-    else:
-        _write_report(wanted, to_json(done.as_dict()))
     return done.complete
 
 
@@ -211,15 +191,15 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
     """Fill in the output path and format that the preset or the input determines."""
     from rlacd.io.write.target import MODELS, file_kind
 
-    ending, file_format = file_kind(asked.file_format, preset)
+    ending, file_type = file_kind(asked.file_type, preset)
     if mesh.suffix.lower() in ROBOTS:
         ending = mesh.suffix
     beside = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
     output = beside if asked.output is None else asked.output
-    model, ending = MODELS.get(str(file_format)), Path(output).suffix.lower().lstrip(".")
-    if asked.file_format is None and (model is None or ending not in model.endings):
-        file_format = None
-    return dataclasses.replace(asked, output=output, file_format=file_format)
+    model, ending = MODELS.get(str(file_type)), Path(output).suffix.lower().lstrip(".")
+    if asked.file_type is None and (model is None or ending not in model.endings):
+        file_type = None
+    return dataclasses.replace(asked, output=output, file_type=file_type)
 
 
 def _check_mesh(mesh: Path, wanted: OutputOptions, robots: dict[str, Any]) -> None:
@@ -228,14 +208,14 @@ def _check_mesh(mesh: Path, wanted: OutputOptions, robots: dict[str, Any]) -> No
     from rlacd.io.write.balls import check_balls
     from rlacd.io.write.folder import check_names
 
-    target = hull_target(stdout_name(str(wanted.output), wanted.file_format), wanted)
+    target = hull_target(stdout_name(str(wanted.output), wanted.file_type), wanted)
     if target.is_folder:
         stem = file_stem(mesh.stem)
-        check_names(target.path, stem, [f"{stem}_000.{target.file_format}"])  # the one that every result has
+        check_names(target.path, stem, [f"{stem}_000.{target.file_type}"])  # the one that every result has
     for flag in ["package-dir"] * bool(wanted.package_dirs) + [{"links": "link"}.get(name, name) for name in robots]:
         raise OptionError(f"--{flag} is for robots, a .urdf or .xml file as input.")
     if wanted.picture is not None:
-        from rlacd.view.picture import check_picture
+        from rlacd.viewer.picture import check_picture
 
         check_picture(wanted.picture, up=wanted.up)
     if wanted.balls is not None:
@@ -246,9 +226,9 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes."""
     if wanted.output == STDIO:
         raise OptionError("a robot is several files, which do not fit into stdout: give -o a file name.")
-    for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "scene"):
+    for name in ("picture", "balls", "file_type", "density", "mass", "one_mesh", "scene"):
         if getattr(asked, name) is not None:
-            spelled = "format" if name == "file_format" else name.replace("_", "-")
+            spelled = "format" if name == "file_type" else name.replace("_", "-")
             raise OptionError(f"--{spelled} is for a single mesh; leave it out for a robot.")
 
 

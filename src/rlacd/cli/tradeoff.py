@@ -20,7 +20,7 @@ from rlacd.plain_json import to_json
 
 TAKEN = (
     *("threshold", "criterion", "max_hulls", "threshold_abs", "volume_tolerance", "volume_of", "max_vertices"),
-    *("max_faces", "preset", "detail", "merge", "policy", "open", "unit", "scale", "quality", "seed", "threads"),
+    *("max_faces", "preset", "detail", "merge", "policy", "openings", "unit", "scale", "quality", "seed", "threads"),
     "timeout",
 )
 
@@ -44,7 +44,7 @@ def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None
         raise OptionError(f"{mesh} is a robot; give one of the meshes that it refers to.")
     import_trimesh(mesh)
     if picture is not None:
-        from rlacd.view.picture import check_picture
+        from rlacd.viewer.picture import check_picture
 
         check_picture(picture)
     options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
@@ -54,12 +54,12 @@ def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None
     with watching(quiet=bool(quiet)) as watch:
         found = tradeoff(mesh, **options, progress=watch)
     found = replace(found, unit=Unit.typed(unit_given(how)) or found.unit)
-    give(to_json(found.as_plain()) if as_json else f"{found}\n")
-    if found.pick is None and found.choices:
+    give(to_json(found.as_dict()) if as_json else f"{found}\n")
+    if found.pick is None and found.rows:
         say("no threshold tried leads to so few hulls; rlacd decompose --max-hulls finds the tightest.")
-    if picture is not None and found.choices:
+    if picture is not None and found.rows:
         with writing("picture", picture, quiet=bool(quiet)):
-            found.picture(picture)
+            found.save_picture(picture)
     if not found.complete:
         raise SystemExit(ExitCode.STOPPED_EARLY)
 

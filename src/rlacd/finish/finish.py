@@ -70,7 +70,7 @@ def finish(reached: Reached, run: Run) -> Finished:
     one that misses nothing is.
     """
     done, parts = _finished(reached, run)
-    under = done.report.hausdorff.under
+    under = done.report.hausdorff.missed
     if under is not None and under > COVERAGE_TOLERANCE:
         earlier = run.if_in_time(lambda: _covering(reached, parts, run), lambda: None)
         return done if earlier is None else finish(earlier, run)

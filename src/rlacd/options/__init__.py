@@ -50,7 +50,7 @@ CRITERIA = {
 """Each criterion by its name, with the numbers that say how tight it is."""
 
 VolumeOf = Literal["part", "whole"]
-OpenName = Literal["auto", "solid", "thin"]
+OpeningsName = Literal["auto", "solid", "thin"]
 DetailName = Literal["simple", "full"]
 QualityName = Literal["fast", "balanced", "best"]
 RelativeTo = Literal["scene", "node", "mesh"]
@@ -257,7 +257,7 @@ class Options:
     """
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
     """Grid cells along the longest side, used to repair bodies that are not closed."""
-    open: OpenName = option("auto", METHOD, one_of=OpenName)
+    openings: OpeningsName = option("auto", METHOD, one_of=OpeningsName)
     """Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
     others thin shells; solid fills all that enclose a space; thin fills none."""
     keep_cavities: bool = option(False, METHOD)

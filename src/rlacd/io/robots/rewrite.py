@@ -15,7 +15,7 @@ from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.decomposed import check_options, decomposed_robot
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
-from rlacd.io.robots.rewritten import Rewritten, rewritten
+from rlacd.io.robots.rewritten import RewrittenRobot, rewritten
 from rlacd.io.robots.robot import Robot
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
 from rlacd.options import ELSEWHERE, Options
@@ -35,7 +35,7 @@ def rewrite_robot(
     keep_input: bool = False,
     progress: ProgressCallback | None = None,
     **options: Any,
-) -> Rewritten:
+) -> RewrittenRobot:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
 
     Parameters
@@ -61,7 +61,7 @@ def rewrite_robot(
 
     Returns
     -------
-    Rewritten
+    RewrittenRobot
 
     Raises
     ------
@@ -95,7 +95,7 @@ def rewrite_in(
     keep_input: bool = False,
     progress: ProgressCallback | None = None,
     **options: Any,
-) -> Rewritten:
+) -> RewrittenRobot:
     """Rewrite as `rewrite_robot` does, but warn of nothing, and tell lengths in a unit; None for the robot's own."""
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     check_names("rewrite_robot", options, inspect.signature(rewrite_robot).parameters, ELSEWHERE)
@@ -118,7 +118,7 @@ def rewrite(
     *,
     keep_input: bool = False,
     began: float | None = None,
-) -> Rewritten:
+) -> RewrittenRobot:
     """Rewrite a robot that has been read, since a time of `time.perf_counter`; see `rewrite_robot`."""
     began = time.perf_counter() if began is None else began
     check_options(options)

@@ -165,9 +165,9 @@ export class Controls {
         ["solid", "Solid", "Fill every body that encloses a space once its openings are closed."],
         ["thin", "Thin", "Fill none: every open body becomes a thin shell."],
       ],
-      given.open,
+      given.openings,
       (value) => {
-        this.options.open = value;
+        this.options.openings = value;
         this.changed();
       },
       "What becomes of bodies with openings.",
@@ -216,7 +216,7 @@ export class Controls {
         ? { volume_tolerance: this.volume.value }
         : { threshold: this.threshold.value };
     const limits = { max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
-    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, keep_open: this.options.keep_open ?? null, open: this.options.open, keep_cavities: this.options.keep_cavities && criterion !== "navigable", ...limits };
+    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, keep_open: this.options.keep_open ?? null, open: this.options.openings, keep_cavities: this.options.keep_cavities && criterion !== "navigable", ...limits };
   }
 
   /** Take another engine's limits. */
@@ -239,7 +239,7 @@ export class Controls {
     this.tolerance.tell(scene, 2);
     this.overlap.tell(scene, 2);
     this.criterion.querySelector("input[value=navigable]").disabled = Boolean(scene.robot); // a ball has one size for all
-    this.open.hidden = this.options.open === "auto" && !hasOpenBodies(scene);
+    this.open.hidden = this.options.openings === "auto" && !hasOpenBodies(scene);
     this.cavities.hidden = this.options.criterion === "navigable" || !(this.options.keep_cavities || hasFilledCavities(scene));
   }
 

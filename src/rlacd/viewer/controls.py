@@ -24,7 +24,7 @@ from rlacd.solid.topology import used_points
 
 _NAMES = (
     *("criterion", "threshold", "radius", "tolerance", "volume_tolerance", "quality", "primitives"),
-    *("overlap", "keep_open", "open", "keep_cavities", "max_hulls", "max_vertices", "preset"),
+    *("overlap", "keep_open", "openings", "keep_cavities", "max_hulls", "max_vertices", "preset"),
 )
 _USUAL, _SPACE = Options(), NavigableSpace()
 _NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
@@ -142,4 +142,4 @@ def preset_words(name: str) -> dict[str, Any]:
     ending = preset.ending.lstrip(".")
     stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
     limits = " and ".join(f"{limit} {what}" for what, limit in stated.items() if limit)
-    return {"engine": preset.engine, "format": preset.file_format or MODEL_OF.get(ending, ending), "limits": limits}
+    return {"engine": preset.engine, "format": preset.file_type or MODEL_OF.get(ending, ending), "limits": limits}
