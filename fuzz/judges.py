@@ -324,7 +324,7 @@ def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], ra
         return []
     assert space.radius is not None
     assert space.tolerance is not None
-    radius, tolerance = 2 * space.radius, 2 * space.tolerance
+    radius, tolerance = space.radius, space.tolerance
     if radius >= 2 or "max_hulls" in case.options:
         return []
     vertices, faces = triangles_of(solid)

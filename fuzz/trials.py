@@ -230,7 +230,7 @@ class Laboratory:
             del options["preset"]  # its files have another format
         ending = str(random.choice([*FORMATS, "mjcf", "folder"]))
         space = options.get("criterion")
-        if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.05:
+        if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.1:
             del options["criterion"]  # would give tens of thousands of parts
         spec = JobSpec.of(options, file_type=None if ending == "folder" else ending, folders=ending == "folder")
         trial = replace(trial, story=[*shape.steps, ending], options=options)

@@ -112,7 +112,7 @@ def test_every_kind_of_input_gives_the_same(source: str, tmp_path) -> None:
 
 FAST: list[dict[str, Any]] = [
     {"criterion": "volume", "volume_tolerance": 0.1},
-    {"criterion": rlacd.NavigableSpace(0.05, 0.02)},
+    {"criterion": rlacd.NavigableSpace(0.1, 0.04)},
     {"primitives": True},
     {"overlap": 0.02},
     {"keep_open": 0.9},

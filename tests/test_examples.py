@@ -101,8 +101,8 @@ def test_the_furnished_room_stays_open_for_a_small_ball_only() -> None:
     """Under the bed and in the shelf, where only the small one goes, and in the middle of the room, where both go."""
     places = [(3.5, 1.5, 0.2), (1.1, 2.7, 0.25), (1.0, 1.5, 1.3)]
     inside = []
-    for radius in (0.02, 0.10):
-        space = rlacd.NavigableSpace(radius, tolerance=0.01)
+    for radius in ("2%", "10%"):
+        space = rlacd.NavigableSpace(radius, tolerance="1%")
         hulls = rlacd.decompose(
             script(ROOT / "examples" / "furnished_room.py").room(), criterion=space, policy="navacd", quality="fast"
         )

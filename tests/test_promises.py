@@ -95,7 +95,7 @@ REPORTS: list[dict[str, Any]] = [
     {},
     {"criterion": "volume"},
     {"threshold_abs": 0.1},
-    {"criterion": rlacd.NavigableSpace(radius=0.1, tolerance=0.05)},
+    {"criterion": rlacd.NavigableSpace(radius=0.2, tolerance=0.1)},
     {"primitives": True, "overlap": 0.005},
     {"per_node": True, "avoid": [trimesh.creation.box(bounds=[(9, 9, 9), (10, 10, 10)])]},
 ]

@@ -278,7 +278,7 @@ def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
         source,
         resolution=options.resolution,
         open_bodies=options.openings,
-        gap=2 * options.gap,
+        gap=options.gap,
         threads=run.threads,
         keep_cavities=options.sees_cavities,
     )

@@ -29,9 +29,9 @@ class Unit:
         return cls() if metres is None else cls(_NAMES.get(metres, cls.name))
 
     @classmethod
-    def typed(cls, name: str | None) -> Unit | None:
-        """That in which a length was typed for an input in metres; None if it was a bare number or a share."""
-        return None if name is None else cls(name, UNITS[name])
+    def typed(cls, name: str | None, metres: float | None) -> Unit | None:
+        """That in which a length was given for an input whose unit is so many metres; None if none was."""
+        return None if name is None or metres is None else cls(name, UNITS[name] / metres)
 
     def scaled(self, scale: float) -> Unit:
         """The same for lengths in a frame, of which an input's unit is so many units."""

@@ -22,6 +22,7 @@ from rlacd.fit import ANY, Unit
 from rlacd.io.read.load import load_mesh
 from rlacd.options import FAST, Options
 from rlacd.options.fields import about, check_callback
+from rlacd.options.lengths import read_lengths
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.manifold import to_manifold
@@ -122,6 +123,7 @@ def tradeoff(
     OptionError
         An option has the wrong type or is out of range, or the criterion is navigable space, which has no threshold.
     """
+    options = read_lengths(options)
     chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options})
     name = "threshold_abs" if chosen.threshold_abs is not None else chosen.numbers[0]
     if name == "radius" or chosen.per_node:
@@ -129,12 +131,12 @@ def tradeoff(
     if options.get(name) is None:
         usual = about(Options, name).kind.read(getattr(chosen, name))
         chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options, name: FINEST * usual})
-    finest = getattr(chosen, name)
     check_callback("progress", progress, "a `rlacd.Progress`")
     rows: list[TradeoffRow] = []
     with Run(chosen.threads, chosen.timeout, progress) as run:
         with run.stage("load"):
-            source = in_metres(load_mesh(mesh, faces, file_type), chosen)
+            source, chosen = in_metres(load_mesh(mesh, faces, file_type), chosen)
+            finest = getattr(chosen, name)
         for factor, reached in zip(FACTORS, find_parts_under(source, chosen, FACTORS, run), strict=False):
             unit = 1.0 if chosen.threshold_abs is None else reached.solid.frame.scale
             rows.append(_row(finest * factor, reached, unit, run))

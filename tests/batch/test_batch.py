@@ -264,7 +264,7 @@ def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[s
 
 def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
     said = ["Some lies 3.7 mm outside: repair dropped it."]
-    missing = {"hausdorff": {"under": 0.37}, "missed": "3.7 mm", "warnings": said}
+    missing = {"hausdorff": {"missed": 0.37}, "missed": "3.7 mm", "warnings": said}
     assert [_status(report) for report in ({"warnings": ["a"]}, missing, {"warnings": []})] == [
         *("warned", "uncovered", "done")
     ]

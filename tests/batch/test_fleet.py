@@ -132,9 +132,9 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
         key(mass=2.0),
         key(keep_input=True),
         key(policy="navacd"),
-        key(criterion=NavigableSpace(0.1)),
         key(criterion=NavigableSpace(0.2)),
-        key(criterion=NavigableSpace(0.2, seeds=[(1, 2, 3)])),
+        key(criterion=NavigableSpace(0.4)),
+        key(criterion=NavigableSpace(0.4, seeds=[(1, 2, 3)])),
         key(policy=str(policies[0])),
     ]
     assert len({*same, *others}) == 1 + len(others)
@@ -149,7 +149,7 @@ def test_a_batch_takes_every_option_of_a_decomposition() -> None:
 
 
 def test_an_order_survives_the_way_to_another_process() -> None:
-    space = NavigableSpace(0.1, 0.2, seeds=[(1, 2, 3)], closed_planes=[((0, 0, 1), 0)])
+    space = NavigableSpace(0.2, 0.4, seeds=[(1, 2, 3)], closed_planes=[((0, 0, 1), 0)])
     spec = JobSpec.of({"criterion": space, "max_vertices": 32}, file_type="urdf", density=2.0, up="y")
     again = JobSpec(**json.loads(json.dumps(dataclasses.asdict(spec))))
     assert Options(**again.options).criterion == space

@@ -45,16 +45,14 @@ def rlacd(*words: object) -> Result:
 
 
 class StandIn:
-    """Takes the place of `decompose_in` where a test needs it to be slow, stopped or broken."""
+    """Takes the place of `decompose_quietly` where a test needs it to be slow, stopped or broken."""
 
     def __init__(self) -> None:
         self.calls: list[dict[str, Any]] = []
         self.during: Callable[[], object] = lambda: None
         self.known: dict[str, Any] = {}
 
-    def __call__(
-        self, told_in: Unit | None, mesh: Path, *, progress: ProgressCallback, **options: Any
-    ) -> Decomposition:
+    def __call__(self, mesh: Path, *, progress: ProgressCallback, **options: Any) -> Decomposition:
         self.calls.append(options)
         complete = True
         for step in range(3):
@@ -72,7 +70,7 @@ class StandIn:
             "hausdorff": Hausdorff(0.02, float("nan")),
             "seconds": {"total": 0.3},
             "warnings": ("one body was open",),
-            "unit": told_in or ANY,
+            "unit": ANY,
         }
         return Decomposition.of([hull_of(source.vertices)], source, **{**known, **self.known})
 
@@ -80,9 +78,9 @@ class StandIn:
 @pytest.fixture
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> StandIn:
     module = types.ModuleType("rlacd.decompose_mesh")
-    module.decompose_in = StandIn()  # type: ignore[attr-defined]
+    module.decompose_quietly = StandIn()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "rlacd.decompose_mesh", module)
-    return module.decompose_in
+    return module.decompose_quietly
 
 
 # --- what a good run says ---------------------------------------------------------------------------------------------
@@ -99,6 +97,7 @@ def test_hulls_go_beside_the_input_by_default_and_stdout_stays_empty(mesh: Path,
 
 def test_lengths_are_said_in_the_unit_that_was_given(mesh: Path, stand_in: StandIn) -> None:
     stand_in.known = {"concavity": LengthFit(None, 0.0498, 0.05), "scale": 10.0, "hausdorff": Hausdorff(0.2, 0.0)}
+    stand_in.known |= {"unit": Unit("mm", 1e-3)}
     glb = trimesh.load(mesh).export(mesh.with_suffix(".glb")) and mesh.with_suffix(".glb")
     said = "concavity at most 4.98 mm (threshold 5 mm); hulls reach 20 mm beyond the input and cover it\n"
     assert said in rlacd("decompose", glb, "--threshold", "5mm").stderr
@@ -136,7 +135,7 @@ def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -
         "max_faces": 60,
         "policy": "greedy",
         "resolution": 80,
-        "gap": 0.05,
+        "gap": 0.1,
         "seed": 7,
         "threads": 1,
         "timeout": 2.5,
@@ -144,6 +143,7 @@ def test_every_option_reaches_the_decomposition(mesh: Path, stand_in: StandIn) -
     words = [word for name, value in options.items() for word in ("--" + name.replace("_", "-"), value)]
     words += ["--avoid", "a.obj", "--avoid", "b.stl"]
     assert rlacd("decompose", mesh, *words, "--no-merge").exit_code == 0
+    options |= {name: str(options[name]) for name in ("threshold", "overlap", "keep_open", "gap")}
     assert stand_in.calls == [{**options, "avoid": ["a.obj", "b.stl"], "merge": False}]
 
 
@@ -210,7 +210,7 @@ def test_a_folder_can_be_filled_in_any_format(mesh: Path, stand_in: StandIn) -> 
         (["-o", ""], 2, "no name"),
         (["--picture", "{dir}/p.png", "--up", "w"], 2, "x, y or z"),
         (["-o", "{dir}/out.glb", "--format", "obj"], 2, "contradicts"),
-        (["--threshold", "tight"], 2, "--threshold"),
+        (["--threshold", "tight"], 2, "threshold is 'tight'; it has to be a number, a share such as 5%, or a length"),
         (["--treshold", "1"], 2, "there is no option --treshold; did you mean --threshold?"),
         (["--max-hulls"], 2, "option '--max-hulls' requires an argument"),
         (["--max-hulls", "few"], 2, "--max-hulls is 'few'; it has to be an integer, at least 1"),

@@ -195,7 +195,7 @@ CRITERIA: list[tuple[str, dict[str, Any]]] = [
     ("concavity", {}),
     ("concavity", {"quality": "fast", "max_vertices": 24}),
     ("volume", {"criterion": "volume", "volume_tolerance": 0.05, "quality": "fast"}),
-    ("navigable", {"criterion": rlacd.NavigableSpace(0.05, 0.02), "quality": "fast"}),
+    ("navigable", {"criterion": rlacd.NavigableSpace(0.1, 0.04), "quality": "fast"}),
 ]
 
 

@@ -245,7 +245,7 @@ def stool() -> trimesh.Trimesh:
 
 def test_primitives_leave_navigable_space_free(tmp_path: Path) -> None:
     """The true shapes touch no ball in MuJoCo, but would touch larger ones."""
-    space = rlacd.NavigableSpace(radius=0.06, tolerance=0.02)
+    space = rlacd.NavigableSpace(radius=0.12, tolerance=0.04)
     result = rlacd.decompose(stool(), criterion=space, primitives=True, quality="fast", threads=1)
     found, balls = primitives_of(result), result.balls
     assert "cylinder" in {each.kind for each in found}
@@ -266,7 +266,7 @@ def test_primitives_of_navigable_space_stay_near_the_convex_hull() -> None:
     dome = trimesh.creation.icosphere(subdivisions=3).slice_plane([0, 0, 0], [0, 0, 1], cap=True)
     drum = trimesh.creation.cylinder(1.0, 1.0, sections=24)
     for mesh, kinds in ((dome, set[str]()), (drum, {"cylinder"})):
-        space = rlacd.NavigableSpace(radius=0.2, tolerance=0.02)
+        space = rlacd.NavigableSpace(radius=0.4, tolerance=0.04)
         result = rlacd.decompose(mesh, criterion=space, primitives=True, quality="fast", threads=1)
         assert len(result.balls) == 0
         assert {each.kind for each in primitives_of(result)} == kinds

@@ -171,7 +171,7 @@ def test_no_hull_spans_nodes_that_interlock() -> None:
 
 def test_nodes_apart_cannot_have_a_navigable_space() -> None:
     with pytest.raises(OptionError, match="per_node"):
-        rlacd.decompose(trimesh.creation.box(), per_node=True, criterion=rlacd.NavigableSpace(radius=0.1))
+        rlacd.decompose(trimesh.creation.box(), per_node=True, criterion=rlacd.NavigableSpace(radius=0.2))
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])

@@ -129,7 +129,7 @@ def test_a_cloud_of_points_and_balls_can_be_shown() -> None:
     cloud = payload(report_page(rlacd.decompose((corners, np.empty((0, 3), dtype=np.int32))), picture=False))
     assert cloud["input"] == []
     assert cloud["heat"]["parts"] == []
-    space = rlacd.NavigableSpace(radius=0.05, tolerance=0.02)
+    space = rlacd.NavigableSpace(radius=0.1, tolerance=0.04)
     free = rlacd.decompose(elbow(1.0), criterion=space)
     balls = payload(report_page(free, picture=False))["balls"]
     assert 0 < balls["shown"] <= balls["of"] == len(free.balls)

@@ -38,13 +38,9 @@ class JobSpec:
     """Arguments of `rlacd.Decomposition.save` beside the path."""
     weights: str = ""
     """Hash of the network, if the policy is a file."""
-    told_in: str | None = None
-    """The unit in which lengths were typed, which messages use; None for that of each mesh."""
 
     @classmethod
-    def of(
-        cls, options: dict[str, Any], *, folders: bool = False, told_in: str | None = None, **written: Any
-    ) -> JobSpec:
+    def of(cls, options: dict[str, Any], *, folders: bool = False, **written: Any) -> JobSpec:
         """Check everything that can be checked before a mesh is read.
 
         Parameters
@@ -53,8 +49,6 @@ class JobSpec:
             Keyword arguments of `rlacd.decompose`, without ``progress``. Each mesh gets one thread by default.
         folders : bool
             Whether each mesh gets a folder with one file per hull.
-        told_in : str, optional
-            The unit in which messages give lengths, of meshes that are converted to metres.
         **written
             ``file_type``: a value of ``--format``, or any ending of a hull file; by default the preset's format,
             else glb. ``density``, ``mass``, ``up``, ``one_mesh`` and ``keep_input`` as for `rlacd.Decomposition.save`.
@@ -88,7 +82,7 @@ class JobSpec:
         saved = {name: getattr(asked, name) for name in WRITTEN}
         if ending == f".{file_type}":
             saved["file_type"] = None  # the same as not given
-        return cls(plain, ending, saved, _weights(checked.first_policy), told_in)
+        return cls(plain, ending, saved, _weights(checked.first_policy))
 
     def key(self, content: str, name: str) -> str:
         """Name the result of a mesh with this content by everything that determines its bytes.
@@ -100,7 +94,7 @@ class JobSpec:
         if options["policy"].endswith(WEIGHTS_ENDING):
             options["policy"] = WEIGHTS_ENDING
         stem = PurePosixPath(name).stem  # models carry this name
-        decides = [__version__, content, stem, self.weights, options, self.ending, self.written, self.told_in]
+        decides = [__version__, content, stem, self.weights, options, self.ending, self.written]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def shared(self) -> dict[str, Shared]:

@@ -15,10 +15,9 @@ import numpy as np
 import trimesh
 
 from rlacd.batch.job_spec import POLICY, JobSpec
-from rlacd.decompose_mesh import decompose, decompose_in
+from rlacd.decompose_mesh import decompose, decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
-from rlacd.fit import Unit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import is_robot, rewrite_robot
@@ -70,7 +69,7 @@ def make(
             ending = mesh.suffix if stage is None else spec.ending
             facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)
             return facts, _files_in(Path(folder))
-        result = _hull(spec, mesh) if hull_only else decompose_in(Unit.typed(spec.told_in), mesh, **spec.options)
+        result = _hull(spec, mesh) if hull_only else decompose_quietly(mesh, **spec.options)
         place = f"{folder}/{stem}{spec.ending or '/'}"
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always", ImplausibleBodyWarning)

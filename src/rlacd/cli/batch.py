@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from rlacd.cli.commands import Argument, Command, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import ctrl_c_at_once
-from rlacd.cli.options import PoolOptions, decompose_options, how, unit_given
+from rlacd.cli.options import PoolOptions, decompose_options, how
 from rlacd.errors import OptionError
 from rlacd.options.fields import check_fields, option, stated
 from rlacd.options.output import OutputOptions
@@ -80,8 +80,8 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     if where.jobs == 0:
         raise OptionError("--jobs is 0; a batch needs at least 1 process.")
     written = {"file_type": own.file_type, **{name: given.pop(name) for name in WRITTEN}}
-    options = decompose_options({**given, "threads": own.threads}, metres=given["unit"] is not None)
-    spec = JobSpec.of(options, folders=own.folders, told_in=unit_given(given), **written)
+    options = decompose_options({**given, "threads": own.threads})
+    spec = JobSpec.of(options, folders=own.folders, **written)
     work = Batch(assets, own.output, spec, where.limits(), own.fallback, own.glob, own.redo)
     if own.dry_run:
         _print_plan(work)

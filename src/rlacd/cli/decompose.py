@@ -17,10 +17,9 @@ import click
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import import_trimesh
-from rlacd.cli.options import decompose_options, how, link_lengths, unit_given
+from rlacd.cli.options import decompose_options, how, link_lengths
 from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
-from rlacd.fit import Unit
 from rlacd.io.read import READERS
 from rlacd.io.read.open_file import missing
 from rlacd.options.output import REPORTS, OutputOptions
@@ -28,9 +27,6 @@ from rlacd.options.robots import RobotOptions
 from rlacd.run import Progress, ProgressCallback
 
 ROBOTS = (".urdf", ".xml")
-IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
-"""File formats that define the metre as their unit, or are read in metres whatever theirs is."""
-
 MESH = (
     f"The mesh: {', '.join(READERS)}. It need not be closed or clean. Or a robot, .urdf or .xml (MJCF), whose "
     "collision meshes are to be replaced. - reads stdin."
@@ -86,8 +82,7 @@ def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str
     import_trimesh(mesh)
     if STDIO in (asked.report, asked.output):
         give("")  # before any work
-    in_metres = mesh.suffix.lower() in IN_METRES
-    options = decompose_options(how, metres=in_metres or how.get("unit") is not None)
+    options = decompose_options(how)
     wanted = _named(mesh, asked, options.get("preset"))
     stage = _stage(mesh, wanted, apart=robots.get("per") == "mesh")
     robot = mesh.suffix.lower() in ROBOTS or stage is not None
@@ -95,19 +90,19 @@ def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str
     _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted, robots)
     if wanted.balls is not None and isinstance(options.get("criterion", ""), str):
         raise OptionError("--balls needs --criterion navigable.")
-    run = partial(_rewrite, stage, RobotOptions(**link_lengths(robots, in_metres))) if robot else _write
-    return run(mesh, wanted, options, Unit.typed(unit_given(how)))
+    run = partial(_rewrite, stage, RobotOptions(**link_lengths(robots))) if robot else _write
+    return run(mesh, wanted, options)
 
 
-def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: Unit | None) -> bool:
+def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
     from rlacd.cli.terminal import summary, watching, writing
-    from rlacd.decompose_mesh import decompose_in
+    from rlacd.decompose_mesh import decompose_quietly
     from rlacd.plain_json import to_json
 
     up, quiet = wanted.up, bool(wanted.quiet)
     with watching(quiet=quiet) as watch:
-        result = decompose_in(told_in, mesh, **options, progress=watch)
+        result = decompose_quietly(mesh, **options, progress=watch)
     place = str(wanted.output)
     names = ("file_type", "density", "mass", "one_mesh", "keep_input", "scene")
     written = chosen({name: getattr(wanted, name) for name in names})
@@ -134,12 +129,10 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: 
     return result.report.complete
 
 
-def _rewrite(
-    stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any], told_in: Unit | None
-) -> bool:
+def _rewrite(stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     """Replace the collision meshes of a robot, or of a stage that has been read; returns whether all are complete."""
     from rlacd.cli.terminal import rewrite_summary, watching, writing
-    from rlacd.io.robots.rewrite import rewrite, rewrite_in
+    from rlacd.io.robots.rewrite import rewrite, rewrite_quietly
     from rlacd.plain_json import to_json
 
     with watching(quiet=bool(wanted.quiet)) as watch:
@@ -149,7 +142,7 @@ def _rewrite(
             done = rewrite(stage, Path(place), options, how, keep_input=flat)
         else:
             given = {"package_dirs": wanted.package_dirs or (), "keep_input": flat, **vars(how)}
-            done = rewrite_in(told_in, robot, place, **given, **options)
+            done = rewrite_quietly(robot, place, **given, **options)
     if not wanted.quiet:
         say(rewrite_summary(done))
     if wanted.report == STDIO:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rlacd.cli.commands import Argument, Command, Option, options_of
-from rlacd.cli.decompose import IN_METRES, ROBOTS
+from rlacd.cli.decompose import ROBOTS
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import import_trimesh
-from rlacd.cli.options import decompose_options, unit_given
+from rlacd.cli.options import decompose_options
 from rlacd.cli.pipes import refuse_stdin
 from rlacd.errors import OptionError
-from rlacd.fit import Unit
 from rlacd.options import Options
 from rlacd.options.output import OutputOptions
 from rlacd.plain_json import to_json
@@ -47,13 +45,12 @@ def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None
         from rlacd.viewer.picture import check_picture
 
         check_picture(picture)
-    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
+    options = decompose_options(how)
     from rlacd.cli.terminal import watching, writing
     from rlacd.thresholds import tradeoff
 
     with watching(quiet=bool(quiet)) as watch:
         found = tradeoff(mesh, **options, progress=watch)
-    found = replace(found, unit=Unit.typed(unit_given(how)) or found.unit)
     give(to_json(found.as_dict()) if as_json else f"{found}\n")
     if found.pick is None and found.rows:
         say("no threshold tried leads to so few hulls; rlacd decompose --max-hulls finds the tightest.")

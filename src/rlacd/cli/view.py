@@ -10,7 +10,6 @@ from typing import Any
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of
 from rlacd.cli.exit_codes import leave, say
 from rlacd.cli.lean import ctrl_c_at_once
-from rlacd.cli.options import lengths
 from rlacd.cli.pipes import refuse_stdin
 from rlacd.options import Options
 from rlacd.options.output import OutputOptions
@@ -37,7 +36,7 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
     with ctrl_c_at_once():
         from rlacd.view_file import view
 
-    asked = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
+    asked = chosen({name: given.pop(name) for name in CONTROLS})
     with view(mesh, package_dirs=packages, **given, **asked) as server, suppress(KeyboardInterrupt):
         say(f"{mesh.name} is shown at {server.address} (Ctrl-C ends)")
         if browser:

@@ -150,7 +150,7 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
 
     parts, seams = reached.parts, None
     if options.overlap > 0 and root is not None:
-        parts, seams = overlap_parts(parts, root, goal, 2 * options.overlap)
+        parts, seams = overlap_parts(parts, root, goal, options.overlap)
     return run.map(cleaned, parts), seams
 
 

@@ -96,7 +96,7 @@ def make_report(
         missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
-        warnings += _shallow(seams, solid.frame.unit.words(2 * options.overlap)) if options.overlap > 0 else []
+        warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
         warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
         warnings += warnings_of(entered, _why_entered(run), solid.frame.told_in) if entered else []

@@ -16,6 +16,8 @@ from rlacd.io.read.load import load_mesh
 from rlacd.io.write import file_stem
 from rlacd.io.write.target import MODEL_OF
 from rlacd.options import CRITERIA, FAST, Options, with_criterion
+from rlacd.options.fields import shown
+from rlacd.options.lengths import read_lengths
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.options.presets import PRESETS
@@ -43,7 +45,11 @@ def read_controls(given: dict[str, Any]) -> dict[str, Any]:
     OptionError
         An option is unknown, of the wrong type or out of range.
     """
+    given = read_lengths(given)
     for name in given:
+        if name.removesuffix("_abs") in CONTROLS and name not in CONTROLS:
+            plain = name.removesuffix("_abs")
+            raise OptionError(f"{plain} is {shown(given[name])}; it has to be a number or a share such as 2%.")
         if name not in CONTROLS:
             raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(CONTROLS))}.")
     controls = {name: usual if given.get(name) is None else given[name] for name, usual in CONTROLS.items()}
