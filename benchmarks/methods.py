@@ -142,7 +142,7 @@ def _rlacd(name: str) -> Run:
         goal: dict[str, Any] = {} if number == Options.threshold else {"threshold": number}
         if space:
             radius = float(space[0].partition("=")[2] or number / 2)
-            goal = {"criterion": rlacd.NavigableSpace(radius / 2, number / 2)}  # shares of the longest side
+            goal = {"criterion": rlacd.NavigableSpace(radius, number)}
         result = rlacd.decompose((vertices, faces), threads=threads, **goal, **options)
         return [_as_arrays(hull.vertices, hull.faces) for hull in result]
 

@@ -107,7 +107,7 @@ def _simulated(result: Result, piles: int, worlds: int | None) -> Row:
         "primitives": sum(each is not None for each in getattr(result, "primitives", [])),
         "vertices": statistics.fmean(len(hull.vertices) for hull in result.hulls),
         "bytes": model_size(result),
-        "over": result.report.hausdorff.over,  # unknown for other tools
+        "over": result.report.hausdorff.added,  # unknown for other tools
         "volume": float(sum(hull.volume for hull in result.hulls)),
         **asdict(drops_in_mujoco(result)),
         "rate": statistics.geometric_mean(rates),

@@ -132,7 +132,7 @@ def _speeds(models: list[Any]) -> list[float]:
 
 def _line(row: dict[str, Any]) -> list[object]:
     own, whole = row["before"], row["whole"]
-    far, size = (1000 * whole["metres"] * (whole[what] or math.nan) for what in ("farthest_abs", "size_abs"))
+    far, size = (1000 * whole["metres"] * (whole[what] or math.nan) for what in ("added_abs", "size_abs"))
     return [
         *(row["robot"], whole["meshes"], whole["links"], own["hulls"], whole["hulls"]),
         *(f"{whole['hulls'] / whole['links']:.1f}", f"{far:.1f}", f"{size:.0f}"),

@@ -29,7 +29,7 @@ def main() -> None:
         result.save(hulls)
         report.write_text(to_json(result.report), encoding="utf-8")
     with step("drawing it"):
-        result.picture(picture, up="y")
+        result.save_picture(picture, up="y")
 
     print(f"\n{summary(result, hulls.name)}")
     print(f"\n  input    {mesh}\n  hulls    {hulls}\n  picture  {picture}\n  report   {report}")

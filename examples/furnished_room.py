@@ -60,14 +60,13 @@ def room() -> trimesh.Trimesh:
 def main(folder: Path) -> None:
     """Decompose the room for a small and for a large ball and draw both."""
     folder.mkdir(parents=True, exist_ok=True)
-    for radius in (0.02, 0.10):
-        result = rlacd.decompose(
-            room(), criterion=rlacd.NavigableSpace(radius, tolerance=0.01), policy="navacd", quality="fast"
-        )
-        name = f"room_radius_{round(100 * radius)}_percent"
+    for share in (2, 10):
+        space = rlacd.NavigableSpace(radius=f"{share}%", tolerance="1%")
+        result = rlacd.decompose(room(), criterion=space, policy="navacd", quality="fast")
+        name = f"room_radius_{share}_percent"
         result.save(folder / f"{name}.glb")
         result.save_balls(folder / f"{name}_balls.glb")
-        result.picture(folder / f"{name}.png", width=1200)
+        result.save_picture(folder / f"{name}.png", width=1200)
         print(f"{name}: {result}")
 
 

@@ -47,13 +47,13 @@ def main(meshes: Path, out: Path) -> None:
         stem = Path(name).stem.partition("-")[0].lower()
         with TemporaryDirectory() as folder:
             drawn = Path(folder) / "drawn.png"
-            result.picture(drawn, up=up)
+            result.save_picture(drawn, up=up)
             with Image.open(drawn) as picture:
                 shown = picture.convert("RGB").crop((0, int(TITLE * picture.height), picture.width, picture.height))
                 shown.resize((WIDTH, shown.height * WIDTH // shown.width)).save(out / f"{stem}.webp", quality=80)
         report = result.report
-        cells = [f"{len(result.source.faces):,}", str(report.parts), f"{report.faces:,}"]
-        print(f"| {stem} | {' | '.join(cells)} | {report.hausdorff.over:.3f} |", flush=True)
+        cells = [f"{len(result.source.faces):,}", str(report.hulls), f"{report.triangles:,}"]
+        print(f"| {stem} | {' | '.join(cells)} | {report.hausdorff.added:.3f} |", flush=True)
 
 
 if __name__ == "__main__":

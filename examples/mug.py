@@ -90,7 +90,7 @@ def draw(outcomes: list[Outcome], path: Path, width: int = 1400) -> None:
     """Draw the outcomes side by side."""
     from PIL import Image
 
-    from rlacd.view.render import Body, render
+    from rlacd.viewer.render import Body, render
 
     panels = []
     for outcome in outcomes:

@@ -31,8 +31,7 @@ from sample import sample
 
 import rlacd
 from rlacd.result import Result
-from rlacd.view.picture import picture_bytes
-from rlacd.view.viewer import open_viewer
+from rlacd.viewer.picture import picture_bytes
 
 
 def main(docs: Path, meshes: Path) -> None:
@@ -40,8 +39,8 @@ def main(docs: Path, meshes: Path) -> None:
     with step("the chair of make demo, and its boxes"), TemporaryDirectory() as folder:
         mesh = Path(folder) / "chair.glb"
         sample().export(mesh)
-        rlacd.decompose(mesh).picture(docs / "demo.png")
-        rlacd.decompose(mesh, primitives="all").picture(docs / "primitives.png", width=1200)
+        rlacd.decompose(mesh).save_picture(docs / "demo.png")
+        rlacd.decompose(mesh, primitives="all").save_picture(docs / "primitives.png", width=1200)
     with step("a mug on a peg"), TemporaryDirectory() as folder:
         mug.draw(mug.main(Path(folder)), docs / "mug.png")
     with step("furnished rooms"), TemporaryDirectory() as folder:
@@ -152,7 +151,7 @@ def shoot_viewer(docs: Path) -> None:
             ("viewer_error", {"threshold": 0.15, "quality": "fast"}, "h"),
             ("viewer_balls", {"criterion": "navigable", "quality": "fast"}, "b"),
         ):
-            with open_viewer(mesh, rlacd.decompose, options, port=0) as viewer:
+            with rlacd.view(mesh, port=0, **options) as viewer:
                 page = browser.new_page(viewport={"width": 1440, "height": 900})
                 page.goto(viewer.address)
                 page.wait_for_selector("body[data-run='1']", timeout=120_000)

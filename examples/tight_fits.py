@@ -37,7 +37,7 @@ def chords(tolerance: float) -> int:
 def draw(result: rlacd.Decomposition, path: Path) -> None:
     """Draw the input and its hulls, without the caption, whose wall time differs from run to run."""
     with TemporaryDirectory() as folder:
-        drawn = Image.open(result.picture(Path(folder) / "hulls.png", width=700, up="z"))
+        drawn = Image.open(result.save_picture(Path(folder) / "hulls.png", width=700, up="z"))
         drawn.crop((0, drawn.height // 6, *drawn.size)).save(path, quality=85)
 
 
@@ -45,12 +45,12 @@ def main(picture: Path) -> None:
     """Print a row a tolerance and a share, and draw the hulls at 1 mm."""
     for tolerance in (1.0, 0.3, 0.1):
         result = rlacd.decompose(block(), threshold_abs=tolerance, threads=1)
-        print(f"{tolerance} mm: {chords(tolerance)} chords, {len(result)} hulls, at least {result.report.at_least}")
+        print(f"{tolerance} mm: {chords(tolerance)} chords, {len(result)} hulls, at least {result.report.lower_bound}")
         if tolerance == 1.0:
             draw(result, picture)
     for share in (None, 0.8, 0.9, 0.97):
         result = rlacd.decompose(block(), threshold_abs=3.0, keep_open=share, threads=1)
-        clear = RADIUS - result.report.hausdorff.over / result.report.scale
+        clear = RADIUS - result.report.hausdorff.added / result.report.scale
         print(f"3 mm, keep_open={share}: {len(result)} hulls, clear radius {clear:.1f} mm")
 
 

@@ -40,7 +40,7 @@ def draw_options(seed: int) -> dict[str, Any]:
             options[name] = int(random.choice([4, 5, 8, 24, 44, 64]))
     if chance(0.2):
         options["resolution"] = int(random.choice([20, 60]))
-    if "criterion" in options and options["criterion"].radius < 0.05:
+    if "criterion" in options and options["criterion"].radius < 0.1:
         options["timeout"] = 30.0  # loose sheets and small balls may give tens of thousands of parts
     if chance(0.05):
         options["timeout"] = float(random.choice([1e-6, 0.05, 0.5]))
@@ -52,7 +52,7 @@ def draw_options(seed: int) -> dict[str, Any]:
 
 
 def _space(random: np.random.Generator, chance: Any) -> NavigableSpace:
-    radius, tolerance = float(random.choice([0.02, 0.05, 0.1, 0.4, 1.5])), float(random.choice([0.005, 0.02, 0.1]))
+    radius, tolerance = float(random.choice([0.04, 0.1, 0.2, 0.8, 3.0])), float(random.choice([0.01, 0.04, 0.2]))
     planes: tuple[tuple[tuple[float, float, float], float], ...] = ()
     if chance(0.2):
         x, y, z, offset = random.normal(size=4).tolist()

@@ -113,7 +113,7 @@ def limits(case: Case) -> list[str]:
     most_hulls = case.options.get("max_hulls")
     if most_hulls is not None and len(case.hulls) > most_hulls and case.report["complete"]:
         found.append(f"{len(case.hulls)} hulls, not {most_hulls}; said: {case.warned!r}")
-    if len(case.hulls) != case.report["parts"] or not case.hulls:
+    if len(case.hulls) != case.report["hulls"] or not case.hulls:
         found.append(f"{len(case.hulls)} hulls in the file, {case.report['parts']} in the report")
     return found
 
@@ -126,7 +126,7 @@ def coverage(
     No word excuses them where repair dropped nothing; bodies that cavities are kept in may be cavities themselves.
     """
     missed = seen_under(hulls, where, faces, samples, random)
-    reported = case.report["hausdorff"]["under"]
+    reported = case.report["hausdorff"]["missed"]
     found = []
     if reported is not None and missed.distance > reported + ROUNDING:
         found.append(f"the input leads {missed.distance:.6g} out of the hulls, the report says {reported:.6g}")
@@ -148,7 +148,7 @@ def _is_as_given(case: Case) -> bool:
 def left_out(case: Case, corners: Floats, hulls: list[Polytope]) -> list[str]:
     """Corners that only faces without an area have lie in a hull, or a warning says that they do not."""
     farthest = float(distance_to_union(corners, hulls).max())
-    under = case.report["hausdorff"]["under"]
+    under = case.report["hausdorff"]["missed"]
     if under is None or farthest <= COVERAGE_TOLERANCE + ROUNDING or "outside the hulls" in case.warned:
         return []
     return [f"a corner of a face lies {farthest:.6g} outside the hulls, and no word of it"]
@@ -178,7 +178,7 @@ def overhang(
     Faces without area need not be covered, but hulls may extend to them.
     """
     reached = seen_over(hulls, corners, samples, random)
-    reported = case.report["hausdorff"]["over"]
+    reported = case.report["hausdorff"]["added"]
     found = []
     if reported is not None and reached.distance > reported + 2 * ROUNDING:
         found.append(f"the hulls reach {reached.distance:.6g} beyond the input, the report says {reported:.6g}")
@@ -324,7 +324,7 @@ def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], ra
         return []
     assert space.radius is not None
     assert space.tolerance is not None
-    radius, tolerance = 2 * space.radius, 2 * space.tolerance
+    radius, tolerance = space.radius, space.tolerance
     if radius >= 2 or "max_hulls" in case.options:
         return []
     vertices, faces = triangles_of(solid)

@@ -184,7 +184,7 @@ class Laboratory:
         """Decompose a shape, possibly again with another number of threads, and judge the result."""
         random = np.random.default_rng([self.seed, trial.number, 11])
         ending, twice = str(random.choice(FORMATS)), bool(random.random() < 1 / AGAIN)
-        spec = JobSpec.of(options, file_format=ending)
+        spec = JobSpec.of(options, file_type=ending)
         trial = replace(trial, end="done", said=[], story=list(shape.steps), options=spec.options)
         trial.counts = Counter(decompositions=1)
         mesh = write_mesh(self.folder / f"{trial.number}.ply", shape.vertices, shape.faces)
@@ -195,7 +195,7 @@ class Laboratory:
                 trial.end, trial.said = _refusal(shape, ending, told)
                 return trial
             if twice and told["report"]["complete"]:
-                other = JobSpec.of({**options, "threads": options["threads"] % 3 + 1}, file_format=ending)
+                other = JobSpec.of({**options, "threads": options["threads"] % 3 + 1}, file_type=ending)
                 again, same = self._shapes.decompose(other, mesh, "out")
                 trial.cpu += again["cpu"]
                 if files != same:
@@ -206,7 +206,7 @@ class Laboratory:
             return trial
         finally:
             mesh.unlink()
-        trial.counts["hulls"] = told["report"]["parts"]
+        trial.counts["hulls"] = told["report"]["hulls"]
         if ending in ("obj", "ply"):
             trial.said = judge(Case(shape, options, read_hulls(files[f"out.{ending}"], ending), told["report"]))
         return replace(trial, end="wrong" if trial.said else "done")
@@ -230,9 +230,9 @@ class Laboratory:
             del options["preset"]  # its files have another format
         ending = str(random.choice([*FORMATS, "mjcf", "folder"]))
         space = options.get("criterion")
-        if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.05:
+        if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.1:
             del options["criterion"]  # would give tens of thousands of parts
-        spec = JobSpec.of(options, file_format=None if ending == "folder" else ending, folders=ending == "folder")
+        spec = JobSpec.of(options, file_type=None if ending == "folder" else ending, folders=ending == "folder")
         trial = replace(trial, story=[*shape.steps, ending], options=options)
         with TemporaryDirectory(dir=self.folder) as place:
             mesh = write_mesh(Path(place) / "mesh.ply", shape.vertices, shape.faces)
@@ -258,7 +258,7 @@ class Laboratory:
             if first.code == 4 and main.endswith((".obj", ".ply")):
                 report = {**said["report"], "complete": False, "warnings": ["Incomplete exceed outside the hulls"]}
                 hulls = read_hulls(after[main], main[-3:])
-                report |= {"parts": len(hulls), "hausdorff": {"under": None, "over": None}, "concavity": None}
+                report |= {"parts": len(hulls), "hausdorff": {"missed": None, "added": None}, "concavity": None}
                 found += judge(Case(shape, {**options, "max_hulls": None}, hulls, report))
             if fault.name == "timeout":
                 found += _lateness(first.cpu, float(fault.words[1]), options["threads"])
@@ -268,7 +268,7 @@ class Laboratory:
                 found.append(f"the command again ends with {again.code} and other files: {again.said[-300:]}")
             if not fault.kills and (strays := now.keys() - whole.keys() - old.keys()):
                 found.append(f"the command again leaves {', '.join(sorted(strays))}")
-        counts = Counter(decompositions=3, faults=1, hulls=said["report"]["parts"])
+        counts = Counter(decompositions=3, faults=1, hulls=said["report"]["hulls"])
         counts[fault.name] += 1
         return replace(
             trial, end="wrong" if found else "done", said=found, counts=counts, cpu=trial.cpu + first.cpu + again.cpu

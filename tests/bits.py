@@ -95,7 +95,7 @@ CASES: dict[str, tuple[Callable[[], Shape], dict[str, Any]]] = {
     "chair, few": (chair, {**FAST, "max_hulls": 5}),
     "ring": (ring, {}),
     "ring, best": (ring, {"quality": "best", "search_steps": 20}),
-    "ring, passages": (ring, {**FAST, "criterion": rlacd.NavigableSpace(radius=0.1)}),
+    "ring, passages": (ring, {**FAST, "criterion": rlacd.NavigableSpace(radius=0.2)}),
     "ring, kept open": (ring, {**FAST, "keep_open": 0.9}),
     "ring, round": (ring, {**FAST, "primitives": ["sphere", "capsule", "cylinder"], "threshold": 0.3}),
     "ring, limited": (ring, {**FAST, "max_vertices": 12}),
@@ -103,8 +103,8 @@ CASES: dict[str, tuple[Callable[[], Shape], dict[str, Any]]] = {
     "hills, volume": (hills, {**FAST, "criterion": "volume"}),
     "hills, distance in full": (hills, {**FAST, "criterion": "distance", "detail": "full"}),
     "torn": (torn, FAST),
-    "torn, thin": (torn, {**FAST, "open": "thin"}),
-    "torn, solid": (torn, {**FAST, "open": "solid", "resolution": 60, "gap": 0.03}),
+    "torn, thin": (torn, {**FAST, "openings": "thin"}),
+    "torn, solid": (torn, {**FAST, "openings": "solid", "resolution": 60, "gap": 0.06}),
     **{f"hills, {policy}": (hills, {**FAST, "policy": policy}) for policy in POLICIES},
 }
 

@@ -32,10 +32,10 @@ def save_hulls(
     path: str | os.PathLike[str],
     *,
     stem: str = "mesh",
-    file_format: str | None = None,
+    file_type: str | None = None,
 ) -> Path:
     """Write hulls without the mesh they come from."""
-    return Decomposition.of(list(hulls), trimesh.Trimesh(), name=stem).save(path, file_format=file_format)
+    return Decomposition.of(list(hulls), trimesh.Trimesh(), name=stem).save(path, file_type=file_type)
 
 
 def strict_json(report: Report) -> str:

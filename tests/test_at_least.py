@@ -39,11 +39,11 @@ def points_of(solid: Component, count: int = 120) -> Floats:
     return np.concatenate([corners[:count], _native.sample_surface(solid.vertices, solid.faces, count, 3)[0]])
 
 
-@pytest.mark.promise("at-least")
+@pytest.mark.promise("lower-bound")
 @pytest.mark.parametrize("teeth", [2, 3, 5])
 def test_a_comb_needs_a_hull_for_every_tooth(teeth: int) -> None:
     result = rlacd.decompose(trimesh_of(comb(teeth)), threads=1)
-    assert teeth <= result.report.at_least <= len(result)
+    assert teeth <= result.report.lower_bound <= len(result)
     solid, slices = Component(comb(teeth)), []
     for x in np.linspace(-0.8, 0.8, 15).tolist():
         below, solid = solid.cut(Plane((1.0, 0.0, 0.0), x))
@@ -74,7 +74,7 @@ def test_what_lies_in_a_cavity_is_not_open_to_the_outside() -> None:
     assert len(apart(shell, points_of(shell))) == 1
 
 
-@pytest.mark.promise("at-least")
+@pytest.mark.promise("lower-bound")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["vhacd/hornbug.ply", "ikea_assembled/chair_ivar_0668.ply", "coacd_examples/Kettle.ply"]
@@ -94,7 +94,7 @@ def test_no_valid_hull_of_a_real_mesh_holds_two_of_the_points(corpus: Path, name
 
 def test_the_summary_says_what_is_proved() -> None:
     result = rlacd.decompose(trimesh_of(comb(3)), threads=1)
-    least = result.report.at_least
+    least = result.report.lower_bound
     words = "hulls" if least == len(result) else f"than {least} hulls"
     assert f"no decomposition to this tolerance has fewer {words}" in summary(result, "x.obj")
-    assert rlacd.decompose(trimesh_of(comb(3)), quality="fast", threads=1).report.at_least is None
+    assert rlacd.decompose(trimesh_of(comb(3)), quality="fast", threads=1).report.lower_bound is None

@@ -90,7 +90,7 @@ def test_it_saves_to_a_file_and_to_a_folder_named_after_the_mesh(tmp_path: Path)
     cup = result(2)
     assert cup.save(tmp_path / "cup.glb") == tmp_path / "cup.glb"
     assert len(trimesh.load_scene(tmp_path / "cup.glb").geometry) == 2
-    folder = cup.save(f"{tmp_path}/parts/", file_format="ply")
+    folder = cup.save(f"{tmp_path}/parts/", file_type="ply")
     assert sorted(path.name for path in folder.glob("*.ply")) == ["cup_000.ply", "cup_001.ply"]
     with pytest.raises(OptionError):
         cup.save(tmp_path / "cup.doc")
@@ -154,4 +154,4 @@ def test_what_is_delivered_is_what_is_measured():
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
     scale = 2 / (upper - lower).max()
     beyond = max((hull.vertices - upper).max() for hull in result) * scale
-    assert result.report.hausdorff.over >= beyond - 1e-5
+    assert result.report.hausdorff.added >= beyond - 1e-5

@@ -38,19 +38,19 @@ FORMATS = [("glb", "glb"), ("mjcf", "xml"), ("usd", "usd")]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("file_format", "ending"), FORMATS)
+@pytest.mark.parametrize(("file_type", "ending"), FORMATS)
 @pytest.mark.promise("batch-bytes")
 def test_a_batch_of_real_meshes_writes_what_decompose_writes(
-    file_format: str, ending: str, corpus: Path, tmp_path: Path
+    file_type: str, ending: str, corpus: Path, tmp_path: Path
 ) -> None:
-    if file_format == "usd":
+    if file_type == "usd":
         pytest.importorskip("pxr", reason="the extra usd is not installed")
     assets, alone = tmp_path / "assets", tmp_path / "alone"
     assets.mkdir()
     alone.mkdir()
     for name in SMALL:
         shutil.copy(corpus / name, assets)
-    order = JobSpec.of({"quality": "fast", "threads": 1}, file_format=file_format)
+    order = JobSpec.of({"quality": "fast", "threads": 1}, file_type=file_type)
     with InProcessPool() as pool:
         Batch(assets, str(tmp_path / "out"), order).run(pool, mock.Mock())
     for mesh in assets.iterdir():

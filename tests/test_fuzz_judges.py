@@ -37,7 +37,7 @@ def test_good_hulls_pass() -> None:
     assert judge(case(**SPACE)) == []
 
 
-SPACE = {"criterion": rlacd.NavigableSpace(0.05, 0.02)}
+SPACE = {"criterion": rlacd.NavigableSpace(0.1, 0.04)}
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def test_a_command_does_not_wait_for_libraries_that_it_does_not_use(tmp_path: Pa
         "torch",
         "mitsuba",
         "ray",
-        "rlacd.view.picture",
+        "rlacd.viewer.picture",
     }
     assert not loaded & unused
 

@@ -128,10 +128,10 @@ def test_the_report_of_a_decomposition_says_the_same(corpus: Path) -> None:
     path = corpus / "test/vhacd/ob_chair_gothic.ply"
     result = rlacd.decompose(path, threads=1)
     found = measure(repair(load_mesh(path)), [(h.vertices, h.faces) for h in result], 0.05)
-    assert found.parts == result.report.parts
-    assert found.faces == result.report.faces
-    assert found.over == pytest.approx(result.report.hausdorff.over, abs=3e-3)
-    assert found.under == pytest.approx(result.report.hausdorff.under, abs=3e-3)
+    assert found.parts == result.report.hulls
+    assert found.faces == result.report.triangles
+    assert found.over == pytest.approx(result.report.hausdorff.added, abs=3e-3)
+    assert found.under == pytest.approx(result.report.hausdorff.missed, abs=3e-3)
     assert found.exceeding == found.invalid == found.empty == 0
     # What of the solid lies in a hull may be more than the part it was made for, so this is no less by definition.
     assert found.concavity <= result.report.concavity.max + 2 * TOLERANCE

@@ -36,7 +36,7 @@ from rlacd.search.levels import LEAST_WORK, MOST_WORK, PATIENCE, TIMES_FIRST_PAS
 from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.passages import FACES
-from rlacd.view import server
+from rlacd.viewer import server
 
 ROOT = Path(__file__).resolve().parents[1]
 GB = 2**30
@@ -134,10 +134,10 @@ def measured(corpus: Path, group: str, options: str) -> list[Report]:
 
 
 STATISTICS: dict[str, Callable[[list[dict[str, Any]]], str]] = {
-    "hulls": lambda reports: f"{sum(report.parts for report in reports):,}",
-    "hulls a mesh": lambda reports: f"{sum(report.parts for report in reports) / len(reports):.1f}",
-    "triangles a mesh": lambda reports: f"{sum(report.faces for report in reports) / len(reports):,.0f}",
-    "primitives": lambda reports: f"{sum(report.parts - report.primitives['hull'] for report in reports):,}",
+    "hulls": lambda reports: f"{sum(report.hulls for report in reports):,}",
+    "hulls a mesh": lambda reports: f"{sum(report.hulls for report in reports) / len(reports):.1f}",
+    "triangles a mesh": lambda reports: f"{sum(report.triangles for report in reports) / len(reports):,.0f}",
+    "primitives": lambda reports: f"{sum(report.hulls - report.primitives['hull'] for report in reports):,}",
 }
 
 FAST, DEFAULT = '{"quality": "fast"}', "{}"

@@ -116,7 +116,7 @@ def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:
 @pytest.mark.parametrize("criterion", ["concavity", "navigable"])
 def test_decompose_takes_shipped_networks_with_any_criterion_and_number_of_threads(policy: str, criterion: str) -> None:
     given = trimesh_of(hollow_table())
-    space = {"criterion": rlacd.NavigableSpace(radius=0.05)} if criterion == "navigable" else {"threshold": 0.02}
+    space = {"criterion": rlacd.NavigableSpace(radius=0.1)} if criterion == "navigable" else {"threshold": 0.02}
     one, two = (rlacd.decompose(given, policy=policy, quality="fast", threads=n, **space) for n in (1, 2))
     assert len(one) > 2
     assert_same_hulls(one, two)

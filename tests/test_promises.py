@@ -95,7 +95,7 @@ REPORTS: list[dict[str, Any]] = [
     {},
     {"criterion": "volume"},
     {"threshold_abs": 0.1},
-    {"criterion": rlacd.NavigableSpace(radius=0.1, tolerance=0.05)},
+    {"criterion": rlacd.NavigableSpace(radius=0.2, tolerance=0.1)},
     {"primitives": True, "overlap": 0.005},
     {"per_node": True, "avoid": [trimesh.creation.box(bounds=[(9, 9, 9), (10, 10, 10)])]},
 ]
@@ -160,7 +160,7 @@ def test_presets_are_those_of_the_table() -> None:
         assert [vertices, faces] == [str(limit or "–") for limit in (preset.max_vertices, preset.max_faces)], name
         assert re.findall(r"`(\.\w+)`", file) == [preset.ending], name
         looks = {"unreal": "`UCX_`", "godot": "`-convcolonly`"}
-        assert preset.file_format is None or looks[preset.file_format] in file, name
+        assert preset.file_type is None or looks[preset.file_type] in file, name
 
 
 def test_the_readme_has_the_numbers_of_the_benchmarks() -> None:

@@ -116,26 +116,26 @@ def ring() -> trimesh.Trimesh:
 def test_each_choice_is_what_its_threshold_leads_to(given: dict[str, object]) -> None:
     mesh = ring()
     found = rlacd.tradeoff(mesh, threads=1, **given)
-    assert 3 <= len(found.choices) <= 10
-    for choice in found.choices:
+    assert 3 <= len(found.rows) <= 10
+    for choice in found.rows:
         alone = rlacd.decompose(mesh, quality="fast", threads=1, **{**given, found.option: choice.threshold})
         assert choice.hulls == len(alone)
-        assert choice.triangles == alone.report.faces
+        assert choice.triangles == alone.report.triangles
         unit = alone.report.scale if found.option == "threshold_abs" else 1.0
-        assert choice.farthest == pytest.approx(alone.report.hausdorff.over / unit, abs=1e-6)
+        assert choice.added == pytest.approx(alone.report.hausdorff.added / unit, abs=1e-6)
         if found.option != "volume_tolerance":
-            assert choice.farthest <= 1.001 * choice.threshold
-    assert found.choices[0].added < found.choices[-1].added
+            assert choice.added <= 1.001 * choice.threshold
+    assert found.rows[0].added_volume < found.rows[-1].added_volume
 
 
 def test_the_finest_with_few_hulls_is_picked_or_the_knee() -> None:
     found = rlacd.tradeoff(ring(), threads=1)
-    few = found.choices[-2].hulls
+    few = found.rows[-2].hulls
     limited = rlacd.tradeoff(ring(), threads=1, max_hulls=few)
-    assert limited.choices == found.choices
+    assert limited.rows == found.rows
     assert limited.pick is not None
     assert found.pick is not None
-    assert limited.pick == min(i for i, choice in enumerate(found.choices) if choice.hulls <= few)
+    assert limited.pick == min(i for i, choice in enumerate(found.rows) if choice.hulls <= few)
     assert str(found).splitlines()[1 + found.pick].startswith("*")
 
 
@@ -148,7 +148,7 @@ def test_the_command_prints_a_table_or_json_and_draws_the_curve(tmp_path: Path) 
     assert table.stdout == f"{rlacd.tradeoff(mesh, threshold=0.1)}\n"
     assert picture.read_bytes().startswith(b"\x89PNG")
     plain = json.loads(CliRunner().invoke(app, ["tradeoff", str(mesh), "-t", "0.1", "--json"]).stdout)
-    assert plain == json.loads(json.dumps(rlacd.tradeoff(mesh, threshold=0.1).as_plain()))
+    assert plain == json.loads(json.dumps(rlacd.tradeoff(mesh, threshold=0.1).as_dict()))
 
 
 @pytest.mark.parametrize("given", [{"criterion": rlacd.NavigableSpace()}, {"per_node": True}])
@@ -159,4 +159,4 @@ def test_what_has_no_single_threshold_is_refused(given: dict[str, object]) -> No
 
 def test_without_time_there_are_fewer_choices() -> None:
     found = rlacd.tradeoff(ring(), timeout=1e-9)
-    assert (found.choices, found.pick, found.complete) == ([], None, False)
+    assert (found.rows, found.pick, found.complete) == ([], None, False)

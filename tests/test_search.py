@@ -186,7 +186,7 @@ def test_no_level_makes_more_hulls_than_the_one_before() -> None:
             for options in ({"quality": "fast"}, {}, {"quality": "best", "search_steps": 16})
         )
         assert len(best) <= len(fast) >= len(balanced)
-        assert balanced.report.search.steps > 0 or len(balanced) == balanced.report.at_least
+        assert balanced.report.search.steps > 0 or len(balanced) == balanced.report.lower_bound
 
 
 @pytest.mark.nightly

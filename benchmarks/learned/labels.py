@@ -108,7 +108,7 @@ def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
     threshold = float(rng.choice(THRESHOLDS)) if kind == "concavity" else 0.05
     solid = repair(load_mesh(path), threads=1)
     root = Component(solid.shape)
-    space = NavigableSpace(radius=0.05, tolerance=0.01)
+    space = NavigableSpace(radius=0.1, tolerance=0.02)
     criterion: Criterion = Concavity(threshold) if kind == "concavity" else Navigable.of(space, solid, 1)
     if criterion.is_met(root):
         return []

@@ -12,7 +12,7 @@ _NAMES = {
     "decomposition": "Decomposition",
     "errors": "RlacdError MeshError MeshFileError MeshDataError EmptyMeshError OptionError OutputError "
     "MissingExtraError DecompositionWarning ImplausibleBodyWarning",
-    "io.robots": "Rewritten rewrite_robot",
+    "io.robots": "RewrittenRobot rewrite_robot",
     "options.navigable": "NavigableSpace",
     "options.presets": "PRESETS Preset",
     "planes.sweep": "Sweep SweepCache",
@@ -21,7 +21,8 @@ _NAMES = {
     "run": "Progress",
     "solid.component": "Component Plane",
     "solid.primitive": "Primitive",
-    "thresholds": "Choice Tradeoff tradeoff",
+    "thresholds": "Tradeoff TradeoffRow tradeoff",
+    "view_file": "view",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 __all__ = ["__version__", *_HOME]

@@ -17,8 +17,8 @@ from rlacd.errors import MissingExtraError as MissingExtraError
 from rlacd.errors import OptionError as OptionError
 from rlacd.errors import OutputError as OutputError
 from rlacd.errors import RlacdError as RlacdError
-from rlacd.io.robots import Rewritten as Rewritten
-from rlacd.options import DetailName, OpenName, QualityName, RelativeTo, UnitName, VolumeOf
+from rlacd.io.robots import RewrittenRobot as RewrittenRobot
+from rlacd.options import DetailName, OpeningsName, QualityName, RelativeTo, UnitName, VolumeOf
 from rlacd.options.names import PrimitiveKind
 from rlacd.options.navigable import NavigableSpace as NavigableSpace
 from rlacd.options.presets import PRESETS as PRESETS
@@ -34,9 +34,10 @@ from rlacd.run import ProgressCallback
 from rlacd.solid.component import Component as Component
 from rlacd.solid.component import Plane as Plane
 from rlacd.solid.primitive import Primitive as Primitive
-from rlacd.thresholds import Choice as Choice
 from rlacd.thresholds import Tradeoff as Tradeoff
+from rlacd.thresholds import TradeoffRow as TradeoffRow
 from rlacd.thresholds import tradeoff as tradeoff
+from rlacd.view_file import view as view
 
 def decompose(
     mesh: MeshLike,
@@ -45,26 +46,26 @@ def decompose(
     file_type: str | None = None,
     progress: ProgressCallback | None = None,
     criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = None,
-    threshold: float | None = 0.05,
+    threshold: float | str | None = 0.05,
     threshold_abs: float | None = None,
-    volume_tolerance: float | None = 0.01,
+    volume_tolerance: float | str | None = 0.01,
     volume_of: VolumeOf | None = "part",
     max_hulls: int | None = None,
     max_vertices: int | None = None,
     max_faces: int | None = None,
     detail: DetailName | None = "simple",
     primitives: bool | Sequence[PrimitiveKind] | None = (),
-    overlap: float | None = 0.0,
+    overlap: float | str | None = 0.0,
     overlap_abs: float | None = None,
-    keep_open: float | None = None,
+    keep_open: float | str | None = None,
     keep_open_abs: float | None = None,
     avoid: Sequence[MeshLike] | None = (),
     merge: bool | None = True,
     policy: str | Policy | None = None,
     resolution: int | None = 100,
-    open: OpenName | None = "auto",
+    openings: OpeningsName | None = "auto",
     keep_cavities: bool | None = False,
-    gap: float | None = 0.015,
+    gap: float | str | None = 0.03,
     seed: int | None = 0,
     threads: int | None = None,
     timeout: float | None = None,
@@ -97,13 +98,13 @@ def decompose(
         or navigable: it stays out of the space that a ball of `radius` can reach, and what no ball can reach may be
         filled. Navigable space is given as an `rlacd.NavigableSpace`. Default: concavity; distance with a length as the
         threshold.
-    threshold : float
-        The concavity or distance a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with
-        more hulls: 0.02 is fine, 0.2 coarse. This is CoACD's frame; all other lengths are shares of the longest side,
-        or in the mesh's own unit. Default: 0.05.
+    threshold : float | str
+        The concavity or distance a hull may have, where the longest side of the mesh is 2, as in CoACD. Smaller is
+        tighter, with more hulls: 0.02 is fine, 0.2 coarse. Also a share of the longest side (2.5%) or, where the unit
+        is known, a length (5mm), which is a distance. Default: 0.05.
     threshold_abs : float | None
         The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance.
-    volume_tolerance : float
+    volume_tolerance : float | str
         With `criterion` volume: the share of volume that a hull may add, such as 1%. The default is that of V-HACD.
         Parts smaller than a thousandth of the whole's convex hull count as this large. Default: 0.01.
     volume_of : VolumeOf
@@ -130,16 +131,17 @@ def decompose(
         simplest whose volume is within a quarter of the least; its own hull is a convex polyhedron around it, and
         ``Decomposition.primitives`` describes it. A round one may reach below a side on which the input rests. Default:
         none.
-    overlap : float
-        Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them. One
-        takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and a
-        warning says at how many seams. With `per_node`, hulls of different nodes do not overlap. Default: 0.0.
+    overlap : float | str
+        Hulls that touch overlap by this, given as `threshold` is (0.5%, 2mm), so that nothing thin slips between them.
+        One takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less,
+        and a warning says at how many seams. With `per_node`, hulls of different nodes do not overlap. Default: 0.0.
     overlap_abs : float | None
         The same as a length in the mesh's own unit.
-    keep_open : float | None
+    keep_open : float | str | None
         Passages stay open: in a hole, slot or mouth that holds a ball of at least `threshold` in radius, one of this
-        share of its radius (0.9) still fits between the hulls. It fits at the same place. A warning counts the passages
-        not kept and says what is left; ``report.passages`` lists them. Default: passages may close.
+        share of its radius (0.9, 90%) still fits between the hulls; or the radius of a ball that has to pass (2mm). It
+        fits at the same place. A warning counts the passages not kept and says what is left; ``report.passages`` lists
+        them. Default: passages may close.
     keep_open_abs : float | None
         The radius of that ball as a length in the mesh's own unit. It still passes wherever one 1 % larger does.
     avoid : Sequence[MeshLike]
@@ -154,15 +156,16 @@ def decompose(
         learned with --no-merge.
     resolution : int
         Grid cells along the longest side, used to repair bodies that are not closed. Default: 100.
-    open : OpenName
+    openings : OpeningsName
         Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
         others thin shells; solid fills all that enclose a space; thin fills none. Default: auto.
     keep_cavities : bool
         Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are filled, as
         nothing can get in, and only the mass leaves them out. Closed cavities are those that an inner shell or closed
         bodies bound, and spaces that only narrow gaps lead to. Default: false.
-    gap : float
-        Openings that a ball of this radius, a share of the longest side, cannot pass count as closed. Default: 0.015.
+    gap : float | str
+        Openings that a ball of this radius cannot pass count as closed; given as `threshold` is, without a unit.
+        Default: 0.03.
     seed : int
         The same seed, input and options give the same bytes; another seed finds other hulls. Another seed starts from
         cuts by other planes: the best of several is often better than any one. Default: 0.
@@ -229,31 +232,31 @@ def rewrite_robot(
     keep_input: bool = False,
     progress: ProgressCallback | None = None,
     per: Per | None = "link",
-    links: Mapping[str, float] | None = None,
+    links: Mapping[str, float | str] | None = None,
     samples: int | None = 500,
     exclude: str | Sequence[PairKind] | None = (),
     srdf: str | os.PathLike[str] | None = None,
     criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = None,
-    threshold: float | None = None,
+    threshold: float | str | None = None,
     threshold_abs: float | None = None,
-    volume_tolerance: float | None = None,
+    volume_tolerance: float | str | None = None,
     volume_of: VolumeOf | None = None,
     max_hulls: int | None = None,
     max_vertices: int | None = None,
     max_faces: int | None = None,
     detail: DetailName | None = None,
     primitives: bool | Sequence[PrimitiveKind] | None = None,
-    overlap: float | None = None,
+    overlap: float | str | None = None,
     overlap_abs: float | None = None,
-    keep_open: float | None = None,
+    keep_open: float | str | None = None,
     keep_open_abs: float | None = None,
     avoid: Sequence[MeshLike] | None = None,
     merge: bool | None = None,
     policy: str | Policy | None = None,
     resolution: int | None = None,
-    open: OpenName | None = None,
+    openings: OpeningsName | None = None,
     keep_cavities: bool | None = None,
-    gap: float | None = None,
+    gap: float | str | None = None,
     seed: int | None = None,
     threads: int | None = None,
     timeout: float | None = None,
@@ -265,7 +268,7 @@ def rewrite_robot(
     relative_to: RelativeTo | None = None,
     unit: UnitName | None = None,
     scale: float | None = None,
-) -> Rewritten:
+) -> RewrittenRobot:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
 
     Parameters
@@ -287,9 +290,9 @@ def rewrite_robot(
         What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
         Links that fixed joints connect stay apart; so do MJCF geoms with a name, and meshes that belong to no body.
         Default: link.
-    links : Mapping[str, float] | None
-        Another distance for the links whose whole name matches a regular expression; the last that matches counts. It
-        stands for `threshold_abs`: ``{"finger.*": 0.001}``.
+    links : Mapping[str, float | str] | None
+        Another distance for the links whose whole name matches a regular expression; the last that matches counts.
+        ``{"finger.*": "1mm"}``, or a number in the robot's own unit, as `threshold_abs`.
     samples : int
         Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
         extra rlacd[clear]. Where hulls of such links would touch, they are cut finer, or a warning names both. USD
@@ -308,7 +311,7 @@ def rewrite_robot(
 
     Returns
     -------
-    Rewritten
+    RewrittenRobot
 
     Raises
     ------

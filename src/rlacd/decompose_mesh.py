@@ -25,6 +25,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.options import Options
 from rlacd.options.fields import check_callback
 from rlacd.options.keywords import taking
+from rlacd.options.lengths import LONGEST_SIDE
 from rlacd.options.names import UNITS, mesh_name
 from rlacd.options.navigable import NavigableSpace
 from rlacd.policies import make_policy
@@ -87,30 +88,33 @@ def decompose(
     DecompositionWarning
         What ``report.warnings`` says, once a call.
     """
-    done = decompose_in(None, mesh, faces, file_type=file_type, progress=progress, **options)
+    done = decompose_quietly(mesh, faces, file_type=file_type, progress=progress, **options)
     if done.report.warnings:
         said = f"{done.name}: {' '.join(done.report.warnings)}"
         warnings.warn(said, DecompositionWarning, stacklevel=2)
     return done
 
 
-def decompose_in(
-    told_in: Unit | None,
+def decompose_quietly(
     mesh: MeshLike,
     faces: ArrayLike | None = None,
     *,
     file_type: str | None = None,
     progress: ProgressCallback | None = None,
+    told_in: Unit | None = None,
     **options: Any,
 ) -> Decomposition:
-    """Decompose as `decompose` does, but warn of nothing, and tell lengths in a unit; None for the input's own."""
+    """Decompose as `decompose` does, but warn of nothing.
+
+    Lengths are told in a unit: by default that in which a length was given, else the input's own.
+    """
     asked = Options.of(options)
     check_callback("progress", progress, "a `rlacd.Progress`")
     make_policy(asked.first_policy)  # reports a bad network before any work is done
     with Run(asked.threads, asked.timeout, progress) as run:
         with run.stage("load"):
-            source = in_metres(load_mesh(mesh, faces, file_type, _fineness(asked)), asked)
-            source = replace(source, told_in=told_in)
+            source, asked = in_metres(load_mesh(mesh, faces, file_type, _fineness(asked)), asked)
+            source = replace(source, told_in=told_in or source.told_in)
             obstacles = tuple(_obstacle(one).scaled(source.factor) for one in asked.avoid)
         asked = replace(asked, avoid=obstacles)
         apart = asked.per_node and len(source.nodes) > 1
@@ -135,13 +139,14 @@ def _fineness(options: Options) -> Fineness:
     """How near to curved surfaces triangles have to be: a tenth of the distance that the criterion allows."""
     space, factor = options.criterion, _factor(options, 1.0)
     if isinstance(space, NavigableSpace):
-        share, length = space.tolerance, space.tolerance_abs
+        bare, length = space.tolerance, space.tolerance_abs
     elif "threshold" in options.numbers:
-        share, length = options.threshold / 2, options.threshold_abs
+        bare, length = options.threshold, options.threshold_abs
     else:
         return USUAL
     of_nodes = options.per_node and options.relative_to == "node"
-    return Fineness((share or 0.0) / 10, None if length is None else length / factor / 10, of_nodes)
+    share = float(bare or 0.0) / LONGEST_SIDE
+    return Fineness(share / 10, None if length is None else length / factor / 10, of_nodes)
 
 
 def _obstacle(mesh: MeshLike | Obstacle) -> Obstacle:
@@ -192,10 +197,10 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
         bodies += len(one.report.repair)
     report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
     said, distances = [*report.warnings, *said], report.hausdorff
-    if distances.under is not None:
+    if distances.missed is not None:
         found = [hull for part in done for h in part.hulls if (hull := Hull.of(frame.to_frame(h.vertices))) is not None]
         left_out = missed(frame.to_frame(source.specks), found, frame, run)
-        distances = replace(distances, under=max(distances.under, left_out.distance))
+        distances = replace(distances, missed=max(distances.missed, left_out.distance))
         said[len(report.warnings) : len(report.warnings)] = left_out.said
     told = (*source.warnings, *said)
     joint = replace(report, options=options.as_plain(), hausdorff=distances, warnings=told)
@@ -239,13 +244,13 @@ def _clear_of_each_other(
     return warnings_of(cleared, rest, unit.words)
 
 
-def in_metres(source: InputMesh, options: Options) -> InputMesh:
-    """Convert the input as the options say.
+def in_metres(source: InputMesh, options: Options) -> tuple[InputMesh, Options]:
+    """Convert the input as the options say, and lengths with a unit to the input's.
 
     Raises
     ------
     OptionError
-        The unit is to be that of the file, which does not say it.
+        The unit is to be that of the file, which does not say it; or a length has a unit, and the input none.
     """
     if options.unit == "file" and source.metres is None:
         raise OptionError(f"unit is 'file', but {source.name} does not say its unit; give mm, cm, m or in.")
@@ -258,7 +263,9 @@ def in_metres(source: InputMesh, options: Options) -> InputMesh:
             source = replace(source, warnings=(*source.warnings, f"{said}overrides that"))
         source = replace(source, metres=1.0)
     factor = _factor(options, stated or 1.0)
-    return source if factor == 1.0 else source.scaled(factor)
+    source = source if factor == 1.0 else source.scaled(factor)
+    told_in = Unit.typed(options.typed_unit, source.metres)
+    return replace(source, told_in=told_in), options.in_unit(source.metres, source.name)
 
 
 def _factor(options: Options, metres: float) -> float:

@@ -35,7 +35,7 @@ class Decomposition(Result):
         self,
         path: str | os.PathLike[str],
         *,
-        file_format: str | None = None,
+        file_type: str | None = None,
         density: float | None = None,
         mass: float | None = None,
         up: Axis | None = None,
@@ -50,10 +50,10 @@ class Decomposition(Result):
         path : path-like
             ``*.glb``, ``*.obj``, ``*.ply`` or ``*.stl`` for one file with a node, group or solid a hull
             (``hull_000``, ...). An existing folder, text ending in ``/``, or a name without ending given with a
-            `file_format`, for one file per hull. ``*.xml`` (MJCF), ``*.urdf``, ``*.sdf``, ``*.usd``, ``*.usda`` or
+            `file_type`, for one file per hull. ``*.xml`` (MJCF), ``*.urdf``, ``*.sdf``, ``*.usd``, ``*.usda`` or
             ``*.usdc`` for a body with mass, the input to look at and the hulls to collide with; the first three keep
             their meshes in a folder beside them, ``chair_mjcf`` for ``chair.xml``.
-        file_format : str, optional
+        file_type : str, optional
             The format inside a folder: ``"obj"`` (default), ``"glb"``, ``"ply"`` or ``"stl"``. Or ``"unreal"`` or
             ``"godot"``, for a ``*.glb`` (or, with unreal, ``*.obj``) with the input and hulls named as those engines
             expect: the hulls of a glTF file, and of a scene or textured mesh from memory, are added to the input's own
@@ -84,7 +84,7 @@ class Decomposition(Result):
             The place cannot be written to, or a hull is too thin for single precision where the format knows nothing
             else.
         OptionError
-            The ending or `file_format` is unknown, or the two contradict each other; `density`, `mass` or `up` is out
+            The ending or `file_type` is unknown, or the two contradict each other; `density`, `mass` or `up` is out
             of range.
         MissingExtraError
             USD was asked for and the extra ``usd`` is not installed.
@@ -92,7 +92,7 @@ class Decomposition(Result):
         from rlacd.io.write import save
 
         more = {"one_mesh": one_mesh, "keep_input": keep_input, "scene": scene}
-        return save(self, path, file_format=file_format, density=density, mass=mass, up=up, **more)
+        return save(self, path, file_type=file_type, density=density, mass=mass, up=up, **more)
 
     export = save
     """The same, by the name that it has in trimesh."""
@@ -123,7 +123,7 @@ class Decomposition(Result):
             raise OptionError("there are no balls to write; decompose with a NavigableSpace.")
         return save_balls(self.balls, path)
 
-    def picture(self, path: str | os.PathLike[str], *, width: int = 1600, up: Axis | None = None) -> Path:
+    def save_picture(self, path: str | os.PathLike[str], *, width: int = 1600, up: Axis | None = None) -> Path:
         """Draw the input beside its hulls, together and pulled apart, as a PNG file; needs no display and no GPU.
 
         Parameters
@@ -149,19 +149,20 @@ class Decomposition(Result):
         OptionError
             `path`, `width` or `up` is none of those above.
         """
-        from rlacd.view.picture import draw_picture
+        from rlacd.viewer.picture import draw_picture
 
         return draw_picture(self, path, width=width, up=up)
 
     def save_report(self, path: str | os.PathLike[str], *, up: Axis | None = None) -> Path:
-        """Write a page with a 3-D view of the hulls, what was measured and what was repaired; needs no network.
+        """Write what was measured and what was repaired, as ``--report`` does.
 
         Parameters
         ----------
         path : path-like
-            Where to write; must end in ``.html``.
+            ``*.html`` for a page with a 3-D view of the hulls, which needs no network; ``*.json`` for the values of
+            `report`.
         up : {"x", "y", "z"}, optional
-            The axis of the input that points up; as for `save`.
+            The axis of the input that points up on the page; as for `save`.
 
         Returns
         -------
@@ -175,7 +176,7 @@ class Decomposition(Result):
         OptionError
             `path` or `up` is none of those above.
         """
-        from rlacd.view.report import save_report_page
+        from rlacd.viewer.report import save_report_page
 
         return save_report_page(self, path, up=up)
 
@@ -221,7 +222,7 @@ class Decomposition(Result):
         """Show the 3-D view in a notebook."""
         from html import escape
 
-        from rlacd.view.report import report_page
+        from rlacd.viewer.report import report_page
 
         page = escape(report_page(self, picture=False))
         return f'<iframe srcdoc="{page}" style="width:100%;height:600px;border:0"></iframe>'

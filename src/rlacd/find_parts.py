@@ -223,7 +223,7 @@ class _Decomposer:
             if self.model.proxy is None:
                 return states, done.criterion, found
             moved = [self._transferred(best, goal)]
-            least = found.at_least if found is not None else 1
+            least = found.lower_bound if found is not None else 1
             for parts in states[:-1]:  # of the levels below: on the solid they may be fewer
                 if len(moved[-1]) > least and self.run.stopped_by is None:
                     moved = sorted([self._transferred(parts, goal), *moved], key=cost, reverse=True)
@@ -289,8 +289,8 @@ def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
     return repair(
         source,
         resolution=options.resolution,
-        open_bodies=options.open,
-        gap=2 * options.gap,
+        open_bodies=options.openings,
+        gap=options.gap,
         threads=run.threads,
         keep_cavities=options.sees_cavities,
     )

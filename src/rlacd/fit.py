@@ -29,9 +29,9 @@ class Unit:
         return cls() if metres is None else cls(_NAMES.get(metres, cls.name))
 
     @classmethod
-    def typed(cls, name: str | None) -> Unit | None:
-        """That in which a length was typed for an input in metres; None if it was a bare number or a share."""
-        return None if name is None else cls(name, UNITS[name])
+    def typed(cls, name: str | None, metres: float | None) -> Unit | None:
+        """That in which a length was given for an input whose unit is so many metres; None if none was."""
+        return None if name is None or metres is None else cls(name, UNITS[name] / metres)
 
     def scaled(self, scale: float) -> Unit:
         """The same for lengths in a frame, of which an input's unit is so many units."""
@@ -111,8 +111,8 @@ class Fit(NamedTuple):
     name: str
     """The measurement; also its key in summaries."""
     per_part: tuple[float, ...] | None
-    """None, like `worst`, where there was no time."""
-    worst: float | None
+    """None, like `max`, where there was no time."""
+    max: float | None
     limit: float | None
     """None for navigable space, of which hulls may touch nothing."""
     balls: int = 0
@@ -147,18 +147,18 @@ class Fit(NamedTuple):
     def words(self, unit: Unit) -> str | None:
         """Say how well the hulls fit, with lengths of the frame in a unit; None if unknown."""
         if self.name == "intrusion":
-            if self.worst is None:
+            if self.max is None:
                 return f"there are {self.balls} balls"
-            if self.worst <= 0:
+            if self.max <= 0:
                 return f"no hull touches any of the {self.balls} balls"
-            return f"hulls reach {unit.words(self.worst)} into the {self.balls} balls"
-        if self.worst is None or self.limit is None:
+            return f"hulls reach {unit.words(self.max)} into the {self.balls} balls"
+        if self.max is None or self.limit is None:
             return None
         if self.name == "added_volume":
-            most, tolerance = told_apart(100 * self.worst, 100 * self.limit)
+            most, tolerance = told_apart(100 * self.max, 100 * self.limit)
             return f"hulls add up to {most} % of volume (tolerance {tolerance} %)"
-        most, threshold = unit.apart(self.worst, self.limit)
-        return f"{self.name} at most {most} (threshold {threshold}{', exceeded' * (self.worst > self.limit)})"
+        most, threshold = unit.apart(self.max, self.limit)
+        return f"{self.name} at most {most} (threshold {threshold}{', exceeded' * (self.max > self.limit)})"
 
 
 def told_apart(value: float, limit: float) -> tuple[str, str]:

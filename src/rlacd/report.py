@@ -32,8 +32,8 @@ class OfNode:
 class ShortSeam:
     """A seam at which hulls overlap by less than asked for."""
 
-    parts: tuple[int, int]
-    """The two hulls, by their place in the order of the hulls."""
+    hulls: tuple[int, int]
+    """The two, by their place in the order of the hulls."""
     at_abs: Point
     """``[3]``, where the seam lacks the most depth."""
     depth_abs: float
@@ -83,9 +83,9 @@ measurement, where the longest side is 2."""
 class Hausdorff:
     """Distances between the surfaces of hulls and input, to 1 %; upper bounds up to 0.001; null without time."""
 
-    over: float | None = None
+    added: float | None = None
     """The greatest distance of the hulls' surface from the input's."""
-    under: float | None = None
+    missed: float | None = None
     """The greatest distance of the input's surface from the hulls, where it lies outside them."""
 
 
@@ -102,13 +102,13 @@ class Passage(OfNode):
 
 
 @dataclass(frozen=True)
-class NodeParts:
+class NodeHulls:
     """A node of the scene, with `per_node`."""
 
     node: str
     """Its name."""
-    parts: int
-    """How many hulls it has."""
+    hulls: int
+    """How many it has."""
     scale: float
     """The length of one unit of the input in the frame of the node."""
 
@@ -184,7 +184,7 @@ class SearchSummary:
     """Units of work done, about a microsecond of one core each."""
     allowed: int | None
     """Limit on the work, if the level has one."""
-    at_least: int
+    lower_bound: int
     """No decomposition to this tolerance has fewer parts."""
 
 
@@ -213,14 +213,14 @@ class Report:
     """False if the work was stopped early: hulls are valid and cover the solid, but may exceed the threshold."""
     stopped_by: Literal["timeout", "cancel"] | None = None
     """Why the work was stopped early."""
-    parts: int
+    hulls: int
     """Number of hulls."""
-    faces: int
+    triangles: int
     """Triangles of all hulls."""
     vertices: int
     """Vertices of all hulls."""
     primitives: Mapping[str, int] | None = if_asked()
-    """With the option `primitives`: how many parts became a ``sphere``, ``capsule``, ``box`` or ``cylinder``, and how
+    """With the option `primitives`: how many hulls became a ``sphere``, ``capsule``, ``box`` or ``cylinder``, and how
     many stayed a ``hull``. `primitives` of the result says what each part is."""
     overlap: Overlap | None = if_asked()
     """With the option `overlap`."""
@@ -239,7 +239,7 @@ class Report:
     passages: tuple[Passage, ...] | None = None
     """What the hulls narrow, most narrowed first; null without time to look. Those narrower than 0.8 % of the longest
     side are left out. Over 2,000 triangles or 600 places, some may be missing: warnings then say "at least"."""
-    nodes: tuple[NodeParts, ...] | None = if_asked()
+    nodes: tuple[NodeHulls, ...] | None = if_asked()
     """With the option `per_node`."""
     scale: float
     """The length of one unit of the input in the frame: divide a length by it to have it in the input's unit."""
@@ -251,7 +251,7 @@ class Report:
     """The holes of bodies that have an inside, most doubtful first, at most 1,000."""
     search: SearchSummary | None = None
     """Null with the quality ``fast``, and where `max_hulls` asks for far fewer hulls."""
-    at_least: int | None = None
+    lower_bound: int | None = None
     """No decomposition has fewer hulls if each stays within the threshold of the solid and they cover it to 0.001; null
     without a search; 1 where the criterion bounds no distance."""
     warnings: tuple[str, ...] = ()
@@ -284,10 +284,10 @@ class Report:
         """Say how well hulls fit, by the criterion, and how far they reach beyond the input; empty if it is unknown."""
         unit = self.unit_in_frame
         words = [said] if self.fit is not None and (said := self.fit.words(unit)) else []
-        over, under = self.hausdorff.over, self.hausdorff.under
-        if over is not None and under is not None:
-            missed = "and cover it" if under <= COVERED else f"and miss it by {_length(under, unit)}"
-            words.append(f"hulls reach {_length(over, unit)} beyond the input {missed}")
+        added, missed = self.hausdorff.added, self.hausdorff.missed
+        if added is not None and missed is not None:
+            covered = "and cover it" if missed <= COVERED else f"and miss it by {_length(missed, unit)}"
+            words.append(f"hulls reach {_length(added, unit)} beyond the input {covered}")
         return "; ".join(words)
 
     def as_dict(self) -> dict[str, Any]:
@@ -309,8 +309,8 @@ def kind_of(warning: str) -> str:
 
 def sizes_of(hulls: Sequence[Any]) -> dict[str, Any]:
     """How many hulls there are, and how many triangles and vertices they have."""
-    faces, vertices = (sum(len(getattr(hull, what)) for hull in hulls) for what in ("faces", "vertices"))
-    return {"parts": len(hulls), "faces": faces, "vertices": vertices}
+    triangles, vertices = (sum(len(getattr(hull, what)) for hull in hulls) for what in ("faces", "vertices"))
+    return {"hulls": len(hulls), "triangles": triangles, "vertices": vertices}
 
 
 def _length(length: float, unit: Unit) -> str:

@@ -22,6 +22,7 @@ from rlacd.fit import ANY, Unit
 from rlacd.io.read.load import load_mesh
 from rlacd.options import FAST, Options
 from rlacd.options.fields import about, check_callback
+from rlacd.options.lengths import read_lengths
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.manifold import to_manifold
@@ -33,17 +34,17 @@ FINEST = 0.4
 """Share of the usual threshold that the finest is where none is given: 0.02, for 0.02 to 0.5."""
 
 
-class Choice(NamedTuple):
+class TradeoffRow(NamedTuple):
     """What one threshold leads to."""
 
     threshold: float
     """As `rlacd.decompose` takes it; with the criterion ``volume``, its `volume_tolerance`."""
     hulls: int
     triangles: int
-    farthest: float
+    added: float
     """How far the hulls reach beyond the input: where the longest side is 2, or in the input's unit if the threshold
     is."""
-    added: float
+    added_volume: float
     """The volume of all hulls together, less that of the solid, as a share of that."""
 
 
@@ -55,34 +56,34 @@ class Tradeoff:
     """Of the object."""
     option: str
     """What the thresholds are given as: ``threshold``, ``threshold_abs`` or ``volume_tolerance``."""
-    choices: list[Choice]
+    rows: list[TradeoffRow]
     """The finest first; one with a single hull ends them."""
     pick: int | None
-    """The choice to take: the finest with at most `max_hulls`, if that was given; else the knee of the curve, beyond
-    which a finer threshold costs ever more hulls. None without choices."""
+    """The row to take: the finest with at most `max_hulls`, if that was given; else the knee of the curve, beyond
+    which a finer threshold costs ever more hulls. None without rows."""
     complete: bool
     """False if there was no time for coarser thresholds."""
     unit: Unit = ANY
     """In which printing it tells lengths, if the thresholds are lengths."""
 
-    def as_plain(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """Everything as values that ``json`` can write."""
-        return asdict(self) | {"choices": [choice._asdict() for choice in self.choices]}
+        return asdict(self) | {"rows": [row._asdict() for row in self.rows]}
 
-    def picture(self, path: str | os.PathLike[str]) -> Path:
-        """Draw the curve as a PNG file (extra ``view``); raises as `rlacd.Decomposition.picture` does."""
-        from rlacd.view.curve import draw_curve
+    def save_picture(self, path: str | os.PathLike[str]) -> Path:
+        """Draw the curve as a PNG file (extra ``view``); raises as `rlacd.Decomposition.save_picture` does."""
+        from rlacd.viewer.curve import draw_curve
 
-        points = [(choice.threshold, choice.hulls) for choice in self.choices]
+        points = [(row.threshold, row.hulls) for row in self.rows]
         return draw_curve(path, self.name, self.option, points, self.pick)
 
     def __str__(self) -> str:
-        head = ("", self.option, "hulls", "triangles", "farthest", "volume added")
+        head = ("", self.option, "hulls", "triangles", "added", "added volume")
         words = self.unit.words if self.option == "threshold_abs" else "{:.4g}".format
-        marks = ["*" if i == self.pick else "" for i in range(len(self.choices))]
+        marks = ["*" if i == self.pick else "" for i in range(len(self.rows))]
         lines = [
-            (mark, words(c.threshold), c.hulls, c.triangles, words(c.farthest), f"{100 * c.added:.3g} %")
-            for mark, c in zip(marks, self.choices, strict=True)
+            (mark, words(c.threshold), c.hulls, c.triangles, words(c.added), f"{100 * c.added_volume:.3g}%")
+            for mark, c in zip(marks, self.rows, strict=True)
         ]
         return "\n".join("{:1} {:>16} {:>6} {:>10} {:>12} {:>13}".format(*line) for line in (head, *lines))
 
@@ -122,6 +123,7 @@ def tradeoff(
     OptionError
         An option has the wrong type or is out of range, or the criterion is navigable space, which has no threshold.
     """
+    options = read_lengths(options)
     chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options})
     name = "threshold_abs" if chosen.threshold_abs is not None else chosen.numbers[0]
     if name == "radius" or chosen.per_node:
@@ -129,20 +131,20 @@ def tradeoff(
     if options.get(name) is None:
         usual = about(Options, name).kind.read(getattr(chosen, name))
         chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options, name: FINEST * usual})
-    finest = getattr(chosen, name)
     check_callback("progress", progress, "a `rlacd.Progress`")
-    choices: list[Choice] = []
+    rows: list[TradeoffRow] = []
     with Run(chosen.threads, chosen.timeout, progress) as run:
         with run.stage("load"):
-            source = in_metres(load_mesh(mesh, faces, file_type), chosen)
+            source, chosen = in_metres(load_mesh(mesh, faces, file_type), chosen)
+            finest = getattr(chosen, name)
         for factor, reached in zip(FACTORS, find_parts_under(source, chosen, FACTORS, run), strict=False):
             unit = 1.0 if chosen.threshold_abs is None else reached.solid.frame.scale
-            choices.append(_choice(finest * factor, reached, unit, run))
+            rows.append(_row(finest * factor, reached, unit, run))
         complete = run.stopped_by is None
-    return Tradeoff(Path(source.name).stem, name, choices, _pick(choices, max_hulls), complete, source.unit)
+    return Tradeoff(Path(source.name).stem, name, rows, _pick(rows, max_hulls), complete, source.unit)
 
 
-def _choice(threshold: float, reached: Reached, unit: float, run: Run) -> Choice:
+def _row(threshold: float, reached: Reached, unit: float, run: Run) -> TradeoffRow:
     solid = reached.solid
     with run.shielded():
         hulls = [part.hull for part in cleaned_parts(reached, run)[0]]
@@ -150,20 +152,20 @@ def _choice(threshold: float, reached: Reached, unit: float, run: Run) -> Choice
         union = Manifold.batch_boolean([to_manifold(hull.vertices, hull.faces) for hull in hulls], OpType.Add)
         own = abs(float(mesh_volume(*solid.mesh)))
     added = max(union.volume() / own - 1, 0.0) if own > 0 else math.inf
-    return Choice(threshold, len(hulls), sum(len(hull.faces) for hull in hulls), over / unit, added)
+    return TradeoffRow(threshold, len(hulls), sum(len(hull.faces) for hull in hulls), over / unit, added)
 
 
-def _pick(choices: Sequence[Choice], most: int | None) -> int | None:
+def _pick(rows: Sequence[TradeoffRow], most: int | None) -> int | None:
     """The finest with at most so many hulls, or the knee: the point farthest below the line between the ends.
 
     The threshold counts by its logarithm; both axes are scaled to the same length (Satopää et al., "Finding a
     'Kneedle' in a Haystack", 2011).
     """
     if most is not None:
-        return next((i for i, choice in enumerate(choices) if choice.hulls <= most), None)
-    if len(choices) < 3 or choices[0].hulls == choices[-1].hulls:
-        return len(choices) - 1 if choices else None
-    x = np.log([choice.threshold for choice in choices])
-    y = np.array([choice.hulls for choice in choices], dtype=np.float64)
+        return next((i for i, row in enumerate(rows) if row.hulls <= most), None)
+    if len(rows) < 3 or rows[0].hulls == rows[-1].hulls:
+        return len(rows) - 1 if rows else None
+    x = np.log([row.threshold for row in rows])
+    y = np.array([row.hulls for row in rows], dtype=np.float64)
     below = (y[0] - y) / (y[0] - y[-1]) - (x - x[0]) / (x[-1] - x[0])
     return int(below.argmax())

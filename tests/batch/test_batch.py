@@ -88,7 +88,7 @@ def test_every_mesh_gets_hulls_and_a_row_and_is_not_done_again(assets: Path, tmp
     for name, row in told.items():
         hulls = trimesh.load_scene(out / next(iter(row["outputs"]))).geometry
         assert row["status"] == "done"
-        assert row["parts"] == len(hulls) >= 2
+        assert row["hulls"] == len(hulls) >= 2
         assert row["concavity"] <= 0.05
         assert rows(out, TIMES)[name]["seconds"] > 0
 
@@ -176,13 +176,13 @@ def test_robots_and_stages_are_worked_on_like_meshes_and_other_xml_is_passed_ove
     (assets / "stage.usda").unlink()
     stage = robots_usd.Usd.Stage.Open(str(out / "stage.usd"))
     assert stage.GetPrimAtPath("/robot/table")
-    assert len(robots_usd.colliders(stage)) == told["stage.usda"]["parts"] > 1
+    assert len(robots_usd.colliders(stage)) == told["stage.usda"]["hulls"] > 1
     again = batch(assets, "-o", out, "--glob", "*.urdf", *how)
     assert "0 now" in again.stderr
     write_ell(assets / "meshes" / "l.obj")
     changed = batch(assets, "-o", out, "--glob", "r.*", "--jobs", 1, *how)
     assert "2 of 2 meshes are done" in changed.stderr
-    assert rows(out)["r.urdf"]["parts"] > 1, "done again when a mesh has changed"
+    assert rows(out)["r.urdf"]["hulls"] > 1, "done again when a mesh has changed"
 
 
 def test_a_folder_of_robots_with_their_meshes_beside_them_takes_one_command(tmp_path: Path) -> None:
@@ -210,7 +210,7 @@ def test_a_folder_of_robots_with_their_meshes_beside_them_takes_one_command(tmp_
     for name, row in told.items():
         assert ["objs/look.obj" in warning for warning in row["warnings"]] == [True]
         body = pybullet.loadURDF(str(out / name))
-        assert len(pybullet.getCollisionShapeData(body, -1)) == row["parts"] > 1
+        assert len(pybullet.getCollisionShapeData(body, -1)) == row["hulls"] > 1
         assert len(pybullet.getVisualShapeData(body)) == 1
     pybullet.disconnect()
 
@@ -264,7 +264,7 @@ def test_mistakes_are_one_sentence_and_leave_nothing(assets: Path, words: list[s
 
 def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
     said = ["Some lies 3.7 mm outside: repair dropped it."]
-    missing = {"hausdorff": {"under": 0.37}, "missed": "3.7 mm", "warnings": said}
+    missing = {"hausdorff": {"missed": 0.37}, "missed": "3.7 mm", "warnings": said}
     assert [_status(report) for report in ({"warnings": ["a"]}, missing, {"warnings": []})] == [
         *("warned", "uncovered", "done")
     ]

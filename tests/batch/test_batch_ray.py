@@ -73,7 +73,7 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
     (assets / "bad.obj").write_text("no mesh")
     doomed = cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
-    spec, limits = JobSpec.of({}, file_format="urdf"), ProcessLimits(seconds=120)
+    spec, limits = JobSpec.of({}, file_type="urdf"), ProcessLimits(seconds=120)
 
     killing = threading.Thread(target=lambda: cluster.remove_node(doomed, allow_graceful=False))
     watch = counter(at=3, then=killing.start)

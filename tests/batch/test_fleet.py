@@ -25,7 +25,7 @@ from rlacd.errors import OutputError
 from rlacd.options import Options
 from tests.hulls import save_hulls
 
-NOT_OPTIONS = ("self", "path", "file_format", "scene")
+NOT_OPTIONS = ("self", "path", "file_type", "scene")
 
 # --- which meshes, and what their results are called ------------------------------------------------------------------
 
@@ -48,7 +48,7 @@ def test_meshes_of_all_depths_and_links_to_files_are_found_in_order_and_nothing_
 def test_hulls_among_the_meshes_are_passed_over_by_what_is_in_them(tmp_path: Path) -> None:
     box = trimesh.creation.box()
     touch(tmp_path, "a.stl", "a_hulls.glb", "b/c.obj", "b/c_hulls.stl", "own_hulls.glb", "b/a_hulls.obj")
-    save_hulls([box], f"{tmp_path}/b/hulls/", stem="mesh", file_format="stl")
+    save_hulls([box], f"{tmp_path}/b/hulls/", stem="mesh", file_type="stl")
     touch(tmp_path, "b/hulls/mesh_001.stl")
     for name in ("result.glb", "result.obj", "result.ply"):
         save_hulls([box], tmp_path / name)
@@ -107,13 +107,13 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
     for policy in policies:
         policy.write_bytes(q_network())
 
-    written = ("file_format", "density", "mass", "up", "folders", "one_mesh", "keep_input")
+    written = ("file_type", "density", "mass", "up", "folders", "one_mesh", "keep_input")
 
     def key(content: str = "c", name: str = "a/chair.obj", **options: object) -> str:
         kept = {what: options.pop(what) for what in written if what in options}
         return JobSpec.of(options, **kept).key(content, name)  # type: ignore[arg-type]
 
-    same = [key(), key(threads=2), key(threshold=0.05), key(name="b/chair.obj"), key(file_format="glb")]
+    same = [key(), key(threads=2), key(threshold=0.05), key(name="b/chair.obj"), key(file_type="glb")]
     assert len(set(same)) == 1
     others = [
         key("d"),
@@ -122,23 +122,23 @@ def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Pat
         key(seed=1),
         key(preset="mujoco"),
         key(preset="unity"),
-        key(file_format="obj"),
-        key(file_format="obj", folders=True),
-        key(file_format="unreal"),
-        key(file_format="urdf"),
-        key(file_format="urdf", one_mesh=True),
+        key(file_type="obj"),
+        key(file_type="obj", folders=True),
+        key(file_type="unreal"),
+        key(file_type="urdf"),
+        key(file_type="urdf", one_mesh=True),
         key(density=2.0),
         key(up="y"),
         key(mass=2.0),
         key(keep_input=True),
         key(policy="navacd"),
-        key(criterion=NavigableSpace(0.1)),
         key(criterion=NavigableSpace(0.2)),
-        key(criterion=NavigableSpace(0.2, seeds=[(1, 2, 3)])),
+        key(criterion=NavigableSpace(0.4)),
+        key(criterion=NavigableSpace(0.4, seeds=[(1, 2, 3)])),
         key(policy=str(policies[0])),
     ]
     assert len({*same, *others}) == 1 + len(others)
-    assert key(file_format=".OBJ", folders=True) == key(file_format="obj", folders=True)
+    assert key(file_type=".OBJ", folders=True) == key(file_type="obj", folders=True)
     assert key(policy=str(policies[0])) == key(policy=str(policies[1])), "where the network lies is all the same"
 
 
@@ -149,8 +149,8 @@ def test_a_batch_takes_every_option_of_a_decomposition() -> None:
 
 
 def test_an_order_survives_the_way_to_another_process() -> None:
-    space = NavigableSpace(0.1, 0.2, seeds=[(1, 2, 3)], closed_planes=[((0, 0, 1), 0)])
-    spec = JobSpec.of({"criterion": space, "max_vertices": 32}, file_format="urdf", density=2.0, up="y")
+    space = NavigableSpace(0.2, 0.4, seeds=[(1, 2, 3)], closed_planes=[((0, 0, 1), 0)])
+    spec = JobSpec.of({"criterion": space, "max_vertices": 32}, file_type="urdf", density=2.0, up="y")
     again = JobSpec(**json.loads(json.dumps(dataclasses.asdict(spec))))
     assert Options(**again.options).criterion == space
     assert again.key("c", "a.obj") == spec.key("c", "a.obj")

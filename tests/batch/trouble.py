@@ -11,15 +11,15 @@ import os, signal, sys, time
 import rlacd.decompose_mesh
 
 module = sys.modules["rlacd.decompose_mesh"]
-well = module.decompose_in
+well = module.decompose_quietly
 
-def decompose_in(told_in, mesh, *faces, **options):
+def decompose_quietly(mesh, *faces, **options):
     name = getattr(mesh, "stem", "")  # the hull of a mesh that failed is taken of its points
     if name.startswith("dies_once"):
         try:
             os.close(os.open(os.environ["TROUBLE_MARK"], os.O_CREAT | os.O_EXCL))
         except FileExistsError:
-            return well(told_in, mesh, *faces, **options)
+            return well(mesh, *faces, **options)
     if name.startswith("dies"):
         print("last words", file=sys.stderr, flush=True)
         os.kill(os.getpid(), signal.SIGSEGV)
@@ -35,9 +35,9 @@ def decompose_in(told_in, mesh, *faces, **options):
         os.write(1, b"x" * 10**6)
     if name.startswith("bug"):
         raise RuntimeError("surprise")
-    return well(told_in, mesh, *faces, **options)
+    return well(mesh, *faces, **options)
 
-module.decompose_in = decompose_in
+module.decompose_quietly = decompose_quietly
 """
 
 

@@ -70,7 +70,7 @@ WAYS = {"50mm": "mm", "5cm": "cm", "0.05m": "m", f"{0.05 / 0.0254}in": "in"}
     ("given", "least"),
     [
         ("--threshold LENGTH --max-vertices 8 --max-hulls 6 --overlap 2%", 12),
-        ("--threshold LENGTH --avoid rod.stl --keep-open 0.9 --max-hulls 4 --open solid", 9),
+        ("--threshold LENGTH --avoid rod.stl --keep-open 0.9 --max-hulls 4 --openings solid", 9),
         ("--threshold LENGTH --max-hulls 1 --per-node", 9),
         ("--threshold LENGTH --timeout 0.000001", 3),
         ("--criterion navigable --radius LENGTH --max-hulls 2 --max-vertices 6", 8),

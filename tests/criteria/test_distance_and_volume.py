@@ -131,7 +131,7 @@ def test_no_hull_adds_more_than_the_share(shape: object, tolerance: float) -> No
     measured = result.report.volume
     assert len(measured.per_part) == len(result)
     assert measured.max == max(measured.per_part) <= tolerance
-    assert result.report.hausdorff.under < 0.005
+    assert result.report.hausdorff.missed < 0.005
     assert not [warning for warning in result.report.warnings if "volume" in warning]
 
 

@@ -44,7 +44,7 @@ def stage_of(robot: str, folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def stages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, rlacd.Rewritten]]:
+def stages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, rlacd.RewrittenRobot]]:
     if not CONVERTER.exists():
         pytest.skip("urdf-usd-converter is not installed (make build/engines)")
     found = {}
@@ -59,7 +59,7 @@ def stages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, rl
 
 @pytest.fixture(scope="module")
 def answers(
-    stages: dict[str, tuple[Path, rlacd.Rewritten]], tmp_path_factory: pytest.TempPathFactory
+    stages: dict[str, tuple[Path, rlacd.RewrittenRobot]], tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, Any]:
     asked, answered = (tmp_path_factory.mktemp("newton") / name for name in ("task.json", "answer.json"))
     asked.write_text(json.dumps([[str(stage), str(done.path)] for stage, done in stages.values()]))
@@ -71,7 +71,7 @@ def answers(
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_openusd_finds_nothing_that_it_did_not_find_before(
-    stages: dict[str, tuple[Path, rlacd.Rewritten]], robot: str
+    stages: dict[str, tuple[Path, rlacd.RewrittenRobot]], robot: str
 ) -> None:
     from tests.io.test_robots_usd import Usd, colliders, findings
 

@@ -12,8 +12,8 @@ from manifold3d import Manifold
 import rlacd
 from fuzz.geometry import Polytope, distance_to_union
 from rlacd import _native
-from rlacd.cli.options import decompose_options
 from rlacd.errors import OptionError
+from rlacd.options import Options
 from rlacd.solid.passages import Density, passage_balls
 from tests.shapes import Closed, Floats, box, from_manifold, point_to_triangles, trimesh_of
 
@@ -216,7 +216,7 @@ CRITERIA: list[dict[str, Any]] = [
     {},
     {"criterion": "distance"},
     {"criterion": "volume", "volume_tolerance": 0.1},
-    {"criterion": rlacd.NavigableSpace(0.05, 0.08)},
+    {"criterion": rlacd.NavigableSpace(0.1, 0.16)},
     {"max_vertices": 32},
     {"overlap": 0.02},
     {"primitives": True},
@@ -276,10 +276,10 @@ def test_where_a_limit_forbids_it_a_warning_says_so() -> None:
 
 
 def test_a_share_and_a_radius_are_told_apart() -> None:
-    assert decompose_options({"keep_open": "0.9"}) == decompose_options({"keep_open": "90%"}) == {"keep_open": 0.9}
-    assert decompose_options({"keep_open": "2mm"}, metres=True) == {"keep_open_abs": 0.002}
+    assert {Options.of({"keep_open": given}).keep_open for given in (0.9, "0.9", "90%")} == {0.9}
+    assert Options.of({"keep_open": "2mm"}).in_unit(1.0, "mesh").keep_open_abs == 0.002
     with pytest.raises(
-        OptionError, match=r"keep_open_abs \(--keep-open as a length\) is 0\.1 % .* between 0\.2 % and 100 %"
+        OptionError, match=r"keep_open_abs \(--keep-open as a length\) is 0\.1% .* between 0\.2% and 100%"
     ):
         rlacd.decompose(trimesh.creation.box(), keep_open_abs=0.001)
     with pytest.raises(OptionError, match="keep_open_abs, a length"):

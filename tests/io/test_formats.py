@@ -209,7 +209,7 @@ def files_of(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("ending", [None, *FORMATS])
 def test_a_folder_gets_one_file_a_hull(tmp_path: Path, ending: str | None) -> None:
-    folder = save_hulls(THREE, f"{tmp_path}/hulls{'' if ending else '/'}", stem="chair", file_format=ending)
+    folder = save_hulls(THREE, f"{tmp_path}/hulls{'' if ending else '/'}", stem="chair", file_type=ending)
     known = ending or "obj"
     assert files_of(folder) == [*(f"chair_{i:03d}.{known}" for i in range(3)), "chair_hulls.json"]
     assert files_of(tmp_path) == ["hulls"]

@@ -30,7 +30,7 @@ WOOD = None
 
 def kept(path: Path, out: Path, **options: Any) -> tuple[Json, bytes, rlacd.Decomposition]:
     result = rlacd.decompose(path, quality="fast", threads=1, **options)
-    header, binary, _ = read_glb(result.save(out, file_format="unreal"))
+    header, binary, _ = read_glb(result.save(out, file_type="unreal"))
     return header, binary, result
 
 

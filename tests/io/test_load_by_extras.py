@@ -116,7 +116,7 @@ def test_triangles_keep_to_the_surface_and_inches_are_converted() -> None:
         ({"threshold_abs": 2e-4}, 2e-5),
         ({"threshold_abs": 0.2, "scale": 1000.0}, 0.02),
         ({"threshold_abs": 1e-5, "unit": "in"}, 1e-6),
-        ({"criterion": NavigableSpace(0.1, 0.005)}, 0.005 / 10 * 0.06),
+        ({"criterion": NavigableSpace(0.2, 0.01)}, 0.005 / 10 * 0.06),
         ({"threshold": 0.5}, USUAL.share * 0.06),
     ],
     ids=str,

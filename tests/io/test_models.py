@@ -167,7 +167,7 @@ def test_usd_turns_the_inertia_the_right_way(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", MODELS["unreal"].endings)
 def test_unreal_finds_the_hulls_of_the_mesh_by_name(tmp_path: Path, wooden: Decomposition, ending: str) -> None:
-    path = renamed(wooden, "my table").save(tmp_path / f"table.{ending}", file_format="unreal")
+    path = renamed(wooden, "my table").save(tmp_path / f"table.{ending}", file_type="unreal")
     read = trimesh.load_scene(path, process=False, **({"split_objects": True} if ending == "obj" else {}))
     assert sorted(read.geometry) == sorted(["my_table", *(f"UCX_my_table_{i:02d}" for i in range(len(wooden)))])
     assert read.geometry["my_table"].volume == pytest.approx(TABLE_VOLUME, rel=1e-5)
@@ -277,9 +277,9 @@ def test_usd_without_its_extra_is_one_sentence_before_any_work(
 @pytest.mark.parametrize(
     ("path", "options", "error", "says"),
     [
-        ("table.glb", {"file_format": "mjcf"}, OptionError, r"mjcf needs a file whose name ends in \.xml"),
-        ("table.stl", {"file_format": "unreal"}, OptionError, r"\.glb or \.obj"),
-        ("table/", {"file_format": "godot"}, OptionError, r"\.glb"),
+        ("table.glb", {"file_type": "mjcf"}, OptionError, r"mjcf needs a file whose name ends in \.xml"),
+        ("table.stl", {"file_type": "unreal"}, OptionError, r"\.glb or \.obj"),
+        ("table/", {"file_type": "godot"}, OptionError, r"\.glb"),
         ("table.xml", {"density": 0.0}, OptionError, "density is 0.0"),
         ("table.xml", {"density": float("nan")}, OptionError, "density"),
         ("table.xml", {"up": "w"}, OptionError, "x, y or z"),
@@ -287,7 +287,7 @@ def test_usd_without_its_extra_is_one_sentence_before_any_work(
         ("table.blend", {}, OptionError, r"\.xml, \.urdf, \.sdf, \.usd"),
         *((name, {}, OptionError, r"\.glb, \.obj, \.ply, \.stl") for name in ("hulls", "hulls.glb.zip", ".glb")),
         ("nul\0.glb", {}, OutputError, ""),
-        ("table/", {"file_format": "fbx"}, OptionError, "unknown format"),
+        ("table/", {"file_type": "fbx"}, OptionError, "unknown format"),
     ],
 )
 def test_mistakes_are_one_sentence(

@@ -233,13 +233,13 @@ def test_a_mesh_smaller_than_the_threshold_becomes_one_hull(tmp_path: Path) -> N
 
 def test_a_timeout_counts_for_each_mesh(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
-    whole = decomposed.decompose_in
+    whole = decomposed.decompose_quietly
 
     def watched(*words: object, **options: object) -> object:
         given.append(options["timeout"])
         return whole(*words, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(decomposed, "decompose_in", watched)
+    monkeypatch.setattr(decomposed, "decompose_quietly", watched)
     rlacd.rewrite_robot(ear, ear.with_name("out.urdf"), timeout=50.0, threads=1)
     assert given == [50.0, 50.0]
 

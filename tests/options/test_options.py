@@ -6,6 +6,7 @@ import dataclasses
 import fractions
 import inspect
 import itertools
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -129,13 +130,13 @@ def result() -> rlacd.Decomposition:
 @pytest.mark.slow
 @pytest.mark.parametrize("odd", ODD.values(), ids=ODD.keys())
 def test_options_of_what_is_written_are_checked(odd: Any, result: rlacd.Decomposition, tmp_path: Path) -> None:
-    for name in ("file_format", "density", "up", "one_mesh"):
+    for name in ("file_type", "density", "up", "one_mesh"):
         assert_accepted_or_told(lambda name=name: result.save(tmp_path / "box.urdf", **{name: odd}), RlacdError)
     for place in (tmp_path / "box.png", odd):
         for name in ("width", "up"):  # a wrong ending, so that no picture is drawn
             given = {name: odd}
             assert_accepted_or_told(
-                lambda p=place, g=given: result.picture(Path(str(p) + "x") if p is not odd else p, **g), RlacdError
+                lambda p=place, g=given: result.save_picture(Path(str(p) + "x") if p is not odd else p, **g), RlacdError
             )
     assert_accepted_or_told(lambda: result.save_report(tmp_path / "no folder" / "a.html", up=odd), RlacdError)
 
@@ -156,7 +157,7 @@ def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"threshold": "0.05"}, r"threshold is '0\.05', a string; it has to be a number between 0\.001 and 2\."),
+        ({"threshold": "2.05"}, r"threshold is 2\.05; it has to be a number between 0\.001 and 2\."),
         ({"threshold": [0.1]}, r"threshold is \[0\.1\]; it has to be a number between 0\.001 and 2\."),
         ({"max_hulls": 2.5}, r"max_hulls is 2\.5; it has to be an integer, at least 1\."),
         ({"preset": []}, r"preset is \[\]; it has to be one of mujoco, physx, "),
@@ -190,7 +191,7 @@ def test_the_message_shows_the_value_and_what_it_has_to_be(given: dict[str, Any]
         *(({name: getattr(Options, name), f"{name}_abs": 0.1}, f"left out with {name}_abs") for name in LENGTHS),
         ({"keep_open": 0.9, "keep_open_abs": 0.1}, "left out with keep_open_abs"),
         ({"relative_to": "scene"}, "left out without per_node"),
-        ({"relative_to": "node", "per_node": True, "threshold_abs": 0.1}, "no length is a share"),
+        ({"relative_to": "node", "per_node": True, "threshold_abs": 0.1}, "every length is in the mesh's unit"),
         ({"quality": "fast", "search_steps": 0}, "left out with quality='fast'"),
         ({"quality": "best", "merge": False}, "quality is 'best'; it has to be 'fast'"),
     ],
@@ -246,16 +247,16 @@ def test_callbacks_that_take_one_argument_are_accepted() -> None:
             check_callback("progress", wrong, "one")
 
 
-@pytest.mark.parametrize("given", [{"radius": 1e-320}, {"tolerance": 1e300}, {"radius": 11}, {"tolerance": 1e-9}])
+@pytest.mark.parametrize("given", [{"radius": 1e-320}, {"tolerance": 1e300}, {"radius": 21}, {"tolerance": 1e-9}])
 def test_shares_that_no_object_can_have_are_refused(given: dict[str, float]) -> None:
-    with pytest.raises(OptionError, match=r"a share of the longest side between 0\.0001 and 10"):
+    with pytest.raises(OptionError, match=r"a number between 0\.0002 and 20"):
         rlacd.NavigableSpace(**given)
 
 
 @pytest.mark.parametrize("given", [{"radius_abs": 1e-320}, {"tolerance_abs": 1e300}, {"radius_abs": 1e-5}])
 def test_lengths_that_do_not_fit_the_object_are_refused(given: dict[str, float]) -> None:
     with pytest.raises(
-        OptionError, match=r"is .* % of this object's longest side; it has to be between 0\.01 % and 1000 %"
+        OptionError, match=r"is .*% of this object's longest side; it has to be between 0\.01% and 1000%"
     ):
         rlacd.decompose(creation.box(), criterion=rlacd.NavigableSpace(**given))
 
@@ -263,22 +264,48 @@ def test_lengths_that_do_not_fit_the_object_are_refused(given: dict[str, float])
 # --- lengths in words -------------------------------------------------------------------------------------------------
 
 
-def test_a_length_may_be_a_share_or_in_metres() -> None:
-    assert decompose_options({"threshold": "0.1"}) == {"threshold": 0.1}
-    assert decompose_options({"threshold": "5%"}) == {"threshold": 0.1}
-    assert decompose_options({"threshold": "0.05m"}, metres=True) == {"threshold_abs": 0.05}
-    assert decompose_options({"threshold": "5 mm"}, metres=True) == {"threshold_abs": 0.005}
-    space = decompose_options({"criterion": "navigable", "radius": "4%", "tolerance": "2cm"}, metres=True)["criterion"]
-    assert (space.radius, space.tolerance_abs) == (0.04, 0.02)
-    with pytest.raises(OptionError, match=r"give --unit file if the file states it .*, or --keep-open-abs"):
-        decompose_options({"keep_open": "0.05m"})
-    with pytest.raises(OptionError, match="--keep-open is 'abc'"):
-        decompose_options({"keep_open": "abc"})
-    with pytest.raises(OptionError, match="--keep-open 2mm or --keep-open-abs"):
-        Options(keep_open=2.0)
-    for word in ("tight", "5 %%", "", "1e", "m", "0.1 miles"):
-        with pytest.raises(OptionError, match="--threshold is"):
-            decompose_options({"threshold": word}, metres=True)
+def test_a_length_is_given_alike_whatever_it_is_a_length_of() -> None:
+    """A number where the longest side is 2, a share of that side, or a length with a unit."""
+    for name in ("threshold", "overlap", "gap", "radius", "tolerance"):
+        made = [
+            NavigableSpace(**{name: given}) if hasattr(NavigableSpace, name) else Options.of({name: given})
+            for given in (0.1, "0.1", " 5 %")
+        ]
+        assert {getattr(one, name) for one in made} == {0.1}
+    inches = Options.of({"threshold": "1in", "overlap": "5 mm"}).in_unit(0.0254, "mesh")
+    assert (inches.threshold_abs, inches.overlap_abs) == pytest.approx((1.0, 5 / 25.4))
+    assert inches.criterion == "distance"
+    space = Options.of({"criterion": NavigableSpace("4%", "2cm")}).in_unit(1e-3, "mesh").criterion
+    assert (space.radius, space.tolerance_abs) == pytest.approx((0.08, 20.0))
+    shares = Options.of({"criterion": "volume", "volume_tolerance": "2%", "keep_open": "90%"})
+    assert (shares.volume_tolerance, shares.keep_open) == (0.02, 0.9), "shares of other things"
+
+
+def test_a_length_with_a_unit_is_kept_until_the_mesh_says_its_own() -> None:
+    for given in ({"threshold": "2mm", "keep_open": "1cm"}, {"criterion": NavigableSpace(radius="2mm")}):
+        options = Options.of(given)
+        plain = json.loads(json.dumps(options.as_plain()))
+        again = Options.of(plain)
+        assert again.as_plain() == options.as_plain()
+        assert (again.typed_unit, again.in_unit(1.0, "mesh").typed_unit) == ("mm", None)
+    cube = creation.box()
+    with pytest.raises(OptionError, match=r"threshold is 2mm, but a mesh does not say its unit: .* threshold_abs"):
+        rlacd.decompose(cube, threshold="2mm")
+    assert rlacd.decompose(cube, threshold="2mm", unit="cm").report.options["threshold_abs"] == 0.002
+    assert rlacd.decompose(cube, threshold="20%").report.options["threshold"] == 0.4
+
+
+@pytest.mark.parametrize("word", ["tight", "5 %%", "", "1e", "m", "0.1 miles", "nan%"])
+def test_words_that_are_no_lengths_are_refused(word: str) -> None:
+    wants = {"threshold": Options.of, "overlap": decompose_options, "radius": lambda given: NavigableSpace(**given)}
+    for name, given in wants.items():
+        with pytest.raises(OptionError, match=f"{name} is"):
+            given({name: word})
+    for name in ("gap", "volume_tolerance"):
+        with pytest.raises(OptionError, match=f"{name} is '2mm'; it has to be a number or a share"):
+            Options.of({name: "2mm"})
+    with pytest.raises(OptionError, match="threshold is '2mm'; it has to be left out with threshold_abs"):
+        Options.of({"threshold": "2mm", "threshold_abs": 1.0})
 
 
 # --- stated once ------------------------------------------------------------------------------------------------------

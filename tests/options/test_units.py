@@ -121,7 +121,7 @@ def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> N
     """A box of faces without its lid: repair makes its walls a thousandth of its longest side thick."""
     walls = trimesh.creation.box((0.2, 0.2, 0.2))
     walls.update_faces(walls.face_normals[:, 2] < 0.5)
-    shell = rlacd.decompose(walls, open="thin", quality="fast", threads=1)
+    shell = rlacd.decompose(walls, openings="thin", quality="fast", threads=1)
     assert [body.step for body in shell.report.repair] == [SHEET]
     assert shell.report.mass.volume_abs == pytest.approx(5 * 0.2**2 * 2 * HALF_THICKNESS * 0.1, rel=0.02)
     with pytest.warns(rlacd.ImplausibleBodyWarning, match=r"hollow shell .* walls 0.0002 units thick"):

@@ -102,8 +102,8 @@ def test_a_kept_cavity_stays_free_by_every_criterion(criterion: Any) -> None:
 
 def test_navigable_space_says_by_itself_whether_balls_get_into_cavities() -> None:
     with pytest.raises(OptionError, match=r"keep_cavities .* seeds or reachable_only=False"):
-        rlacd.decompose(ROOM, criterion=rlacd.NavigableSpace(0.1), keep_cavities=True)
-    space = rlacd.NavigableSpace(0.1, 0.01, seeds=[[0.5, 0.5, 0.5]])
+        rlacd.decompose(ROOM, criterion=rlacd.NavigableSpace(0.2), keep_cavities=True)
+    space = rlacd.NavigableSpace(0.2, 0.02, seeds=[[0.5, 0.5, 0.5]])
     assert len(rlacd.decompose(ROOM, criterion=space, keep_cavities=True, threads=1)) > 1
 
 

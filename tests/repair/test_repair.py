@@ -245,7 +245,7 @@ ACROSS_A_GAP = CROSSING[0]
 @pytest.mark.promise("covered")
 def test_nothing_of_meshes_of_which_something_was_lost_lies_outside(corpus, name):
     report = rlacd.decompose(noisy_copy(corpus, name)[1] if name in CROSSING else corpus / name, quality="fast").report
-    under = report.hausdorff.under
+    under = report.hausdorff.missed
     if name == ACROSS_A_GAP:
         assert under <= 0.006  # up to DEFAULT_GAP / √3 is possible, 0.0052 is what happens
         said = f"up to {under / report.scale:.4g} units outside the hulls"
@@ -283,7 +283,7 @@ def test_corners_of_faces_without_an_area_are_covered_or_named(name: str) -> Non
     missed = np.min([trimesh.proximity.signed_distance(hull, corners) * -1 for hull in result], axis=0).max()
     assert max(missed, 0) == pytest.approx(away, abs=2e-3)
     report = result.report
-    assert report.hausdorff.under / report.scale == pytest.approx(away, abs=2e-3)
+    assert report.hausdorff.missed / report.scale == pytest.approx(away, abs=2e-3)
     said = [warning for warning in report.warnings if "only a point or an edge were left out" in warning]
     assert len(said) == (away > 0)
     assert not said or f"lie{'s' if '1 corner ' in said[0] else ''} up to {away} units outside" in said[0]
@@ -298,7 +298,7 @@ def test_needles_apart_are_kept_though_they_are_narrower_than_cracks(width: floa
     result = rlacd.decompose((corners, faces), quality="fast", threads=1)
     outside = [trimesh.proximity.signed_distance(hull, corners[8:]) * -1 for hull in result]
     assert np.min(outside, axis=0).max() <= 2e-3 / result.report.scale
-    assert result.report.hausdorff.under <= 1e-3
+    assert result.report.hausdorff.missed <= 1e-3
     assert {body.step for body in result.report.repair} == {"closed", "slab"}
 
 
@@ -307,5 +307,5 @@ def test_a_node_without_size_is_named_if_hulls_miss_it(per_node: bool) -> None:
     speck = trimesh.Trimesh([[3, 0, 0]] * 3, [[0, 1, 2]], process=False)
     scene = trimesh.Scene({"one": BOX, "two": moved(BOX, -2, 0, 0), "speck": speck})
     report = rlacd.decompose(scene, per_node=per_node, quality="fast", threads=1).report
-    assert report.hausdorff.under == pytest.approx(1.0)
+    assert report.hausdorff.missed == pytest.approx(1.0)
     assert "1 corner lies up to 2 units outside the hulls, farthest near (3, 0, 0)" in report.warnings[0]

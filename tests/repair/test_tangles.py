@@ -123,8 +123,8 @@ def test_a_body_with_large_faces_that_is_inside_out_here_and_there_is_a_tangle()
     """A bracket of 28 triangles, one of them gone and two with a wrong corner."""
     result = rlacd.decompose(FAULTY_BRACKET, threads=2, quality="fast")
     assert len(result) < 60
-    assert result.report.hausdorff.under < 1e-3
-    assert result.report.hausdorff.over < 0.06
+    assert result.report.hausdorff.missed < 1e-3
+    assert result.report.hausdorff.added < 0.06
 
 
 @pytest.mark.slow
@@ -135,8 +135,8 @@ def test_a_tangle_takes_bounded_work(seed: int) -> None:
     result = rlacd.decompose(mesh, threads=2)
     assert result.report.complete
     assert len(result) < 60
-    assert result.report.hausdorff.under < 1e-3
-    assert result.report.hausdorff.over < 0.055
+    assert result.report.hausdorff.missed < 1e-3
+    assert result.report.hausdorff.added < 0.055
     assert result.report.concavity.max <= 0.05
     assert "1 body crosses" in result.report.warnings[0]
 
@@ -149,7 +149,7 @@ def test_cutting_stops_at_its_bound_and_says_so(monkeypatch: pytest.MonkeyPatch)
     one, two = (rlacd.decompose(torus, quality="fast", threads=threads) for threads in (1, 2))
     assert "cutting stopped at its bound" in " ".join(one.report.warnings)
     assert one.report.complete
-    assert one.report.hausdorff.under < 1e-6
+    assert one.report.hausdorff.missed < 1e-6
     assert [hull.vertices.tolist() for hull in one] == [hull.vertices.tolist() for hull in two]
 
 
@@ -194,5 +194,5 @@ def test_bodies_that_cross_each_other_too_often_are_enclosed_instead_of_united()
     assert any("crosses itself too often to be united exactly" in said for said in hulls.report.warnings)
     assert hulls.report.complete
     assert all(hull.is_convex and hull.is_volume for hull in hulls)
-    assert hulls.report.hausdorff.under < 1e-3
+    assert hulls.report.hausdorff.missed < 1e-3
     assert hulls.report.concavity.max <= 0.05

@@ -66,7 +66,7 @@ STAGES_OF_THEIR_OWN = [
     {"max_hulls": 3},
     {"max_vertices": 8, "max_faces": 12},
     {"max_vertices": 5},
-    {"criterion": rlacd.NavigableSpace(0.05, 0.05)},
+    {"criterion": rlacd.NavigableSpace(0.1, 0.1)},
     {"merge": False},
     {"threshold_abs": 0.05},
     {"quality": "fast", "threads": 3},

@@ -8,7 +8,7 @@ import trimesh
 
 import rlacd
 from rlacd.decomposition import Decomposition
-from rlacd.view.heat import FINEST, INNER, HeatMesh, frame_of, heat_map
+from rlacd.viewer.heat import FINEST, INNER, HeatMesh, frame_of, heat_map
 from tests.hulls import hull_of
 from tests.shapes import elbow
 
@@ -31,7 +31,7 @@ def test_the_hottest_spot_is_as_far_as_the_report_says(threshold: float, place: 
     mesh.apply_scale(place[1])
     mesh.apply_translation([place[0], 0, -place[0]])
     result = rlacd.decompose(mesh, threshold=threshold)
-    over = result.report.hausdorff.over
+    over = result.report.hausdorff.added
     # Distance is 1-Lipschitz: the farthest point of a triangle lies within an edge of a corner.
     assert over - FINEST - MEASURED_WITHIN <= hottest(heat_map(result)) <= over + MEASURED_WITHIN
 

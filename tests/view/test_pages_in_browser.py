@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 import rlacd
 from rlacd.cli.main import app
-from rlacd.view.server import ViewServer
+from rlacd.viewer.server import ViewServer
 from tests.view.viewing import open_viewer
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
@@ -159,7 +159,7 @@ def rows(page: Any) -> int:
 @pytest.mark.slow
 def test_the_hulls_are_seen_listed_and_downloaded(seen: Watched, viewer: ViewServer, tmp_path: Path) -> None:
     page = seen.page
-    faces = viewer.session.result[1].report.faces
+    faces = viewer.session.result[1].report.triangles
     assert page.title() == "table: 5 hulls"
     assert page.locator("#name").inner_text() == "table"
     assert page.locator("#summary").inner_text().startswith(f"5 hulls · {faces} triangles · concavity")

@@ -15,7 +15,7 @@ import trimesh
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
 from rlacd.fit import LengthFit
-from rlacd.view.picture import check_picture, draw_picture
+from rlacd.viewer.picture import check_picture, draw_picture
 from tests.hulls import hull_of, moved
 
 Image = pytest.importorskip("PIL.Image", reason="the extra view is not installed")
@@ -76,7 +76,7 @@ def test_up_turns_the_picture(tmp_path: Path) -> None:
 def test_a_single_point_like_hull_and_a_sheet_as_input_can_be_drawn(tmp_path: Path) -> None:
     sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
     slab = hull_of(trimesh.creation.box((1.0, 1.0, 1e-6)).vertices)
-    path = Decomposition.of([slab], sheet).picture(tmp_path / "sheet.png", width=WIDTH)
+    path = Decomposition.of([slab], sheet).save_picture(tmp_path / "sheet.png", width=WIDTH)
     assert pixels(path).min() < 200
 
 
@@ -105,7 +105,7 @@ def test_a_missing_extra_is_one_sentence_with_the_command(
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingExtraError, match=r"pip install 'rlacd\[view\]'") as raised:
-        towers().picture(tmp_path / "out.png")
+        towers().save_picture(tmp_path / "out.png")
     assert isinstance(raised.value, ImportError)
 
 
@@ -115,14 +115,14 @@ def test_an_extra_that_does_not_load_is_told_apart(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr(importlib, "import_module", fail)
     with pytest.raises(MissingExtraError, match=r"does not load here \(libatomic"):
-        towers().picture(tmp_path / "out.png")
+        towers().save_picture(tmp_path / "out.png")
 
 
 def test_drawing_leaves_stdout_and_stderr_alone(tmp_path: Path) -> None:
     """In a process of its own: what Mitsuba's libraries say, they say once, when they are loaded."""
     code = (
         "import sys, trimesh; from rlacd.decomposition import Decomposition; box = trimesh.creation.box();"
-        "Decomposition.of([box], box).picture(sys.argv[1], width=300); print('drawn', file=sys.stderr)"
+        "Decomposition.of([box], box).save_picture(sys.argv[1], width=300); print('drawn', file=sys.stderr)"
     )
     command = [sys.executable, "-c", code, str(tmp_path / "out.png")]
     run = subprocess.run(command, capture_output=True, text=True, timeout=120)

@@ -23,9 +23,9 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.plain_json import to_json
 from rlacd.report import Hausdorff
-from rlacd.view.page import MODULES
-from rlacd.view.report import report_page, save_report_page
-from rlacd.view.scene import scene
+from rlacd.viewer.page import MODULES
+from rlacd.viewer.report import report_page, save_report_page
+from rlacd.viewer.scene import scene
 from tests.hulls import hull_of
 from tests.shapes import elbow
 
@@ -121,7 +121,7 @@ def test_numbers_that_json_does_not_know_become_null() -> None:
     cube = trimesh.creation.box()
     distances = Hausdorff(float("inf"), float("nan"))
     data = payload(report_page(Decomposition.of([hull_of(cube.vertices)], cube, hausdorff=distances), picture=False))
-    assert data["report"]["hausdorff"] == {"over": None, "under": None}
+    assert data["report"]["hausdorff"] == {"added": None, "missed": None}
 
 
 def test_a_cloud_of_points_and_balls_can_be_shown() -> None:
@@ -129,7 +129,7 @@ def test_a_cloud_of_points_and_balls_can_be_shown() -> None:
     cloud = payload(report_page(rlacd.decompose((corners, np.empty((0, 3), dtype=np.int32))), picture=False))
     assert cloud["input"] == []
     assert cloud["heat"]["parts"] == []
-    space = rlacd.NavigableSpace(radius=0.05, tolerance=0.02)
+    space = rlacd.NavigableSpace(radius=0.1, tolerance=0.04)
     free = rlacd.decompose(elbow(1.0), criterion=space)
     balls = payload(report_page(free, picture=False))["balls"]
     assert 0 < balls["shown"] <= balls["of"] == len(free.balls)
@@ -160,7 +160,7 @@ def test_the_ending_tells_the_command_what_kind_of_report_is_meant(tmp_path: Pat
 
 
 def test_bad_places_and_axes_are_refused(result: Decomposition, tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match=r"must end in \.html"):
+    with pytest.raises(OptionError, match=r"must end in \.json, \.html"):
         save_report_page(result, tmp_path / "out.pdf")
     with pytest.raises(OptionError, match="x, y or z"):
         save_report_page(result, tmp_path / "out.html", up="w")

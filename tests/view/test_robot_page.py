@@ -17,9 +17,9 @@ import rlacd
 from rlacd.clear import mjcf_motion, urdf_motion
 from rlacd.io.robots.viewed import USUAL, decompose_viewed, read_viewed
 from rlacd.plain_json import to_json
-from rlacd.view.robot import RobotResult
-from rlacd.view.scene import scene
-from rlacd.view.server import ViewServer
+from rlacd.viewer.robot import RobotResult
+from rlacd.viewer.scene import scene
+from rlacd.viewer.server import ViewServer
 from tests.view.test_pages_in_browser import (
     Watched,
     browser,

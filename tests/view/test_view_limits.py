@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from rlacd.view.server import ViewServer
+from rlacd.viewer.server import ViewServer
 from tests.view.viewing import PATIENCE, ask, open_viewer, port_of
 
 LONGEST_LINE = 1 << 16

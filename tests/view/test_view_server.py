@@ -31,9 +31,9 @@ from rlacd.cli.main import app
 from rlacd.errors import OptionError, OutputError
 from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace
-from rlacd.view.controls import read_controls
-from rlacd.view.downloads import offered
-from rlacd.view.server import ViewServer
+from rlacd.viewer.controls import read_controls
+from rlacd.viewer.downloads import offered
+from rlacd.viewer.server import ViewServer
 from tests.shapes import elbow
 from tests.view.viewing import PATIENCE, Answer, ask, open_viewer, port_of
 
@@ -175,7 +175,7 @@ def test_a_report_under_way_holds_up_no_decomposition(viewer: ViewServer, monkey
         assert done.wait(PATIENCE)
         raise OutputError("the picture could not be drawn: its process died of SIGKILL.")
 
-    monkeypatch.setattr("rlacd.view.report.picture_bytes", slow)
+    monkeypatch.setattr("rlacd.viewer.report.picture_bytes", slow)
     with ThreadPoolExecutor(3) as pool:
         reports = [pool.submit(ask, viewer, "GET", "/download?format=report.html") for _ in range(3)]
         assert begun.wait(PATIENCE)
@@ -297,7 +297,7 @@ def test_a_file_that_is_no_mesh_is_refused_and_nothing_is_lost(
         ({"primitives": True, "overlap": 0.02}, ["--primitives all", "--overlap 0.02"]),
         ({"primitives": ["box", "sphere"], "overlap": 0.0}, ["--primitives box,sphere"]),
         ({"criterion": "volume", "volume_tolerance": 0.02}, ["--criterion volume", "--tolerance 0.02"]),
-        ({"open": "solid", "keep_cavities": True}, ["--open solid", "--keep-cavities"]),
+        ({"openings": "solid", "keep_cavities": True}, ["--openings solid", "--keep-cavities"]),
         ({"criterion": None, "threshold": None, "quality": None}, []),
     ],
 )
@@ -438,7 +438,16 @@ def test_a_port_in_use_is_one_sentence_and_without_one_a_free_one_is_found(viewe
 
 def test_the_controls_hold_the_defaults_of_the_command_line() -> None:
     controls, usual, space = read_controls({}), Options(), NavigableSpace()
-    for name in ("criterion", "threshold", "quality", "max_hulls", "max_vertices", "overlap", "open", "keep_cavities"):
+    for name in (
+        "criterion",
+        "threshold",
+        "quality",
+        "max_hulls",
+        "max_vertices",
+        "overlap",
+        "openings",
+        "keep_cavities",
+    ):
         assert controls[name] == getattr(usual, name)
     assert bool(controls["primitives"]) == bool(usual.primitives)
     assert (controls["radius"], controls["tolerance"]) == (space.radius, space.tolerance)

@@ -15,8 +15,8 @@ import trimesh
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
 from rlacd.run import Progress, ProgressCallback
-from rlacd.view.controls import read_subject
-from rlacd.view.session import Session, SessionState
+from rlacd.viewer.controls import read_subject
+from rlacd.viewer.session import Session, SessionState
 from tests.hulls import hull_of
 
 PATIENCE = 20.0  # seconds until a test gives up

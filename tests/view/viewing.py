@@ -9,8 +9,8 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 import rlacd
-from rlacd.view import viewer
-from rlacd.view.server import ViewServer
+from rlacd.viewer import viewer
+from rlacd.viewer.server import ViewServer
 
 PATIENCE = 60.0
 

@@ -36,19 +36,19 @@ class Options:
     )
     radius: FloatProperty(
         name="Ball radius",
-        description="As a share of the longest side of the mesh",
-        default=0.025,
-        min=0.002,
-        max=0.5,
+        description="Where the longest side of the mesh is 2",
+        default=0.05,
+        min=0.004,
+        max=1.0,
         precision=3,
         step=1,
     )
     tolerance: FloatProperty(
         name="Tolerance",
-        description="Space nearer to the surface than this may be filled; a share of the longest side",
-        default=0.05,
-        min=0.001,
-        max=0.5,
+        description="Space nearer to the surface than this may be filled; where the longest side is 2",
+        default=0.1,
+        min=0.002,
+        max=1.0,
         precision=3,
         step=1,
     )

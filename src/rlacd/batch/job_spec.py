@@ -19,7 +19,7 @@ from rlacd.options.output import OutputOptions
 from rlacd.policies import make_policy
 from rlacd.pool import Shared
 
-WRITTEN = ("file_format", "density", "mass", "up", "one_mesh", "keep_input")
+WRITTEN = ("file_type", "density", "mass", "up", "one_mesh", "keep_input")
 """Options of the output that a batch takes."""
 
 POLICY = "policy"
@@ -38,13 +38,9 @@ class JobSpec:
     """Arguments of `rlacd.Decomposition.save` beside the path."""
     weights: str = ""
     """Hash of the network, if the policy is a file."""
-    told_in: str | None = None
-    """The unit in which lengths were typed, which messages use; None for that of each mesh."""
 
     @classmethod
-    def of(
-        cls, options: dict[str, Any], *, folders: bool = False, told_in: str | None = None, **written: Any
-    ) -> JobSpec:
+    def of(cls, options: dict[str, Any], *, folders: bool = False, **written: Any) -> JobSpec:
         """Check everything that can be checked before a mesh is read.
 
         Parameters
@@ -53,10 +49,8 @@ class JobSpec:
             Keyword arguments of `rlacd.decompose`, without ``progress``. Each mesh gets one thread by default.
         folders : bool
             Whether each mesh gets a folder with one file per hull.
-        told_in : str, optional
-            The unit in which messages give lengths, of meshes that are converted to metres.
         **written
-            ``file_format``: a value of ``--format``, or any ending of a hull file; by default the preset's format,
+            ``file_type``: a value of ``--format``, or any ending of a hull file; by default the preset's format,
             else glb. ``density``, ``mass``, ``up``, ``one_mesh`` and ``keep_input`` as for `rlacd.Decomposition.save`.
 
         Raises
@@ -75,20 +69,20 @@ class JobSpec:
             raise OptionError("in a batch, avoid (--avoid) has to be left out: it is for a single mesh.")
         make_policy(checked.first_policy)
         asked = OutputOptions(**written)
-        ending, file_format = file_kind(asked.file_format, checked.preset)
+        ending, file_type = file_kind(asked.file_type, checked.preset)
         if folders:
-            ending, file_format = "", FOLDER_FORMAT if asked.file_format is None else asked.file_format
-            if file_format not in FORMATS:
-                raise OptionError(f"{file_format} cannot be a folder per mesh; use one of {', '.join(FORMATS)}.")
-        asked = replace(asked, file_format=file_format)
+            ending, file_type = "", FOLDER_FORMAT if asked.file_type is None else asked.file_type
+            if file_type not in FORMATS:
+                raise OptionError(f"{file_type} cannot be a folder per mesh; use one of {', '.join(FORMATS)}.")
+        asked = replace(asked, file_type=file_type)
         with TemporaryDirectory() as folder:
             hull_target(f"{folder}/mesh{ending or '/'}", asked)
         plain = {"threads": 1, **options}
         plain["criterion"] = checked.as_plain()["criterion"]
         saved = {name: getattr(asked, name) for name in WRITTEN}
-        if ending == f".{file_format}":
-            saved["file_format"] = None  # the same as not given
-        return cls(plain, ending, saved, _weights(checked.first_policy), told_in)
+        if ending == f".{file_type}":
+            saved["file_type"] = None  # the same as not given
+        return cls(plain, ending, saved, _weights(checked.first_policy))
 
     def key(self, content: str, name: str) -> str:
         """Name the result of a mesh with this content by everything that determines its bytes.
@@ -100,7 +94,7 @@ class JobSpec:
         if options["policy"].endswith(WEIGHTS_ENDING):
             options["policy"] = WEIGHTS_ENDING
         stem = PurePosixPath(name).stem  # models carry this name
-        decides = [__version__, content, stem, self.weights, options, self.ending, self.written, self.told_in]
+        decides = [__version__, content, stem, self.weights, options, self.ending, self.written]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def shared(self) -> dict[str, Shared]:

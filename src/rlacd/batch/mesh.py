@@ -149,7 +149,7 @@ def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerD
 
 
 def _status(report: dict[str, Any]) -> Status:
-    if (report.get("hausdorff", {}).get("under") or 0.0) > COVERAGE_TOLERANCE:
+    if (report.get("hausdorff", {}).get("missed") or 0.0) > COVERAGE_TOLERANCE:
         return "uncovered"
     return "warned" if report["warnings"] else "done"
 

@@ -15,10 +15,9 @@ import numpy as np
 import trimesh
 
 from rlacd.batch.job_spec import POLICY, JobSpec
-from rlacd.decompose_mesh import decompose, decompose_in
+from rlacd.decompose_mesh import decompose, decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
-from rlacd.fit import Unit
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
 from rlacd.io.robots import is_robot, rewrite_robot
@@ -70,7 +69,7 @@ def make(
             ending = mesh.suffix if stage is None else spec.ending
             facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)
             return facts, _files_in(Path(folder))
-        result = _hull(spec, mesh) if hull_only else decompose_in(Unit.typed(spec.told_in), mesh, **spec.options)
+        result = _hull(spec, mesh) if hull_only else decompose_quietly(mesh, **spec.options)
         place = f"{folder}/{stem}{spec.ending or '/'}"
         with warnings.catch_warnings(record=True) as doubts:
             warnings.simplefilter("always", ImplausibleBodyWarning)
@@ -102,15 +101,15 @@ def _robot(spec: JobSpec, robot: Path | Robot, place: Path, hull_only: bool) -> 
             warning = warning.replace(path, name)
         warnings.append(warning)
     reports = [result.report for link in done.links for result in link.results]
-    missed = [(under, _missed(report)) for report in reports if (under := report.hausdorff.under) is not None]
-    under, in_words = max(missed, default=(None, None))
-    facts = {what: sum(getattr(report, what) for report in reports) for what in ("parts", "faces", "vertices")}
+    each = [(missed, _missed(report)) for report in reports if (missed := report.hausdorff.missed) is not None]
+    missed, in_words = max(each, default=(None, None))
+    facts = {what: sum(getattr(report, what) for report in reports) for what in ("hulls", "triangles", "vertices")}
     fits = [fit for report in reports if (fit := report.fit) is not None and fit.is_length]
-    if fits and all(fit.worst is not None for fit in fits):
-        facts[fits[0].name] = max(fit.worst for fit in fits if fit.worst is not None)
+    if fits and all(fit.max is not None for fit in fits):
+        facts[fits[0].name] = max(fit.max for fit in fits if fit.max is not None)
     return {
         **facts,
-        "hausdorff": {"under": under},
+        "hausdorff": {"missed": missed},
         "missed": in_words,
         "complete": done.complete and not hull_only,
         "warnings": warnings,
@@ -133,17 +132,17 @@ def _hull(spec: JobSpec, mesh: Path) -> Decomposition:
 
 def _summary(report: Report) -> dict[str, Any]:
     """Collect the facts that do not depend on when and where the mesh is decomposed."""
-    same = ("parts", "faces", "vertices", "complete", "hausdorff")
+    same = ("hulls", "triangles", "vertices", "complete", "hausdorff")
     kept = {what: as_plain(getattr(report, what)) for what in same}
     if report.fit is not None:
-        kept[report.fit.name] = report.fit.worst
+        kept[report.fit.name] = report.fit.max
     return {**kept, "missed": _missed(report), "warnings": [*report.warnings]}
 
 
 def _missed(report: Report) -> str | None:
     """How far hulls miss the surface, in words; None if it is unknown."""
-    under = report.hausdorff.under
-    return None if under is None else report.unit_in_frame.words(under)
+    missed = report.hausdorff.missed
+    return None if missed is None else report.unit_in_frame.words(missed)
 
 
 class MeshServer:

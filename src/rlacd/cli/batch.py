@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from rlacd.cli.commands import Argument, Command, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import ctrl_c_at_once
-from rlacd.cli.options import PoolOptions, decompose_options, how, unit_given
+from rlacd.cli.options import PoolOptions, decompose_options, how
 from rlacd.errors import OptionError
 from rlacd.options.fields import check_fields, option, stated
 from rlacd.options.output import OutputOptions
@@ -41,7 +41,7 @@ class BatchOptions:
     """Write a folder for each mesh, with a file for each hull."""
     redo: Redo = option("none", one_of=Redo)
     """Which meshes to do again: none, those that failed (failed), or all."""
-    file_format: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
+    file_type: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
     """The format of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot."""
     threads: int = option(1, least=1)
     """Threads for each mesh."""
@@ -79,9 +79,9 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     own, where = BatchOptions(**taken(given, BatchOptions)), PoolOptions(**taken(given, PoolOptions))
     if where.jobs == 0:
         raise OptionError("--jobs is 0; a batch needs at least 1 process.")
-    written = {"file_format": own.file_format, **{name: given.pop(name) for name in WRITTEN}}
-    options = decompose_options({**given, "threads": own.threads}, metres=given["unit"] is not None)
-    spec = JobSpec.of(options, folders=own.folders, told_in=unit_given(given), **written)
+    written = {"file_type": own.file_type, **{name: given.pop(name) for name in WRITTEN}}
+    options = decompose_options({**given, "threads": own.threads})
+    spec = JobSpec.of(options, folders=own.folders, **written)
     work = Batch(assets, own.output, spec, where.limits(), own.fallback, own.glob, own.redo)
     if own.dry_run:
         _print_plan(work)

@@ -17,20 +17,16 @@ import click
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of, taken
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import import_trimesh
-from rlacd.cli.options import decompose_options, how, link_lengths, unit_given
+from rlacd.cli.options import decompose_options, how, link_lengths
 from rlacd.cli.pipes import STDIO, file_for, stdin_as_file, stdout_name
 from rlacd.errors import ImplausibleBodyWarning, MeshFileError, OptionError
-from rlacd.fit import Unit
 from rlacd.io.read import READERS
 from rlacd.io.read.open_file import missing
-from rlacd.options.output import PAGES, OutputOptions
+from rlacd.options.output import REPORTS, OutputOptions
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Progress, ProgressCallback
 
 ROBOTS = (".urdf", ".xml")
-IN_METRES = (*ROBOTS, ".glb", ".gltf", ".vrm", ".step", ".stp", ".iges", ".igs")
-"""File formats that define the metre as their unit, or are read in metres whatever theirs is."""
-
 MESH = (
     f"The mesh: {', '.join(READERS)}. It need not be closed or clean. Or a robot, .urdf or .xml (MJCF), whose "
     "collision meshes are to be replaced. - reads stdin."
@@ -38,9 +34,6 @@ MESH = (
 
 LOG_EVERY = 30.0
 """Seconds between two lines in a log about a robot that takes long, as between those of a batch."""
-
-REPORTS = (".json", *PAGES)
-"""Endings of reports."""
 
 FROM = "What stdin holds, if IN is -: obj, stl, ...  [default: told from its content]"
 
@@ -59,7 +52,7 @@ def _decompose(mesh: Path, source: str | None, **how: Any) -> None:
       rlacd decompose chair.glb
       rlacd decompose chair.glb -o chair_hulls.obj --threshold 0.02
       rlacd decompose chair.glb -o hulls/ --format stl --max-vertices 64
-      rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .parts
+      rlacd decompose arm.dae -o arm.glb --picture arm.png --report - | jq .hulls
       rlacd decompose chair.glb -o chair.xml --preset mujoco
       rlacd decompose robot.urdf -o robot_acd.urdf
       cat chair.obj | rlacd decompose - --from obj -o - --format stl > hulls.stl
@@ -89,8 +82,7 @@ def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str
     import_trimesh(mesh)
     if STDIO in (asked.report, asked.output):
         give("")  # before any work
-    in_metres = mesh.suffix.lower() in IN_METRES
-    options = decompose_options(how, metres=in_metres or how.get("unit") is not None)
+    options = decompose_options(how)
     wanted = _named(mesh, asked, options.get("preset"))
     stage = _stage(mesh, wanted, apart=robots.get("per") == "mesh")
     robot = mesh.suffix.lower() in ROBOTS or stage is not None
@@ -98,25 +90,25 @@ def _run(mesh: Path, asked: OutputOptions, robots: dict[str, Any], how: dict[str
     _check_robot(asked, wanted) if robot else _check_mesh(mesh, wanted, robots)
     if wanted.balls is not None and isinstance(options.get("criterion", ""), str):
         raise OptionError("--balls needs --criterion navigable.")
-    run = partial(_rewrite, stage, RobotOptions(**link_lengths(robots, in_metres))) if robot else _write
-    return run(mesh, wanted, options, Unit.typed(unit_given(how)))
+    run = partial(_rewrite, stage, RobotOptions(**link_lengths(robots))) if robot else _write
+    return run(mesh, wanted, options)
 
 
-def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: Unit | None) -> bool:
+def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     """Decompose a mesh and write all requested files; returns whether it is complete."""
     from rlacd.cli.terminal import summary, watching, writing
-    from rlacd.decompose_mesh import decompose_in
+    from rlacd.decompose_mesh import decompose_quietly
     from rlacd.plain_json import to_json
 
     up, quiet = wanted.up, bool(wanted.quiet)
     with watching(quiet=quiet) as watch:
-        result = decompose_in(told_in, mesh, **options, progress=watch)
+        result = decompose_quietly(mesh, **options, progress=watch)
     place = str(wanted.output)
-    names = ("file_format", "density", "mass", "one_mesh", "keep_input", "scene")
+    names = ("file_type", "density", "mass", "one_mesh", "keep_input", "scene")
     written = chosen({name: getattr(wanted, name) for name in names})
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", ImplausibleBodyWarning)
-        with file_for(place, wanted.file_format) as file:
+        with file_for(place, wanted.file_type) as file:
             result.save(file, up=up, **written)
     if not quiet:
         say(summary(result, "stdout" if place == STDIO else place))
@@ -125,10 +117,10 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: 
     extras: dict[str, tuple[str | None, Callable[[str], object]]] = {
         "report": (wanted.report, partial(result.save_report, up=up)),
         "balls": (wanted.balls, result.save_balls),
-        "picture": (wanted.picture, partial(result.picture, up=up)),
+        "picture": (wanted.picture, partial(result.save_picture, up=up)),
     }
-    if wanted.report is None or not is_html(wanted.report):
-        _write_report(wanted, to_json(result.report))
+    if wanted.report == STDIO:
+        give(to_json(result.report))
         del extras["report"]
     for what, (path, write) in extras.items():
         if path is not None:
@@ -137,29 +129,10 @@ def _write(mesh: Path, wanted: OutputOptions, options: dict[str, Any], told_in: 
     return result.report.complete
 
 
-def _write_report(wanted: OutputOptions, text: str) -> None:
-    """Write measurements where they were asked for, if they were."""
-    from rlacd.cli.terminal import writing
-    from rlacd.io.write import write_file
-
-    if wanted.report == STDIO:
-        give(text)
-    elif wanted.report is not None:
-        with writing("report", wanted.report, quiet=bool(wanted.quiet)):
-            write_file(Path(wanted.report), text.encode())
-
-
-def is_html(path: str) -> bool:
-    """Tell from its name whether a report should be a page; here, since `rlacd.view` takes time to load."""
-    return Path(path).suffix.lower() in PAGES
-
-
-def _rewrite(
-    stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any], told_in: Unit | None
-) -> bool:
+def _rewrite(stage: Any, how: RobotOptions, robot: Path, wanted: OutputOptions, options: dict[str, Any]) -> bool:
     """Replace the collision meshes of a robot, or of a stage that has been read; returns whether all are complete."""
     from rlacd.cli.terminal import rewrite_summary, watching, writing
-    from rlacd.io.robots.rewrite import rewrite, rewrite_in
+    from rlacd.io.robots.rewrite import rewrite, rewrite_quietly
     from rlacd.plain_json import to_json
 
     with watching(quiet=bool(wanted.quiet)) as watch:
@@ -169,14 +142,14 @@ def _rewrite(
             done = rewrite(stage, Path(place), options, how, keep_input=flat)
         else:
             given = {"package_dirs": wanted.package_dirs or (), "keep_input": flat, **vars(how)}
-            done = rewrite_in(told_in, robot, place, **given, **options)
+            done = rewrite_quietly(robot, place, **given, **options)
     if not wanted.quiet:
         say(rewrite_summary(done))
-    if wanted.report is not None and is_html(wanted.report):
+    if wanted.report == STDIO:
+        give(to_json(done.as_dict()))
+    elif wanted.report is not None:
         with writing("report", wanted.report, quiet=bool(wanted.quiet)):
             done.save_report(wanted.report)
-    else:
-        _write_report(wanted, to_json(done.as_dict()))
     return done.complete
 
 
@@ -211,15 +184,15 @@ def _named(mesh: Path, asked: OutputOptions, preset: str | None) -> OutputOption
     """Fill in the output path and format that the preset or the input determines."""
     from rlacd.io.write.target import MODELS, file_kind
 
-    ending, file_format = file_kind(asked.file_format, preset)
+    ending, file_type = file_kind(asked.file_type, preset)
     if mesh.suffix.lower() in ROBOTS:
         ending = mesh.suffix
     beside = str(mesh.parent / f"{mesh.stem or 'mesh'}_hulls{ending}")
     output = beside if asked.output is None else asked.output
-    model, ending = MODELS.get(str(file_format)), Path(output).suffix.lower().lstrip(".")
-    if asked.file_format is None and (model is None or ending not in model.endings):
-        file_format = None
-    return dataclasses.replace(asked, output=output, file_format=file_format)
+    model, ending = MODELS.get(str(file_type)), Path(output).suffix.lower().lstrip(".")
+    if asked.file_type is None and (model is None or ending not in model.endings):
+        file_type = None
+    return dataclasses.replace(asked, output=output, file_type=file_type)
 
 
 def _check_mesh(mesh: Path, wanted: OutputOptions, robots: dict[str, Any]) -> None:
@@ -228,14 +201,14 @@ def _check_mesh(mesh: Path, wanted: OutputOptions, robots: dict[str, Any]) -> No
     from rlacd.io.write.balls import check_balls
     from rlacd.io.write.folder import check_names
 
-    target = hull_target(stdout_name(str(wanted.output), wanted.file_format), wanted)
+    target = hull_target(stdout_name(str(wanted.output), wanted.file_type), wanted)
     if target.is_folder:
         stem = file_stem(mesh.stem)
-        check_names(target.path, stem, [f"{stem}_000.{target.file_format}"])  # the one that every result has
+        check_names(target.path, stem, [f"{stem}_000.{target.file_type}"])  # the one that every result has
     for flag in ["package-dir"] * bool(wanted.package_dirs) + [{"links": "link"}.get(name, name) for name in robots]:
         raise OptionError(f"--{flag} is for robots, a .urdf or .xml file as input.")
     if wanted.picture is not None:
-        from rlacd.view.picture import check_picture
+        from rlacd.viewer.picture import check_picture
 
         check_picture(wanted.picture, up=wanted.up)
     if wanted.balls is not None:
@@ -246,9 +219,9 @@ def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes."""
     if wanted.output == STDIO:
         raise OptionError("a robot is several files, which do not fit into stdout: give -o a file name.")
-    for name in ("picture", "balls", "file_format", "density", "mass", "one_mesh", "scene"):
+    for name in ("picture", "balls", "file_type", "density", "mass", "one_mesh", "scene"):
         if getattr(asked, name) is not None:
-            spelled = "format" if name == "file_format" else name.replace("_", "-")
+            spelled = "format" if name == "file_type" else name.replace("_", "-")
             raise OptionError(f"--{spelled} is for a single mesh; leave it out for a robot.")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import re
 from dataclasses import dataclass
@@ -15,18 +14,14 @@ from rlacd._version import __version__
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
 from rlacd.options import LENGTHS, OPTION_NAMES, RUN, Options, with_criterion
-from rlacd.options.fields import LONGEST_SIDE, check_fields, number, option, shown, stated
-from rlacd.options.names import UNITS
+from rlacd.options.fields import check_fields, number, option, shown, stated
+from rlacd.options.lengths import read_lengths
 from rlacd.options.navigable import NavigableSpace
 
 if TYPE_CHECKING:
     from rlacd.pool import Pool, ProcessLimits
 
-_ABSOLUTE = {*OPTION_NAMES, *(field.name for field in dataclasses.fields(NavigableSpace))}
-
 LIKE = "The options and the seed of an earlier run, from the file that --report wrote; other options override them."
-
-_LENGTH = re.compile(rf"([-+.\deE]+)\s*(%|{'|'.join(UNITS)})")
 
 
 @stated(panel="Processes")
@@ -66,15 +61,13 @@ def how() -> list[Option]:
     return [like, *options_of(Options, only=own), *options_of(NavigableSpace)]
 
 
-def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[str, Any]:
+def decompose_options(given: dict[str, Any]) -> dict[str, Any]:
     """Keep the options that were given, and build the criterion from its own options.
 
     Parameters
     ----------
     given : dict
         Options that control the decomposition, by name; None if not given.
-    metres : bool
-        Whether the mesh is in metres, so that lengths with a unit can be taken.
 
     Returns
     -------
@@ -86,7 +79,8 @@ def decompose_options(given: dict[str, Any], *, metres: bool = False) -> dict[st
     OptionError
         Options contradict each other or are malformed.
     """
-    given = lengths(chosen(given), metres)
+    given = chosen(given)
+    read_lengths(given)  # refuses what is none before any work; each mesh may have another unit
     before = _of_report(given.pop("like")) if "like" in given else {}
     if "seeds" in given:
         given["seeds"] = [_numbers("--seed-point", words, 3) for words in given["seeds"]]
@@ -120,55 +114,15 @@ def _numbered(version: str) -> list[int]:
     return [int(number) for number in version.split(".")]
 
 
-def lengths(given: dict[str, Any], metres: bool | None) -> dict[str, Any]:
-    """Parse lengths: a number, a share of the longest side (5%), or metres (0.05m), which None refuses."""
-    taken = dict(given)
-    for name, longest in LONGEST_SIDE.items():
-        word = taken.get(name)
-        if not isinstance(word, str):
-            continue
-        flag, found = name.replace("_", "-"), _LENGTH.fullmatch(word.strip())
-        value, unit = (_number(found[1]), found[2]) if found else (_number(word), None)
-        if value is None:
-            raise OptionError(
-                f"--{flag} is {word!r}; it has to be a number, a share such as 5%, or a length such as 5mm."
-            )
-        if unit not in UNITS:
-            taken[name] = value / 100 * longest if unit == "%" else value
-            continue
-        if metres is None or f"{name}_abs" not in _ABSOLUTE:
-            raise OptionError(f"--{flag} is {word}; it has to be a number or a share such as 2%.")
-        if not metres:
-            raise OptionError(
-                f"--{flag} is {word}, so the file's unit has to be known: give --unit file if the file states it (dae, "
-                f"fbx, 3mf, usd), --unit with its unit otherwise, or --{flag}-abs in the file's own."
-            )
-        if f"{name}_abs" in taken:
-            raise OptionError(f"--{flag} and --{flag}-abs are both lengths; give one of the two.")
-        del taken[name]
-        taken[f"{name}_abs"] = value * UNITS[unit]
-    return taken
-
-
-def link_lengths(given: dict[str, Any], metres: bool) -> dict[str, Any]:
-    """Parse ``--link REGEX=LENGTH``: in the robot's own unit, or with one where that is the metre."""
-    taken: dict[str, float] = {}
+def link_lengths(given: dict[str, Any]) -> dict[str, Any]:
+    """Parse ``--link REGEX=LENGTH``."""
+    taken: dict[str, str] = {}
     for word in given.get("links") or ():
         pattern, _, text = word.rpartition("=")
-        found = _LENGTH.fullmatch(text.strip())
-        value, unit = (_number(found[1]), found[2]) if found else (_number(text), None)
-        if not pattern or value is None or unit == "%":
+        if not pattern:
             raise OptionError(f"--link is {word!r}; it has to be REGEX=LENGTH, such as 'finger.*=1mm'.")
-        if unit is not None and not metres:
-            raise OptionError(f"--link is {word!r}; of a USD stage, lengths are in its own unit: leave out {unit}.")
-        taken[pattern] = value * (UNITS[unit] if unit else 1.0)
+        taken[pattern] = text
     return {**given, "links": taken} if taken else given
-
-
-def unit_given(how: dict[str, Any]) -> str | None:
-    """The unit in which a length was given, first of all the threshold; None if all are shares or bare numbers."""
-    found = (_LENGTH.fullmatch(str(how.get(name) or "").strip()) for name in LONGEST_SIDE)
-    return next((one[2] for one in found if one and one[2] in UNITS), None)
 
 
 def _number(word: str) -> float | None:

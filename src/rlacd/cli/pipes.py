@@ -48,25 +48,25 @@ def refuse_stdin(mesh: Path) -> None:
         raise OptionError("only rlacd decompose reads stdin: give the name of a file.")
 
 
-def stdout_name(output: str, file_format: str | None) -> str:
+def stdout_name(output: str, file_type: str | None) -> str:
     """The name of a file whose content goes to stdout; any other output keeps its name."""
     from rlacd.io.write.target import FOLDER_FORMAT, MODEL_OF, WITH_MESHES, ending_of
 
     if output != STDIO:
         return output
-    ending = ending_of(file_format or FOLDER_FORMAT)
+    ending = ending_of(file_type or FOLDER_FORMAT)
     if MODEL_OF.get(ending) in WITH_MESHES:
-        raise OptionError(f"{file_format} is several files, which do not fit into stdout: give -o a file name.")
+        raise OptionError(f"{file_type} is several files, which do not fit into stdout: give -o a file name.")
     return f"hulls.{ending}"
 
 
 @contextlib.contextmanager
-def file_for(output: str, file_format: str | None) -> Iterator[str]:
+def file_for(output: str, file_type: str | None) -> Iterator[str]:
     """The output, or a file whose content goes to stdout in the end."""
     if output != STDIO:
         yield output
         return
     with TemporaryDirectory(prefix="rlacd-") as folder:
-        place = Path(folder) / stdout_name(output, file_format)
+        place = Path(folder) / stdout_name(output, file_type)
         yield str(place)
         give(place.read_bytes())

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rlacd.decomposition import Decomposition
     from rlacd.fit import Unit
-    from rlacd.io.robots import Rewritten
+    from rlacd.io.robots import RewrittenRobot
 
 
 @contextmanager
@@ -109,7 +109,7 @@ def summary(result: Decomposition, written: str) -> str:
     if report.deviation_abs is not None:
         moved = report.unit.words(report.deviation_abs)
         lines.append(f"  measured to triangles, up to {moved} from the surface in the file")
-    least, parts = report.at_least or 1, report.parts
+    least, parts = report.lower_bound or 1, report.hulls
     if 1 < least <= parts:
         fewer = "fewer hulls" if least == parts else f"fewer than {least} hulls"
         lines.append(f"  no decomposition to this tolerance has {fewer}")
@@ -123,7 +123,7 @@ def summary(result: Decomposition, written: str) -> str:
     return "\n".join(lines)
 
 
-def rewrite_summary(done: Rewritten) -> str:
+def rewrite_summary(done: RewrittenRobot) -> str:
     """Summarise the result for a robot: a line for each link with collision meshes, and totals."""
     if not done.links:
         return "\n".join([f"{done.path}: written", *(f"  warning: {warning}" for warning in done.warnings)])
@@ -134,9 +134,9 @@ def rewrite_summary(done: Rewritten) -> str:
     width = max(len(link.name) for link in done.links)
     for link in done.links:
         sizes = f"{counted(len(link.meshes), 'mesh', 'meshes'):>9}  {counted(len(link.files), 'hull', 'hulls'):>8}"
-        lines.append(f"  {link.name:{width}} {sizes}  {_farthest(link.farthest, done.unit)}")
+        lines.append(f"  {link.name:{width}} {sizes}  {_farthest(link.added, done.unit)}")
     each = f"{hulls / len(done.links):.1f} hulls a link for {counted(meshes, 'mesh', 'meshes')}"
-    lines.append(f"  {each}; {_farthest(done.farthest, done.unit)}")
+    lines.append(f"  {each}; {_farthest(done.added, done.unit)}")
     if done.samples:
         kept = sum(pair.kept_clear for pair in done.pairs)
         looked = (

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rlacd.cli.commands import Argument, Command, Option, options_of
-from rlacd.cli.decompose import IN_METRES, ROBOTS
+from rlacd.cli.decompose import ROBOTS
 from rlacd.cli.exit_codes import ExitCode, give, say
 from rlacd.cli.lean import import_trimesh
-from rlacd.cli.options import decompose_options, unit_given
+from rlacd.cli.options import decompose_options
 from rlacd.cli.pipes import refuse_stdin
 from rlacd.errors import OptionError
-from rlacd.fit import Unit
 from rlacd.options import Options
 from rlacd.options.output import OutputOptions
 from rlacd.plain_json import to_json
 
 TAKEN = (
     *("threshold", "criterion", "max_hulls", "threshold_abs", "volume_tolerance", "volume_of", "max_vertices"),
-    *("max_faces", "preset", "detail", "merge", "policy", "open", "unit", "scale", "quality", "seed", "threads"),
+    *("max_faces", "preset", "detail", "merge", "policy", "openings", "unit", "scale", "quality", "seed", "threads"),
     "timeout",
 )
 
@@ -44,22 +42,21 @@ def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None
         raise OptionError(f"{mesh} is a robot; give one of the meshes that it refers to.")
     import_trimesh(mesh)
     if picture is not None:
-        from rlacd.view.picture import check_picture
+        from rlacd.viewer.picture import check_picture
 
         check_picture(picture)
-    options = decompose_options(how, metres=mesh.suffix.lower() in IN_METRES or how.get("unit") is not None)
+    options = decompose_options(how)
     from rlacd.cli.terminal import watching, writing
     from rlacd.thresholds import tradeoff
 
     with watching(quiet=bool(quiet)) as watch:
         found = tradeoff(mesh, **options, progress=watch)
-    found = replace(found, unit=Unit.typed(unit_given(how)) or found.unit)
-    give(to_json(found.as_plain()) if as_json else f"{found}\n")
-    if found.pick is None and found.choices:
+    give(to_json(found.as_dict()) if as_json else f"{found}\n")
+    if found.pick is None and found.rows:
         say("no threshold tried leads to so few hulls; rlacd decompose --max-hulls finds the tightest.")
-    if picture is not None and found.choices:
+    if picture is not None and found.rows:
         with writing("picture", picture, quiet=bool(quiet)):
-            found.picture(picture)
+            found.save_picture(picture)
     if not found.complete:
         raise SystemExit(ExitCode.STOPPED_EARLY)
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import webbrowser
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rlacd.cli.commands import Argument, Command, Option, chosen, options_of
 from rlacd.cli.exit_codes import leave, say
 from rlacd.cli.lean import ctrl_c_at_once
-from rlacd.cli.options import lengths
 from rlacd.cli.pipes import refuse_stdin
 from rlacd.options import Options
 from rlacd.options.output import OutputOptions
 
-CONTROLS = ("threshold", "criterion", "quality", "max_hulls", "open")
+CONTROLS = ("threshold", "criterion", "quality", "max_hulls", "openings")
 """Options of `rlacd decompose` that the page can change."""
 
 
@@ -36,16 +34,10 @@ def _view(mesh: Path, browser: bool, **given: Any) -> None:
     refuse_stdin(mesh)
     packages = given.pop("package_dirs") or ()
     with ctrl_c_at_once():
-        from rlacd.io.robots.read import is_robot, robot_or_none
-        from rlacd.io.robots.viewed import USUAL, decompose_viewed, read_viewed
-        from rlacd.view.viewer import open_viewer
+        from rlacd.view_file import view
 
-    asked = lengths(chosen({name: given.pop(name) for name in CONTROLS}), metres=None)
-    moves = is_robot(mesh) or robot_or_none(mesh) is not None
-    controls = {**USUAL, **asked} if moves else asked
-    given["read"] = partial(read_viewed, package_dirs=packages)
-    decompose = partial(decompose_viewed, package_dirs=packages)
-    with open_viewer(mesh, decompose, controls, **given) as server, suppress(KeyboardInterrupt):
+    asked = chosen({name: given.pop(name) for name in CONTROLS})
+    with view(mesh, package_dirs=packages, **given, **asked) as server, suppress(KeyboardInterrupt):
         say(f"{mesh.name} is shown at {server.address} (Ctrl-C ends)")
         if browser:
             webbrowser.open(server.address)

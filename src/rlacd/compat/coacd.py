@@ -116,7 +116,7 @@ def run_coacd(
         threshold_abs=threshold if real_metric else None,
         max_hulls=None if most_hulls < 1 else most_hulls,
         max_vertices=read(integer(4), "max_ch_vertex", max_ch_vertex) if decimate else None,
-        overlap=min(margin, LENGTHS["overlap"][1]) if extrude else 0.0,
+        overlap=min(2 * margin, LENGTHS["overlap"][1]) if extrude else 0.0,
         merge=merge,
         seed=seed,
     )

@@ -70,7 +70,7 @@ def finish(reached: Reached, run: Run) -> Finished:
     one that misses nothing is.
     """
     done, parts = _finished(reached, run)
-    under = done.report.hausdorff.under
+    under = done.report.hausdorff.missed
     if under is not None and under > COVERAGE_TOLERANCE:
         earlier = run.if_in_time(lambda: _covering(reached, parts, run), lambda: None)
         return done if earlier is None else finish(earlier, run)
@@ -150,7 +150,7 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
 
     parts, seams = reached.parts, None
     if options.overlap > 0 and root is not None:
-        parts, seams = overlap_parts(parts, root, goal, 2 * options.overlap)
+        parts, seams = overlap_parts(parts, root, goal, options.overlap)
     return run.map(cleaned, parts), seams
 
 

@@ -26,7 +26,7 @@ from rlacd.report import (
     Avoids,
     Hausdorff,
     Hole,
-    NodeParts,
+    NodeHulls,
     Overlap,
     Point,
     Report,
@@ -96,7 +96,7 @@ def make_report(
         missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
-        warnings += _shallow(seams, solid.frame.unit.words(2 * options.overlap)) if options.overlap > 0 else []
+        warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
         warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
         warnings += warnings_of(entered, _why_entered(run), solid.frame.told_in) if entered else []
@@ -118,7 +118,7 @@ def make_report(
             repair=solid.bodies,
             holes=_holes(solid),
             search=reached.found,
-            at_least=None if reached.found is None else min(reached.found.at_least, len(hulls)),
+            lower_bound=None if reached.found is None else min(reached.found.lower_bound, len(hulls)),
             warnings=tuple(warnings),
             unit=solid.frame.told_in,
         )
@@ -189,17 +189,17 @@ def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
         options=first.options,
         complete=stopped.complete,
         stopped_by=stopped.stopped_by,
-        **{what: sum(getattr(report, what) for report in each) for what in ("parts", "faces", "vertices")},
+        **{what: sum(getattr(report, what) for report in each) for what in ("hulls", "triangles", "vertices")},
         primitives=_added([report.primitives for report in each]),
         overlap=_joint_overlap(each),
         **_joint_fit(each, factors),
         avoid=_joint_avoid([report.avoid for report in each if report.avoid is not None]),
         hausdorff=Hausdorff(
-            _farthest([report.hausdorff.over for report in each], factors),
-            _farthest([report.hausdorff.under for report in each], factors),
+            _farthest([report.hausdorff.added for report in each], factors),
+            _farthest([report.hausdorff.missed for report in each], factors),
         ),
         passages=tuple(replace(one, node=name) for name, report in reports for one in report.passages or ()),
-        nodes=tuple(NodeParts(name, report.parts, report.scale) for name, report in reports),
+        nodes=tuple(NodeHulls(name, report.hulls, report.scale) for name, report in reports),
         scale=scale,
         mass=joint_mass([report.mass for report in each]),
         repair=tuple(
@@ -212,7 +212,7 @@ def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
             for (name, report), _, begin in bodies
             for hole in report.holes
         ),
-        at_least=_sum_known([report.at_least for report in each]),
+        lower_bound=_sum_known([report.lower_bound for report in each]),
         warnings=tuple(f"{name}: {warning}" for name, report in reports for warning in report.warnings),
         unit=first.unit,
     )
@@ -249,9 +249,9 @@ def _joint_overlap(each: Sequence[Report]) -> Overlap | None:
         return None
     if any(one.seams is None for one in overlaps):
         return Overlap()
-    firsts = accumulate((report.parts for report in each), initial=0)
+    firsts = accumulate((report.hulls for report in each), initial=0)
     short = [
-        replace(seam, parts=(first + seam.parts[0], first + seam.parts[1]))
+        replace(seam, hulls=(first + seam.hulls[0], first + seam.hulls[1]))
         for first, one in zip(firsts, overlaps, strict=False)
         for seam in one.short_seams or ()
     ]
@@ -401,8 +401,8 @@ def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: 
 def _why_beyond(solid: Solid, options: Options) -> str:
     """Name the repairs that move hulls away from the surface, and the options that avoid them."""
     filled = any(body.step in ("capped", "wrapped") for body in solid.bodies)
-    if filled and options.open != "thin":
-        return "repair closed openings (see `repair`), which --open thin leaves open"
+    if filled and options.openings != "thin":
+        return "repair closed openings (see `repair`), which --openings thin leaves open"
     return "repair moved the surface there (see `repair`)"
 
 

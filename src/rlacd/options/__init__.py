@@ -13,7 +13,6 @@ from typing import Any, Literal, TypeAlias, cast
 
 from rlacd.errors import OptionError
 from rlacd.options.fields import (
-    LENGTH,
     about,
     check_fields,
     custom,
@@ -22,11 +21,11 @@ from rlacd.options.fields import (
     one_of,
     option,
     read,
-    relative,
     shown,
     stated,
 )
 from rlacd.options.keywords import check_names
+from rlacd.options.lengths import LENGTH, as_given, in_unit, read_lengths, relative, unit_of
 from rlacd.options.names import (
     POLICIES,
     PRIMITIVE_KINDS,
@@ -50,7 +49,7 @@ CRITERIA = {
 """Each criterion by its name, with the numbers that say how tight it is."""
 
 VolumeOf = Literal["part", "whole"]
-OpenName = Literal["auto", "solid", "thin"]
+OpeningsName = Literal["auto", "solid", "thin"]
 DetailName = Literal["simple", "full"]
 QualityName = Literal["fast", "balanced", "best"]
 RelativeTo = Literal["scene", "node", "mesh"]
@@ -69,16 +68,17 @@ RESOLUTIONS = (20, 400)
 """Fewest and most cells along a side of the grid on which repair looks for voids: with fewer, a wrap drawn onto the
 surface folds over itself; more would take over 4 GB."""
 
-GAPS = (0.005, 0.15)
-"""Shares of the longest side: smaller balls would need more than `RESOLUTIONS` cells, larger ones close what a body is
+GAPS = (0.01, 0.3)
+"""Where the longest side is 2: smaller balls would need more than `RESOLUTIONS` cells, larger ones close what a body is
 made of."""
 
-LENGTHS = {"threshold": (0.001, 2.0), "overlap": (0.0, 0.25)}
-"""Bounds of options that may also be given in the input's unit, under their name and ``_abs``. A hull farther from its
+LENGTHS = {"threshold": (0.001, 2.0), "overlap": (0.0, 0.5)}
+"""Bounds, where the longest side is 2, of options that may also be given in the input's unit, under their name and
+``_abs``. A hull farther from its
 part than the largest threshold does not fit into the frame; hulls that overlap by more are hardly parts."""
 
-RADII = (0.002, 1.0)
-"""Shares of the longest side that the radius of a ball that has to pass may be: narrower passages are not found."""
+RADII = (0.004, 2.0)
+"""Bounds of the radius of a ball that has to pass, where the longest side is 2: narrower passages are not found."""
 
 TIGHT, LIMITS, METHOD, RUN = "How tight", "Limits", "Method", "Running"
 """Headings of the command's help."""
@@ -169,17 +169,17 @@ class Options:
         flags=("--threshold", "-t"),
         metavar="NUMBER",
     )
-    """The concavity or distance a hull may have, where the longest side of the mesh is 2. Smaller is tighter, with
-    more hulls: 0.02 is fine, 0.2 coarse.
+    """The concavity or distance a hull may have, where the longest side of the mesh is 2, as in CoACD. Smaller is
+    tighter, with more hulls: 0.02 is fine, 0.2 coarse. Also a share of the longest side (2.5%) or, where the unit is
+    known, a length (5mm), which is a distance.
 
-    On the command line: also as a share of the longest side (2.5%) or, where the file says its unit, as a length
-    (0.05m), which is a distance. For a robot by default 1.5% of its longest side, as a distance.
-
-    This is CoACD's frame; all other lengths are shares of the longest side, or in the mesh's own unit.
+    On the command line: for a robot by default 1.5% of its longest side, as a distance.
     """
     threshold_abs: float | None = option(None, TIGHT, LENGTH)
     """The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance."""
-    volume_tolerance: float = option(0.01, TIGHT, least=1e-4, most=10.0, flags=("--tolerance",))
+    volume_tolerance: float = option(
+        0.01, TIGHT, number(1e-4, 10.0, typed=str), flags=("--tolerance",), metavar="NUMBER"
+    )
     """With --criterion volume: the share of volume that a hull may add, such as 1%.
 
     The default is that of V-HACD. Parts smaller than a thousandth of the whole's convex hull count as this large.
@@ -217,9 +217,7 @@ class Options:
     one may reach below a side on which the input rests.
     """
     overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
-    """Hulls that touch overlap by this share of the longest side (0.5%), so that nothing thin slips between them.
-
-    On the command line: also a length (2mm).
+    """Hulls that touch overlap by this, given as --threshold is (0.5%, 2mm), so that nothing thin slips between them.
 
     One takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and
     a warning says at how many seams. With `per_node`, hulls of different nodes do not overlap.
@@ -228,9 +226,7 @@ class Options:
     """The same as a length in the mesh's own unit."""
     keep_open: float | None = option(None, LIMITS, _OPENNESS, metavar="NUMBER", usual="passages may close")
     """Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in radius, one of this
-    share of its radius (0.9) still fits between the hulls.
-
-    On the command line: also the radius of a ball that has to pass (2mm).
+    share of its radius (0.9, 90%) still fits between the hulls; or the radius of a ball that has to pass (2mm).
 
     It fits at the same place. A warning counts the passages not kept and says what is left; ``report.passages``
     lists them.
@@ -257,7 +253,7 @@ class Options:
     """
     resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
     """Grid cells along the longest side, used to repair bodies that are not closed."""
-    open: OpenName = option("auto", METHOD, one_of=OpenName)
+    openings: OpeningsName = option("auto", METHOD, one_of=OpeningsName)
     """Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
     others thin shells; solid fills all that enclose a space; thin fills none."""
     keep_cavities: bool = option(False, METHOD)
@@ -266,8 +262,8 @@ class Options:
 
     Closed cavities are those that an inner shell or closed bodies bound, and spaces that only narrow gaps lead to.
     """
-    gap: float = option(0.015, METHOD, number(*GAPS, typed=str), metavar="NUMBER")
-    """Openings that a ball of this radius, a share of the longest side, cannot pass count as closed."""
+    gap: float = option(0.03, METHOD, number(*GAPS, typed=str), metavar="NUMBER")
+    """Openings that a ball of this radius cannot pass count as closed; given as --threshold is, without a unit."""
     seed: int = option(0, RUN, least=0, most=2**63 - 1)
     """The same seed, input and options give the same bytes; another seed finds other hulls.
 
@@ -347,7 +343,7 @@ class Options:
         TypeError
             There is no such option.
         """
-        given = {name: value for name, value in given.items() if value is not None}
+        given = read_lengths({name: value for name, value in given.items() if value is not None})
         check_names("decompose", given, OPTION_NAMES, ELSEWHERE)
         options = cls(**given)
         for name, rule in options._overridden():
@@ -372,7 +368,7 @@ class Options:
         if not self.per_node:
             yield "relative_to", "left out without per_node"
         elif not [name for name in shares if name not in _OWN or name in self.numbers]:
-            yield "relative_to", "left out: no length is a share of the longest side"
+            yield "relative_to", "left out: every length is in the mesh's unit"
         if self.quality == FAST:
             for name in ("budget", "search_steps"):
                 yield name, "left out with quality='fast', which does not search"
@@ -422,8 +418,28 @@ class Options:
         plain = dataclasses.asdict(dataclasses.replace(self, policy="greedy", avoid=()))
         own = {"policy": policy_name(self.first_policy), "primitives": [*plain["primitives"]]}
         plain |= own | {"avoid": [mesh_name(mesh) for mesh in self.avoid]}
+        if isinstance(self.criterion, NavigableSpace):
+            plain["criterion"] = self.criterion.as_plain()
         idle = {name for name, _ in self._overridden()}
-        return {name: value for name, value in plain.items() if name not in idle}
+        return as_given({name: value for name, value in plain.items() if name not in idle})
+
+    @property
+    def typed_unit(self) -> str | None:
+        """The unit in which a length was given, first of all that of the criterion; None if none was."""
+        return unit_of(vars(self)) or (unit_of(vars(self.criterion)) if self.criterion_name == "navigable" else None)
+
+    def in_unit(self, metres: float | None, name: str) -> Options:
+        """Get the same options with lengths that have a unit in that of a mesh; see `rlacd.options.lengths.in_unit`.
+
+        Raises
+        ------
+        OptionError
+            The unit of the mesh is not known.
+        """
+        given = in_unit(vars(self), metres, name)
+        if isinstance(self.criterion, NavigableSpace):
+            given["criterion"] = self.criterion.in_unit(metres, name)
+        return dataclasses.replace(self, **given)
 
     def at_scale(self, scale: float) -> Options:
         """Get the same options with lengths as bare numbers, where a unit of the input is `scale` units of the frame.

@@ -2,8 +2,7 @@
 
 The docstring below a field says what it means: its first paragraph everywhere, others where `TYPED` says.
 
-Lengths are shares of the longest side of the mesh, or in its own unit under the option's name and ``_abs``. The one
-exception is a bare threshold, which is CoACD's: given in the frame where the longest side is 2.
+Lengths: see `rlacd.options.lengths`.
 """
 
 from __future__ import annotations
@@ -316,26 +315,3 @@ def check_callback(name: str, value: Any, taken: str) -> None:
         fits = isinstance(error, ValueError) and not isinstance(value, type)
     if not fits:
         raise OptionError(f"{name} is {shown(value)}; it has to be a function that takes {taken}.")
-
-
-LONGEST_SIDE = {"threshold": 2.0, "overlap": 1.0, "gap": 1.0, "radius": 1.0, "tolerance": 1.0, "keep_open": 1.0}
-"""Length of the longest side in the unit of each option's bare numbers."""
-
-LENGTH = number(above=0, rule="a positive length in the input's unit")
-
-
-def relative(name: str, length: float, scale: float, bounds: tuple[float, float]) -> float:
-    """Get what a length in the input's unit is as a bare number; `scale` is units of the frame per unit of the input.
-
-    Raises
-    ------
-    OptionError
-        The length is too small or too large for the object.
-    """
-    side = LONGEST_SIDE[name]
-    number, (least, most) = length * scale * side / 2, bounds
-    if not least <= number <= most:
-        given = f"{name}_abs (--{name.replace('_', '-')} as a length) is {100 * number / side:.3g} % of this object's"
-        allowed = f"between {100 * least / side:g} % and {100 * most / side:g} %"
-        raise OptionError(f"{given} longest side; it has to be {allowed}.")
-    return number

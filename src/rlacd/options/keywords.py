@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 from rlacd.options.fields import About, stated_in
+from rlacd.options.lengths import TAKEN
 
 Given = ParamSpec("Given")
 Returned = TypeVar("Returned")
@@ -54,11 +55,16 @@ def taking(options: type[Any], *others: type[Any]) -> Callable[[Callable[Given, 
     def completed(function: Callable[Given, Returned]) -> Callable[Given, Returned]:
         signature, keyword = inspect.signature(function), inspect.Parameter.KEYWORD_ONLY
         own = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
-        own += [inspect.Parameter(f.name, keyword, default=f.default, annotation=f.type) for f in fields]
-        own += [inspect.Parameter(f.name, keyword, default=None, annotation=f.type) for f in more]
+        own += [inspect.Parameter(f.name, keyword, default=f.default, annotation=_type(f)) for f in fields]
+        own += [inspect.Parameter(f.name, keyword, default=None, annotation=_type(f)) for f in more]
         function.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
-        said = "".join(explained(field.name, str(field.type)) for field in fields)
+        said = "".join(explained(field.name, _type(field)) for field in fields)
         function.__doc__ = (function.__doc__ or "").replace("    **options\n", f"{said}    **options\n")
         return function
 
     return completed
+
+
+def _type(field: dataclasses.Field[Any]) -> str:
+    """What a function takes for an option: a length as text too."""
+    return str(field.type).replace("float", "float | str") if field.name in TAKEN else str(field.type)

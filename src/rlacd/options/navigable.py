@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from rlacd.errors import OptionError
-from rlacd.options.fields import LENGTH, check_fields, custom, number, option, relative, stated
+from rlacd.options.fields import check_fields, custom, number, option, stated
+from rlacd.options.lengths import LENGTH, as_given, in_unit, read_lengths, relative
 
 Point: TypeAlias = tuple[float, float, float]
 
-SHARES = (1e-4, 10.0)
-"""Bounds of radius and tolerance, as shares of the longest side: less takes endless balls, more fills everything."""
+BOUNDS = (2e-4, 20.0)
+"""Of radius and tolerance, where the longest side is 2: less takes endless balls, more fills everything."""
 
-USUAL = {"radius": 0.025, "tolerance": 0.05}
-"""Defaults where neither the share nor the length is given."""
+USUAL = {"radius": 0.05, "tolerance": 0.1}
+"""Defaults where the length is given in neither way."""
 
 LARGEST_COORDINATE = 1e100
 """Largest coordinate: products of larger ones would be infinite."""
@@ -56,7 +57,7 @@ def _planes(given: Any) -> tuple[tuple[Point, float], ...]:
     return tuple(planes)
 
 
-_SHARE = number(*SHARES, rule="a share of the longest side between {:g} and {:g}".format(*SHARES), typed=str)
+_LENGTH = number(*BOUNDS, typed=str)
 _SEEDS = custom("a list of at least one finite point [x, y, z]", _seeds)
 _PLANES = custom("a list of (normal, offset) pairs, every normal a finite vector [x, y, z] that is not zero", _planes)
 
@@ -72,11 +73,12 @@ class NavigableSpace:
         A value is of the wrong type or out of its range.
     """
 
-    radius: float | None = option(None, kind=_SHARE, metavar="NUMBER", usual=f"{USUAL['radius']:g}")
-    """Radius of the ball, as a share of the longest side of the mesh."""
-    tolerance: float | None = option(None, kind=_SHARE, metavar="NUMBER", usual=f"{USUAL['tolerance']:g}")
-    """Space nearer to the surface than this may be filled; also a share of the longest side. With --criterion volume:
-    the share of volume that a hull may add, such as 1%."""
+    radius: float | str | None = option(None, kind=_LENGTH, metavar="NUMBER", usual=f"{USUAL['radius']:g}")
+    """Radius of the ball, where the longest side of the mesh is 2; also a share of that side (2.5%) or a length (20cm).
+    """
+    tolerance: float | str | None = option(None, kind=_LENGTH, metavar="NUMBER", usual=f"{USUAL['tolerance']:g}")
+    """Space nearer to the surface than this may be filled, given as --radius is. With --criterion volume: the share of
+    volume that a hull may add, such as 1%."""
     reachable_only: bool = option(True, keyword=True, flags=("--reachable-only/--everywhere",), usual="reachable-only")
     """Count only what a ball can reach from outside, or every room."""
     seeds: tuple[Point, ...] | None = option(
@@ -94,13 +96,23 @@ class NavigableSpace:
     """The same as --tolerance, as a length in the mesh's own unit."""
 
     def __post_init__(self) -> None:
+        for name, value in ({name: None for name in USUAL} | read_lengths(vars(self))).items():
+            object.__setattr__(self, name, value)
         check_fields(self)
         for name, usual in USUAL.items():
-            share, length = getattr(self, name), getattr(self, f"{name}_abs")
-            if share is not None and length is not None:
-                raise OptionError(f"{name} is {share!r}; it has to be left out with {name}_abs, its length.")
-            if share is None and length is None:
+            bare, length = getattr(self, name), getattr(self, f"{name}_abs")
+            if bare is not None and length is not None:
+                raise OptionError(f"{name} is {bare!r}; it has to be left out with {name}_abs, its length.")
+            if bare is None and length is None:
                 object.__setattr__(self, name, usual)
+
+    def in_unit(self, metres: float | None, name: str) -> NavigableSpace:
+        """Get the same with lengths that have a unit in that of a mesh; see `rlacd.options.lengths.in_unit`."""
+        return replace(self, **in_unit(vars(self), metres, name))
+
+    def as_plain(self) -> dict[str, Any]:
+        """All options, of which the same can be made."""
+        return as_given(vars(self))
 
     def in_frame(self, scale: float) -> tuple[float, float]:
         """Get radius and tolerance in the frame where the longest side is 2; `scale` is its units per the input's.
@@ -118,5 +130,5 @@ class NavigableSpace:
         return not self.reachable_only or self.seeds is not None
 
     def _in_frame(self, name: str, scale: float) -> float:
-        share, length = getattr(self, name), getattr(self, f"{name}_abs")
-        return 2.0 * float(share) if length is None else 2.0 * relative(name, length, scale, SHARES)
+        bare, length = getattr(self, name), getattr(self, f"{name}_abs")
+        return float(bare) if length is None else relative(name, length, scale, BOUNDS)

@@ -14,7 +14,8 @@ DENSITY = 1000.0
 """Density of water, where the unit is a metre."""
 
 PAGES = (".html", ".htm")
-"""Endings of reports that are pages."""
+REPORTS = (".json", *PAGES)
+"""Endings of reports that are pages, and of all."""
 
 
 def _folders(given: Any) -> list[str]:
@@ -51,7 +52,7 @@ class OutputOptions:
     """Where the hulls go: .glb, .obj, .ply or .stl for one file with a node, group or solid per hull; .xml (MJCF),
     .urdf, .sdf, .usd, .usda or .usdc for a body with mass, visual mesh and hulls; an existing folder, or a name ending
     in /, for one file per hull. An existing file is replaced, a link refused. - writes to stdout what --format says."""
-    file_format: str | None = option(None, kind=_FORMAT, flags=("--format",), metavar="EXT", usual="obj")
+    file_type: str | None = option(None, kind=_FORMAT, flags=("--format",), metavar="EXT", usual="obj")
     """The format of the files in a folder: obj, glb, ply or stl; or unreal or godot, for a .glb with the mesh and hulls
     named for that engine."""
     density: float | None = option(None, kind=_DENSITY, usual=f"{DENSITY:g}")
@@ -74,9 +75,9 @@ class OutputOptions:
         python="rewrite_robot(package_dirs=)",
     )
     """Where a robot's package://NAME/ is; a FOLDER alone may be read and holds packages. May be repeated."""
-    report: str | None = option(None, kind=path_like(), metavar="FILE", python=".report, .save_report(path)")
+    report: str | None = option(None, kind=path_like(), metavar="FILE", python=".save_report(path)")
     """Write all measurements: .json, or .html for a page; - writes JSON to stdout, and nothing else there."""
-    picture: str | None = option(None, kind=path_like(), metavar="FILE.png", python=".picture(path)")
+    picture: str | None = option(None, kind=path_like(), metavar="FILE.png", python=".save_picture(path)")
     """Draw the input beside its hulls, together and pulled apart. Needs the extra rlacd[view]."""
     balls: str | None = option(None, kind=path_like(), metavar="FILE", python=".save_balls(path)")
     """Write the balls that no hull touches: .csv (x, y, z, radius) or .glb. Needs --criterion navigable."""

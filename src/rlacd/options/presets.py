@@ -49,7 +49,7 @@ class Preset:
     """Limits on each hull; None is no limit."""
     ending: str
     """Ending of its files."""
-    file_format: str | None = None
+    file_type: str | None = None
     """The format, where the ending does not tell it."""
     slivers: bool = True
     """Whether it takes hulls that are thinner than 1/100 of their largest extent."""

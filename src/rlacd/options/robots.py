@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rlacd.options.fields import check_fields, custom, number, one_of, option, path_like, stated
+from rlacd.options.fields import check_fields, custom, one_of, option, path_like, stated
+from rlacd.options.lengths import LENGTH, read_length
 
 Per = Literal["link", "mesh"]
 PairKind = Literal["adjacent", "always", "never"]
-
-_length = number(above=0).read
 
 
 def _links(given: Any) -> dict[str, float]:
@@ -21,7 +21,11 @@ def _links(given: Any) -> dict[str, float]:
         raise TypeError
     for pattern in given:
         re.compile(pattern)
-    return {pattern: _length(length) for pattern, length in given.items()}
+    return {pattern: LENGTH.read(_number(length)) for pattern, length in given.items()}
+
+
+def _number(length: Any) -> Any:
+    return read_length(length, math.nan) if isinstance(length, str) else length
 
 
 def _kinds(given: Any) -> tuple[str, ...]:
@@ -32,7 +36,7 @@ def _kinds(given: Any) -> tuple[str, ...]:
 
 
 _KINDS = custom("some of adjacent, always, never", _kinds, "adjacent always never")
-_LINKS = custom("positive lengths by regular expressions of link names, such as {'finger.*': 0.001}", _links)
+_LINKS = custom("positive lengths by regular expressions of link names, such as {'finger.*': '1mm'}", _links)
 
 
 @stated(panel="Robots", python="rewrite_robot({}=)")
@@ -51,14 +55,14 @@ class RobotOptions:
 
     Links that fixed joints connect stay apart; so do MJCF geoms with a name, and meshes that belong to no body.
     """
-    links: Mapping[str, float] | None = option(
+    links: Mapping[str, float | str] | None = option(
         None, kind=_LINKS, flags=("--link",), metavar="REGEX=LENGTH", repeated=True
     )
     """Another distance for the links whose whole name matches a regular expression; the last that matches counts.
 
-    On the command line: give 'finger.*=1mm', or a length in the robot's own unit; may be repeated.
+    On the command line: give 'finger.*=1mm', or a number in the robot's own unit; may be repeated.
 
-    It stands for `threshold_abs`: ``{"finger.*": 0.001}``.
+    ``{"finger.*": "1mm"}``, or a number in the robot's own unit, as `threshold_abs`.
     """
     samples: int = option(500, least=0, most=100_000)
     """Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the

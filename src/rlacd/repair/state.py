@@ -250,7 +250,7 @@ class State:
         if shells:
             became = "1 open body became a thin shell" if shells == 1 else f"{shells} open bodies became thin shells"
             if self.wanted.open_bodies != "solid":
-                became += f"; --open solid fills {'it' if shells == 1 else 'them'}"
+                became += f"; --openings solid fills {'it' if shells == 1 else 'them'}"
             self.warnings.append(f"{became} (open at {self._places(openings)}).")
 
     def _places(self, holes: list[Hole]) -> str:

@@ -104,7 +104,7 @@ def search(
         accepted=state.accepted,
         work=run.work.done - first_pass,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
-        at_least=context.enough(),
+        lower_bound=context.enough(),
     )
     return [state.early, earlier, state.best], summary
 

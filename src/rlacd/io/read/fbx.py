@@ -63,7 +63,7 @@ def _scene(path: Path, content: bytes) -> tuple[Values, dict[str, bytes]]:
 
     # A file may also be left-handed, or point up along a negative axis, which no option can say.
     strict = ufbx.IndexErrorHandling.ABORT_LOADING
-    given: dict[str, Any] = {"file_format": ufbx.FileFormat.FBX, "index_error_handling": strict}
+    given: dict[str, Any] = {"file_type": ufbx.FileFormat.FBX, "index_error_handling": strict}
     scene = ufbx.load_memory(content, **given)
     axes = np.array(scene.settings.axes)
     if not _is_plain(axes):

@@ -2,6 +2,6 @@
 
 from rlacd.io.robots.read import is_robot
 from rlacd.io.robots.rewrite import rewrite_robot
-from rlacd.io.robots.rewritten import Rewritten, RewrittenLink
+from rlacd.io.robots.rewritten import RewrittenLink, RewrittenRobot
 
-__all__ = ["Rewritten", "RewrittenLink", "is_robot", "rewrite_robot"]
+__all__ = ["RewrittenLink", "RewrittenRobot", "is_robot", "rewrite_robot"]

@@ -24,13 +24,14 @@ from rlacd.clear import (
     link_pairs,
     warnings_of,
 )
-from rlacd.decompose_mesh import decompose_in
+from rlacd.decompose_mesh import decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
 from rlacd.options import LENGTHS, Options
-from rlacd.options.fields import LONGEST_SIDE, shown
+from rlacd.options.fields import shown
+from rlacd.options.lengths import LONGEST_SIDE, in_unit, read_lengths, unit_of
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Progress, ProgressCallback
 from rlacd.solid.frame import ROUNDING, Frame
@@ -90,6 +91,16 @@ def check_options(options: Mapping[str, Any]) -> None:
             f"relative_to is {shown(relative_to)}; for a robot it has to be 'scene', all of it, or 'mesh'."
         )
     Options.of({name: value for name, value in options.items() if name not in ("progress", "relative_to")})
+
+
+def with_lengths(
+    robot: Robot, options: Mapping[str, Any], asked: RobotOptions
+) -> tuple[Robot, dict[str, Any], RobotOptions]:
+    """Convert lengths with a unit to the robot's, and tell lengths in the unit in which one was given."""
+    given, name = read_lengths(options), robot.source.name
+    told_in, metres = Unit.typed(unit_of(given), robot.metres), robot.metres
+    links = None if asked.links is None else in_unit(asked.links, metres, name)
+    return replace(robot, told_in=told_in), in_unit(given, metres, name), replace(asked, links=links)
 
 
 def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> Checked:
@@ -167,7 +178,7 @@ def _motion(robot: Robot, samples: int, seed: int) -> tuple[Motion, list[str]]:
 def options_of_bodies(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> list[dict[str, Any]]:
     """The options of each body; raises as `decomposed_robot`."""
     names = [body.name for body in robot.bodies]
-    lengths: dict[str, float] = {}
+    lengths: dict[str, Any] = {}
     for pattern, length in (asked.links or {}).items():
         matched = [name for name in names if re.fullmatch(pattern, name)]
         if not matched:
@@ -184,10 +195,10 @@ def _relative_to_robot(options: Mapping[str, Any], robot: Robot) -> dict[str, An
     if given.pop("relative_to", "scene") == "mesh" or not robot.bodies:
         return given
     if given.setdefault("criterion", "distance") in ("distance", "concavity") and "threshold_abs" not in given:
-        share = given.pop("threshold") / LONGEST_SIDE["threshold"] if "threshold" in given else None
+        share = given.pop("threshold") / LONGEST_SIDE if "threshold" in given else None
         given["threshold_abs"] = float(f"{SHARE * robot.size:.3g}") if share is None else share * robot.size
     if given.get("overlap") and "overlap_abs" not in given:
-        given["overlap_abs"] = given.pop("overlap") * robot.size
+        given["overlap_abs"] = given.pop("overlap") / LONGEST_SIDE * robot.size
     return given
 
 
@@ -195,7 +206,7 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
     """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
-        return decompose_in(unit, (mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
+        return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, **_fitting(mesh, options, body))
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
@@ -210,9 +221,8 @@ def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> d
     scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
     for name, (least, most) in LENGTHS.items():
         if isinstance(length := fitting.get(f"{name}_abs"), (int, float)):
-            unit = LONGEST_SIDE[name] / 2 * scale
-            length = max(length, least / unit * (1 + ROUNDING)) if body.is_world else length
-            fitting[f"{name}_abs"] = min(length, most / unit * (1 - ROUNDING))
+            length = max(length, least / scale * (1 + ROUNDING)) if body.is_world else length
+            fitting[f"{name}_abs"] = min(length, most / scale * (1 - ROUNDING))
     return fitting
 
 

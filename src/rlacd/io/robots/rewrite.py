@@ -7,15 +7,14 @@ import os
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
-from rlacd.fit import Unit
-from rlacd.io.robots.decomposed import check_options, decomposed_robot
+from rlacd.io.robots.decomposed import check_options, decomposed_robot, with_lengths
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
-from rlacd.io.robots.rewritten import Rewritten, rewritten
+from rlacd.io.robots.rewritten import RewrittenRobot, rewritten
 from rlacd.io.robots.robot import Robot
 from rlacd.io.write.target import check_file, check_folder, check_name, mesh_folder
 from rlacd.options import ELSEWHERE, Options
@@ -35,7 +34,7 @@ def rewrite_robot(
     keep_input: bool = False,
     progress: ProgressCallback | None = None,
     **options: Any,
-) -> Rewritten:
+) -> RewrittenRobot:
     """Replace every collision mesh of a URDF, MJCF or USD file by its hulls, and keep everything else.
 
     Parameters
@@ -61,7 +60,7 @@ def rewrite_robot(
 
     Returns
     -------
-    Rewritten
+    RewrittenRobot
 
     Raises
     ------
@@ -77,8 +76,8 @@ def rewrite_robot(
     DecompositionWarning
         What ``warnings`` of the result says, once a call.
     """
-    done = rewrite_in(
-        None, robot, output, package_dirs=package_dirs, keep_input=keep_input, progress=progress, **options
+    done = rewrite_quietly(
+        robot, output, package_dirs=package_dirs, keep_input=keep_input, progress=progress, **options
     )
     if done.warnings:
         said = f"{os.path.basename(robot)}: {' '.join(done.warnings)}"
@@ -86,8 +85,7 @@ def rewrite_robot(
     return done
 
 
-def rewrite_in(
-    told_in: Unit | None,
+def rewrite_quietly(
     robot: str | os.PathLike[str],
     output: str | os.PathLike[str],
     *,
@@ -95,8 +93,8 @@ def rewrite_in(
     keep_input: bool = False,
     progress: ProgressCallback | None = None,
     **options: Any,
-) -> Rewritten:
-    """Rewrite as `rewrite_robot` does, but warn of nothing, and tell lengths in a unit; None for the robot's own."""
+) -> RewrittenRobot:
+    """Rewrite as `rewrite_robot` does, but warn of nothing."""
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     check_names("rewrite_robot", options, inspect.signature(rewrite_robot).parameters, ELSEWHERE)
     own = {field.name for field in fields(RobotOptions)}
@@ -106,7 +104,7 @@ def rewrite_in(
     check_places(source, place, asked, keep_input=keep_input)
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     began = time.perf_counter()
-    description = replace(read_robot(source, packages, apart=asked.per == "mesh"), told_in=told_in)
+    description = read_robot(source, packages, apart=asked.per == "mesh")
     return rewrite(description, place, options, asked, keep_input=keep_input, began=began)
 
 
@@ -118,11 +116,12 @@ def rewrite(
     *,
     keep_input: bool = False,
     began: float | None = None,
-) -> Rewritten:
+) -> RewrittenRobot:
     """Rewrite a robot that has been read, since a time of `time.perf_counter`; see `rewrite_robot`."""
     began = time.perf_counter() if began is None else began
     check_options(options)
     check_places(robot.source, place, asked, keep_input=keep_input)
+    robot, options, asked = with_lengths(robot, options, asked)
     done = decomposed_robot(robot, options, asked)
     pairs = done.pairs if done.samples or robot.is_alone else None
     written = robot.write(place, done.results, pairs, asked, whole=keep_input)

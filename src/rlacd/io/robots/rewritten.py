@@ -44,13 +44,13 @@ class RewrittenLink:
         return cls(body.name, meshes, body.hulls(results), files, [results[collider] for collider in body.colliders])
 
     @property
-    def farthest(self) -> float | None:
+    def added(self) -> float | None:
         """How far its hulls reach beyond its meshes, in the robot's unit; None where there was no time to measure."""
         return _most([_reach(result) for result in self.results])
 
 
 @dataclass(frozen=True, eq=False)
-class Rewritten:
+class RewrittenRobot:
     """The result of rewriting a robot."""
 
     path: Path
@@ -81,24 +81,29 @@ class Rewritten:
         return all(result.report.complete for link in self.links for result in link.results)
 
     @property
-    def farthest(self) -> float | None:
+    def added(self) -> float | None:
         """How far hulls reach beyond the meshes, in the robot's unit; None where there was no time to measure."""
-        return _most([link.farthest for link in self.links])
+        return _most([link.added for link in self.links])
 
     def save_report(self, path: str | os.PathLike[str]) -> Path:
-        """Write a page with a 3-D view of the links, whose joints can be moved; see `rlacd.Decomposition.save_report`.
+        """Write what was measured, as `rlacd.Decomposition.save_report` does; on a page, joints can be moved.
 
         Raises
         ------
         MeshError
-            No link has a collision mesh.
+            No link has a collision mesh, which a page would show.
         """
+        from rlacd.viewer.report import save_report
+
+        return save_report(path, self.as_dict(), self._page)
+
+    def _page(self) -> str:
         if self._source is None or not self.links:
             raise MeshError(f"{self.path} has no collision mesh, so there is nothing to show.")
         from rlacd.io.robots.viewed import shown
-        from rlacd.view.report import save_report_page
+        from rlacd.viewer.report import report_page
 
-        return save_report_page(shown(*self._source, self.warnings, self.seconds), path)
+        return report_page(shown(*self._source, self.warnings, self.seconds))
 
     def as_dict(self) -> dict[str, Any]:
         """All measurements as plain values; lengths named ``_abs`` are in the robot's unit."""
@@ -109,7 +114,7 @@ class Rewritten:
             "complete": self.complete,
             "meshes": sum(len(link.meshes) for link in self.links),
             "hulls": sum(len(link.files) for link in self.links),
-            "farthest_abs": self.farthest,
+            "added_abs": self.added,
             "seconds": self.seconds,
             "links": [
                 {
@@ -117,7 +122,7 @@ class Rewritten:
                     "meshes": [str(mesh) for mesh in link.meshes],
                     "hulls": len(link.files),
                     "files": [*link.files],
-                    "farthest_abs": link.farthest,
+                    "added_abs": link.added,
                     "solids": [result.report.as_dict() for result in link.results],
                 }
                 for link in self.links
@@ -128,13 +133,13 @@ class Rewritten:
         }
 
 
-def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began: float) -> Rewritten:
+def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began: float) -> RewrittenRobot:
     """What became of a robot that was written, since a time of `time.perf_counter`."""
     links = [RewrittenLink.of(body, done.results, written.names) for body in robot.bodies]
     said = [] if links else [f"{robot.source} has no collision mesh, so this is a copy."]
     said += [*robot.warnings, *written.warnings, *warnings_of(robot, done.results), *done.warnings]
     seconds, of_links = time.perf_counter() - began, (done.pairs, done.samples)
-    return Rewritten(
+    return RewrittenRobot(
         place, written.folder, links, said, seconds, robot.size, robot.metres, robot.unit, *of_links, (robot, done)
     )
 
@@ -162,10 +167,10 @@ def warnings_of(robot: Robot, results: Results) -> list[str]:
 def _too_far(result: Decomposition) -> tuple[float, float, int] | None:
     """The farthest of the hulls that exceed the threshold, the threshold, and how many do; None if it is no length."""
     fit = result.report.fit
-    if fit is None or not fit.is_length or fit.worst is None or fit.limit is None or fit.worst <= fit.limit:
+    if fit is None or not fit.is_length or fit.max is None or fit.limit is None or fit.max <= fit.limit:
         return None
     scale = result.report.scale
-    return fit.worst / scale, fit.limit / scale, sum(error > fit.limit for error in fit.per_part or ())
+    return fit.max / scale, fit.limit / scale, sum(error > fit.limit for error in fit.per_part or ())
 
 
 def grouped(warnings: Sequence[tuple[str, str, float]]) -> list[str]:
@@ -186,7 +191,7 @@ def _widest(result: Decomposition) -> float:
 
 
 def _reach(result: Decomposition) -> float | None:
-    over = result.report.hausdorff.over
+    over = result.report.hausdorff.added
     return None if over is None else over / result.report.scale
 
 

@@ -23,8 +23,8 @@ from rlacd.io.robots.robot import Robot, turned
 from rlacd.options.robots import RobotOptions
 from rlacd.result import Result
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.view.controls import Subject, read_subject
-from rlacd.view.robot import Contact, Place, RobotResult
+from rlacd.viewer.controls import Subject, read_subject
+from rlacd.viewer.robot import Contact, Place, RobotResult
 
 USUAL = {"criterion": "distance", "threshold": 0.03}
 """First values of the page's controls for a robot: those of `rlacd.rewrite_robot`."""

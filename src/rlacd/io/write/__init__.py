@@ -51,35 +51,35 @@ def save(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
     target = hull_target(path, asked)
     ending = target.path.suffix.lower().lstrip(".")
     unused = [name for name in ("density", "mass") if getattr(asked, name) is not None]
-    if unused and target.file_format not in SIMULATED:
+    if unused and target.file_type not in SIMULATED:
         warnings.warn(f"{unused[0]} had no effect: {target.path.name} holds no mass", UserWarning, stacklevel=3)
-    if (data := _with_scene(result, target.file_format, ending, bool(asked.keep_input))) is not None:
+    if (data := _with_scene(result, target.file_type, ending, bool(asked.keep_input))) is not None:
         write_file(target.path, data)
         return target.path
-    if target.file_format not in MODELS:
+    if target.file_type not in MODELS:
         return _save_hulls(result.hulls, target, result.name)
     model = model_of(result, asked)
-    if target.file_format in SIMULATED:
+    if target.file_type in SIMULATED:
         for doubt in (implausible(model), None if asked.mass is not None else hollow(result)):
             if doubt is not None:
                 warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=3)
-    if target.file_format in WITH_MESHES:
+    if target.file_type in WITH_MESHES:
         _save_with_meshes(result, replace(model, is_scene=bool(asked.scene)), target, bool(asked.one_mesh))
-    elif target.file_format == "usd":
+    elif target.file_type == "usd":
         write_file(target.path, function_of("write.usd:encode_usd")(model, ending))
     else:
-        write_file(target.path, _for_engine(model, target.file_format, ending))
+        write_file(target.path, _for_engine(model, target.file_type, ending))
     return target.path
 
 
-def _with_scene(result: Result, file_format: str, ending: str, keep_input: bool) -> bytes | None:
+def _with_scene(result: Result, file_type: str, ending: str, keep_input: bool) -> bytes | None:
     """GLB of the input's own scene with its hulls; None if something else is to be written.
 
     With `keep_input`, an input without a scene is the triangles in grey.
     """
     has_scene, kept = result.input is not None and result.input.asset is not None, "write.keep:encode_kept"
-    if ending == "glb" and has_scene and file_format in ENGINE_NAMES:
-        return bytes(function_of(kept)(result, ENGINE_NAMES[file_format], colored=False))
+    if ending == "glb" and has_scene and file_type in ENGINE_NAMES:
+        return bytes(function_of(kept)(result, ENGINE_NAMES[file_type], colored=False))
     if not keep_input or not result.hulls:
         return None
     if has_scene:
@@ -97,14 +97,14 @@ def _for_engine(model: RigidBody, engine: str, ending: str) -> bytes:
 
 
 def _save_with_meshes(result: Result, model: RigidBody, target: Target, one_mesh: bool) -> None:
-    folder, stem = mesh_folder(target.path, target.file_format), file_stem(model.name)
-    shapes = shapes_of(model, stem, MODELS[target.file_format].primitives, one_mesh=one_mesh)
-    mjcf = target.file_format == "mjcf"
+    folder, stem = mesh_folder(target.path, target.file_type), file_stem(model.name)
+    shapes = shapes_of(model, stem, MODELS[target.file_type].primitives, one_mesh=one_mesh)
+    mjcf = target.file_type == "mjcf"
     visuals = visuals_of(model, stem, function_of("write.converted:painted_parts")(result.input) if mjcf else ())
     meshes = [shape for shape in (*visuals, *shapes) if isinstance(shape, MeshFile)]
     files = {file.name: file.data for file in meshes}
     files |= {file.picture_name: file.look.picture for file in meshes if file.look and file.look.picture}
-    encode = function_of(f"write.simulators:encode_{target.file_format}")
+    encode = function_of(f"write.simulators:encode_{target.file_type}")
     described = encode(model, shapes, visuals, folder.name)
     write_folder(folder, stem, files, then=lambda: write_file(target.path, described))
 
@@ -112,10 +112,10 @@ def _save_with_meshes(result: Result, model: RigidBody, target: Target, one_mesh
 def _save_hulls(hulls: Sequence[trimesh.Trimesh], target: Target, stem: str) -> Path:
     if not hulls:
         raise OutputError("there are no hulls to write; decompose a mesh first.")
-    encode = ENCODERS[target.file_format]
+    encode = ENCODERS[target.file_type]
     if target.is_folder:
         stem = file_stem(stem)
-        files = {f"{stem}_{i:03d}.{target.file_format}": encode([hull]) for i, hull in enumerate(hulls)}
+        files = {f"{stem}_{i:03d}.{target.file_type}": encode([hull]) for i, hull in enumerate(hulls)}
         write_folder(target.path, stem, files)
     else:
         write_file(target.path, encode(hulls))

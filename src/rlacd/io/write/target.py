@@ -60,7 +60,7 @@ class Target:
 
     path: Path
     """The file or folder."""
-    file_format: str
+    file_type: str
     """One of `FORMATS` or of `MODELS`."""
     is_folder: bool
     """Whether `path` is a folder."""
@@ -78,11 +78,11 @@ def hull_target(path: str | os.PathLike[str], asked: OutputOptions | None = None
         or something is asked for that the format does not know.
     """
     asked = asked or OutputOptions()
-    target = _target(read(path_like(), "path", path), asked.file_format)
+    target = _target(read(path_like(), "path", path), asked.file_type)
     is_glb = not target.is_folder and target.path.suffix.lower() == ".glb"
     for name, only, fits in (
-        ("one_mesh", ".urdf", target.file_format == "urdf"),
-        ("scene", ".xml (MJCF)", target.file_format == "mjcf"),
+        ("one_mesh", ".urdf", target.file_type == "urdf"),
+        ("scene", ".xml (MJCF)", target.file_type == "mjcf"),
         ("keep_input", ".glb", is_glb),
     ):
         if getattr(asked, name) and not fits:
@@ -91,17 +91,17 @@ def hull_target(path: str | os.PathLike[str], asked: OutputOptions | None = None
     return target
 
 
-def file_kind(file_format: str | None, preset: str | None) -> tuple[str, str | None]:
+def file_kind(file_type: str | None, preset: str | None) -> tuple[str, str | None]:
     """The ending of a file, and its format where one was asked for: by its name, by the preset, or GLB."""
-    if file_format is not None:
-        return f".{ending_of(file_format)}", file_format
+    if file_type is not None:
+        return f".{ending_of(file_type)}", file_type
     engine = None if preset is None else find_preset(preset)
-    return (".glb", None) if engine is None else (engine.ending, engine.file_format)
+    return (".glb", None) if engine is None else (engine.ending, engine.file_type)
 
 
-def ending_of(file_format: str) -> str:
+def ending_of(file_type: str) -> str:
     """The ending of a file of some format."""
-    return MODELS[file_format].endings[0] if file_format in MODELS else file_format
+    return MODELS[file_type].endings[0] if file_type in MODELS else file_type
 
 
 def _target(text: str, wanted: str | None) -> Target:
@@ -132,12 +132,12 @@ def _target(text: str, wanted: str | None) -> Target:
     return Target(place, ending, is_folder=False)
 
 
-def mesh_folder(path: Path, file_format: str) -> Path:
+def mesh_folder(path: Path, file_type: str) -> Path:
     """Return the folder of a multi-file model's meshes: ``chair_urdf`` for ``chair.urdf``.
 
     The format is part of the name, so that two models of one body do not overwrite each other's meshes.
     """
-    return path.with_name(f"{path.stem}_{file_format}")
+    return path.with_name(f"{path.stem}_{file_type}")
 
 
 def check_name(path: Path) -> None:
@@ -146,18 +146,18 @@ def check_name(path: Path) -> None:
         raise OptionError(f"cannot write {str(path)!r}: XML cannot hold its name; choose another name.")
 
 
-def _model_target(text: str, file_format: str) -> Target:
+def _model_target(text: str, file_type: str) -> Target:
     place = Path(text)
-    endings = [f".{ending}" for ending in MODELS[file_format].endings]
+    endings = [f".{ending}" for ending in MODELS[file_type].endings]
     if text.endswith(SEPARATORS) or place.suffix.lower() not in endings:
-        raise OptionError(f"{file_format} needs a file whose name ends in {' or '.join(endings)}, not {text}.")
+        raise OptionError(f"{file_type} needs a file whose name ends in {' or '.join(endings)}, not {text}.")
     check_file(place)
-    if file_format == "usd":
+    if file_type == "usd":
         function_of("write.usd:require_usd")()
-    if file_format in WITH_MESHES:
+    if file_type in WITH_MESHES:
         check_name(place)
-        check_folder(mesh_folder(place, file_format))
-    return Target(place, file_format, is_folder=False)
+        check_folder(mesh_folder(place, file_type))
+    return Target(place, file_type, is_folder=False)
 
 
 def check_file(path: Path) -> None:

@@ -15,10 +15,10 @@ from rlacd.fit import Unit
 from rlacd.result import Result
 from rlacd.solid.frame import Frame
 from rlacd.solid.primitive import PRIMITIVE
-from rlacd.view.coloring import color_hulls
-from rlacd.view.heat import HeatMesh, frame_of
-from rlacd.view.picture import disjoint
-from rlacd.view.robot import RobotResult, robot_scene
+from rlacd.viewer.coloring import color_hulls
+from rlacd.viewer.heat import HeatMesh, frame_of
+from rlacd.viewer.picture import disjoint
+from rlacd.viewer.robot import RobotResult, robot_scene
 
 
 def scene(decomposition: Result, up: str = "z") -> dict[str, Any]:

@@ -3,7 +3,7 @@
 ====================================  ===========================================================================
 ``GET /``, ``GET /page/NAME.js``      the page and its scripts
 ``GET /events``                       the state, with every change (server-sent events)
-``GET /scene``, ``GET /heat``         the data to draw; see `rlacd.view.scene`
+``GET /scene``, ``GET /heat``         the data to draw; see `rlacd.viewer.scene`
 ``GET /download?format=NAME``         a file
 ``POST /open?name=NAME``              open another mesh: the bytes of its file
 ``POST /command``                     the options as a command for a terminal
@@ -42,14 +42,14 @@ from rlacd.io.read.open_file import UPLOAD
 from rlacd.options.presets import PRESETS
 from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.controls import Subject, as_command, file_name, passes_of, preset_words, read_controls
-from rlacd.view.downloads import download, offered
-from rlacd.view.heat import heat_map
-from rlacd.view.page import live_page, module
-from rlacd.view.picture import check_up
-from rlacd.view.robot import RobotResult
-from rlacd.view.scene import heat_scene, input_scene, scene
-from rlacd.view.session import Session
+from rlacd.viewer.controls import Subject, as_command, file_name, passes_of, preset_words, read_controls
+from rlacd.viewer.downloads import download, offered
+from rlacd.viewer.heat import heat_map
+from rlacd.viewer.page import live_page, module
+from rlacd.viewer.picture import check_up
+from rlacd.viewer.robot import RobotResult
+from rlacd.viewer.scene import heat_scene, input_scene, scene
+from rlacd.viewer.session import Session
 
 ADDRESS = "127.0.0.1"
 USUAL_PORT = 8765

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.options import Options, with_criterion
-from rlacd.view.controls import read_controls, read_subject
-from rlacd.view.picture import check_up
-from rlacd.view.server import Read, ViewServer
-from rlacd.view.session import Decompose, Session
+from rlacd.viewer.controls import read_controls, read_subject
+from rlacd.viewer.picture import check_up
+from rlacd.viewer.server import Read, ViewServer
+from rlacd.viewer.session import Decompose, Session
 
 AT_EXIT = 30.0
 """Seconds that work may take to end when Python exits."""

@@ -36,13 +36,13 @@ export const HINTS = {
   added: "The largest share of its part's volume that a hull adds.",
   intrusion: "How deep a hull reaches into the space that a ball can get to.",
   balls: "Places that a ball of the chosen radius can reach and no hull covers.",
-  over: "The farthest that the hulls' surface lies outside the input's.",
-  under: "The farthest that the input's surface lies outside the hulls.",
+  added: "The farthest that the hulls' surface lies outside the input's.",
+  missed: "The farthest that the input's surface lies outside the hulls.",
   seconds: "Time for the whole decomposition, from reading the file to measuring the result.",
   draft: "The first hulls found, in one quick pass. A search for fewer hulls follows.",
   early: "The work was stopped. The hulls cover the input, but may be coarser or more than with more time.",
   shell:
-    "An open surface has no inside, so it was given a small thickness. Its hulls follow that thin wall, which takes many of them. If it encloses a space, --open solid fills it; in the viewer, “Solid” under “Open bodies”.",
+    "An open surface has no inside, so it was given a small thickness. Its hulls follow that thin wall, which takes many of them. If it encloses a space, --openings solid fills it; in the viewer, “Solid” under “Open bodies”.",
   wrapped: "The surface could not be closed face by face, so a tight skin was wrapped around it.",
 };
 
@@ -61,7 +61,7 @@ export function summary(scene, { draft = false } = {}) {
     term(plural(parts.length, "hull"), HINTS.hull),
     report.primitives && term(plural(parts.filter((part) => part.primitive).length, "primitive"), HINTS.primitives),
     scene.robot && term(plural(scene.robot.links.length, "link"), HINTS.links),
-    term(plural(report.faces ?? parts.length, "triangle"), HINTS.triangles),
+    term(plural(report.triangles ?? parts.length, "triangle"), HINTS.triangles),
     length && term(`${criterion} at most\u00a0${digits(length.max)}`, HINTS.concavity),
     volume?.max != null && term(`${percent(volume.max)} of volume added`, HINTS.added),
     navigable && term(`${plural(navigable.balls, "ball")} left free`, HINTS.balls),
@@ -106,8 +106,8 @@ export function fitTable(report, scene) {
   if (length) add(`${capital(criterion)}, at most`, length.max, HINTS.concavity);
   if (report.volume?.max != null) rows.push([term("Largest added volume", HINTS.added), percent(report.volume.max), ""]);
   add("Deepest intrusion", report.navigable?.intrusion?.max, HINTS.intrusion);
-  add("Hulls beyond the input", report.hausdorff?.over, HINTS.over);
-  add("Input beyond the hulls", report.hausdorff?.under, HINTS.under);
+  add("Hulls beyond the input", report.hausdorff?.added, HINTS.added);
+  add("Input beyond the hulls", report.hausdorff?.missed, HINTS.missed);
   return table("Fit", ["", "", "of its size"], rows);
 }
 

@@ -19,8 +19,8 @@ from rlacd.options.fields import checked, integer, read
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
 from rlacd.solid.primitive import Balls
-from rlacd.view.coloring import color_hulls
-from rlacd.view.render import Body, Spheres, render_apart
+from rlacd.viewer.coloring import color_hulls
+from rlacd.viewer.render import Body, Spheres, render_apart
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])

@@ -16,6 +16,8 @@ from rlacd.io.read.load import load_mesh
 from rlacd.io.write import file_stem
 from rlacd.io.write.target import MODEL_OF
 from rlacd.options import CRITERIA, FAST, Options, with_criterion
+from rlacd.options.fields import shown
+from rlacd.options.lengths import read_lengths
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.options.presets import PRESETS
@@ -24,7 +26,7 @@ from rlacd.solid.topology import used_points
 
 _NAMES = (
     *("criterion", "threshold", "radius", "tolerance", "volume_tolerance", "quality", "primitives"),
-    *("overlap", "keep_open", "open", "keep_cavities", "max_hulls", "max_vertices", "preset"),
+    *("overlap", "keep_open", "openings", "keep_cavities", "max_hulls", "max_vertices", "preset"),
 )
 _USUAL, _SPACE = Options(), NavigableSpace()
 _NUMBERS = {number for numbers in CRITERIA.values() for number in numbers}
@@ -43,7 +45,11 @@ def read_controls(given: dict[str, Any]) -> dict[str, Any]:
     OptionError
         An option is unknown, of the wrong type or out of range.
     """
+    given = read_lengths(given)
     for name in given:
+        if name.removesuffix("_abs") in CONTROLS and name not in CONTROLS:
+            plain = name.removesuffix("_abs")
+            raise OptionError(f"{plain} is {shown(given[name])}; it has to be a number or a share such as 2%.")
         if name not in CONTROLS:
             raise OptionError(f"{name!r} is not an option of the viewer; choose from {', '.join(sorted(CONTROLS))}.")
     controls = {name: usual if given.get(name) is None else given[name] for name, usual in CONTROLS.items()}
@@ -142,4 +148,4 @@ def preset_words(name: str) -> dict[str, Any]:
     ending = preset.ending.lstrip(".")
     stated = {"vertices": preset.max_vertices, "triangles": preset.max_faces}
     limits = " and ".join(f"{limit} {what}" for what, limit in stated.items() if limit)
-    return {"engine": preset.engine, "format": preset.file_format or MODEL_OF.get(ending, ending), "limits": limits}
+    return {"engine": preset.engine, "format": preset.file_type or MODEL_OF.get(ending, ending), "limits": limits}

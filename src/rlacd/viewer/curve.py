@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rlacd.errors import import_extra
 from rlacd.io.write import write_file
-from rlacd.view.picture import FADED, INK, PAPER, _write, check_picture
+from rlacd.viewer.picture import FADED, INK, PAPER, _write, check_picture
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 1200, 720, 110, 60, 110, 100
 LINE, PICKED, GRID = (38, 104, 178), (214, 84, 30), (228, 230, 234)
@@ -24,7 +24,7 @@ def draw_curve(
     Raises
     ------
     MissingExtraError, OutputError, OptionError
-        See `rlacd.view.picture.check_picture`.
+        See `rlacd.viewer.picture.check_picture`.
     """
     place = check_picture(path)
     image, pen = (import_extra(f"PIL.{part}", "a picture", "view") for part in ("Image", "ImageDraw"))

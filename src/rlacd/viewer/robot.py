@@ -53,7 +53,7 @@ class RobotResult(Result):
 
 
 def robot_scene(robot: RobotResult, frame: Frame) -> dict[str, Any]:
-    """Describe for the page how a robot moves; see `rlacd.view.scene.scene`."""
+    """Describe for the page how a robot moves; see `rlacd.viewer.scene.scene`."""
     joints = [
         {
             **{name: getattr(joint, name) for name in ("name", "slides", "lower", "upper", "rest", "parent", "leader")},

@@ -17,8 +17,8 @@ from rlacd.io.write.target import WITH_MESHES
 from rlacd.options.output import Axis
 from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.report import report_page
-from rlacd.view.robot import RobotResult
+from rlacd.viewer.report import report_page
+from rlacd.viewer.robot import RobotResult
 
 FOLDERS = ("obj", "stl")
 """Formats also offered with one file per hull."""
@@ -103,9 +103,9 @@ def download(decomposition: Result, wanted: str, *, up: str = "z") -> tuple[str,
             save_balls(decomposition.balls, folder / f"{stem}_balls.csv")
         elif wanted in MODELS:
             place = folder / f"{stem if wanted in WITH_MESHES else f'{stem}_{wanted}'}.{MODELS[wanted].endings[0]}"
-            save(decomposition, place, file_format=wanted, up=cast(Axis, up))
+            save(decomposition, place, file_type=wanted, up=cast(Axis, up))
         elif wanted.endswith(".zip"):
-            save(decomposition, folder, file_format=wanted.removesuffix(".zip"))
+            save(decomposition, folder, file_type=wanted.removesuffix(".zip"))
         else:
             save(decomposition, folder / f"{stem}_hulls.{wanted}")
         files = sorted(path for path in folder.rglob("*") if path.is_file())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,13 @@ from rlacd._version import __version__
 from rlacd.errors import MissingExtraError
 from rlacd.io.write import write_file
 from rlacd.io.write.target import checked_place
-from rlacd.options.output import PAGES
+from rlacd.options.output import PAGES, REPORTS
+from rlacd.plain_json import to_json
 from rlacd.result import Result
-from rlacd.view.heat import heat_map
-from rlacd.view.page import still_page
-from rlacd.view.picture import check_up, picture_bytes
-from rlacd.view.scene import heat_scene, scene
+from rlacd.viewer.heat import heat_map
+from rlacd.viewer.page import still_page
+from rlacd.viewer.picture import check_up, picture_bytes
+from rlacd.viewer.scene import heat_scene, scene
 
 
 def save_report_page(
@@ -24,11 +26,17 @@ def save_report_page(
 ) -> Path:
     """Write a report; see `rlacd.Decomposition.save_report`.
 
-    It may leave out the picture, which takes a few seconds to render. Without the extra ``view`` it does, and says so.
+    A page may leave out the picture, which takes a few seconds to render. Without the extra ``view`` it does, and says
+    so.
     """
     check_up(up)
-    place = checked_place(path, "the report", PAGES)
-    write_file(place, report_page(decomposition, up=up, picture=picture).encode())
+    return save_report(path, decomposition.report, lambda: report_page(decomposition, up=up, picture=picture))
+
+
+def save_report(path: str | os.PathLike[str], values: Any, page: Callable[[], str]) -> Path:
+    """Write measurements as JSON or as a page, by the ending of the path."""
+    place = checked_place(path, "the report", REPORTS)
+    write_file(place, (page() if place.suffix.lower() in PAGES else to_json(values)).encode())
     return place
 
 

@@ -2,7 +2,7 @@
 import { hasFilledCavities, hasOpenBodies } from "page/facts";
 import { choice, make, measure } from "page/widgets";
 
-/** Lengths are shares of the longest side or of the frame; the slider moves by equal ratios. */
+/** Lengths are in the frame, where the longest side is 2; the slider moves by equal ratios. */
 class Length {
   constructor(id, label, hint, [low, high], value, onChange, { orNone = false } = {}) {
     this.low = low;
@@ -42,10 +42,10 @@ class Length {
     this.tell();
   }
 
-  /** Say what the length is in the input's unit; 1 here is `frame` of the frame of `scene`. */
-  tell(scene = this.scene, frame = this.frame) {
-    [this.scene, this.frame] = [scene, frame];
-    this.note.textContent = !scene ? "" : this.value === 0 ? "none" : `= ${measure(this.value * frame, scene)}`;
+  /** Say what the length is in the input's unit. */
+  tell(scene = this.scene) {
+    this.scene = scene;
+    this.note.textContent = !scene ? "" : this.value === 0 ? "none" : `= ${measure(this.value, scene)}`;
   }
 }
 
@@ -58,7 +58,7 @@ export class Controls {
     this.threshold = new Length(
       "threshold",
       "Threshold",
-      "How far a hull may lie from the surface, at the worst place. 0.05 is 2.5 % of the longest side, which counts as 2. Smaller is tighter, with more hulls.",
+      "How far a hull may lie from the surface, at the worst place. 0.05 is 2.5% of the longest side, which counts as 2. Smaller is tighter, with more hulls.",
       [0.01, 0.5],
       given.threshold,
       this.changed,
@@ -66,23 +66,23 @@ export class Controls {
     this.radius = new Length(
       "radius",
       "Ball radius",
-      "The smallest thing that has to fit in between, as a share of the longest side.",
-      [0.01, 0.3],
+      "The radius of the smallest ball that has to fit in between. 0.05 is 2.5% of the longest side, which counts as 2.",
+      [0.02, 0.6],
       given.radius,
       this.changed,
     );
     this.tolerance = new Length(
       "tolerance",
       "Tolerance",
-      "Space nearer to the surface than this may be filled, as a share of the longest side.",
-      [0.005, 0.2],
+      "Space nearer to the surface than this may be filled. 0.1 is 5% of the longest side, which counts as 2.",
+      [0.01, 0.4],
       given.tolerance,
       this.changed,
     );
     this.volume = new Length(
       "volume_tolerance",
       "Added volume",
-      "The share of its part's volume that a hull may add: 0.01 is 1 %.",
+      "The share of its part's volume that a hull may add: 0.01 is 1%.",
       [0.001, 1],
       given.volume_tolerance,
       this.changed,
@@ -137,8 +137,8 @@ export class Controls {
     this.overlap = new Length(
       "overlap",
       "Overlap",
-      "How deep hulls that touch reach into each other, so that nothing thin slips between them. 0.05 is 5 % of the longest side.",
-      [0.001, 0.1],
+      "How deep hulls that touch reach into each other, so that nothing thin slips between them. 0.05 is 2.5% of the longest side, which counts as 2.",
+      [0.002, 0.2],
       given.overlap,
       this.changed,
       { orNone: true },
@@ -165,9 +165,9 @@ export class Controls {
         ["solid", "Solid", "Fill every body that encloses a space once its openings are closed."],
         ["thin", "Thin", "Fill none: every open body becomes a thin shell."],
       ],
-      given.open,
+      given.openings,
       (value) => {
-        this.options.open = value;
+        this.options.openings = value;
         this.changed();
       },
       "What becomes of bodies with openings.",
@@ -216,7 +216,7 @@ export class Controls {
         ? { volume_tolerance: this.volume.value }
         : { threshold: this.threshold.value };
     const limits = { max_hulls: this.hulls.value(), max_vertices: this.corners.value(), preset: this.options.preset ?? null };
-    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, keep_open: this.options.keep_open ?? null, open: this.options.open, keep_cavities: this.options.keep_cavities && criterion !== "navigable", ...limits };
+    return { ...size, criterion, quality, primitives: this.options.primitives, overlap: this.overlap.value, keep_open: this.options.keep_open ?? null, openings: this.options.openings, keep_cavities: this.options.keep_cavities && criterion !== "navigable", ...limits };
   }
 
   /** Take another engine's limits. */
@@ -234,12 +234,9 @@ export class Controls {
 
   /** Lengths are also told in the unit of what is shown; only what has open bodies or cavities offers a choice about them. */
   setScene(scene) {
-    this.threshold.tell(scene, 1);
-    this.radius.tell(scene, 2);
-    this.tolerance.tell(scene, 2);
-    this.overlap.tell(scene, 2);
+    for (const length of [this.threshold, this.radius, this.tolerance, this.overlap]) length.tell(scene);
     this.criterion.querySelector("input[value=navigable]").disabled = Boolean(scene.robot); // a ball has one size for all
-    this.open.hidden = this.options.open === "auto" && !hasOpenBodies(scene);
+    this.open.hidden = this.options.openings === "auto" && !hasOpenBodies(scene);
     this.cavities.hidden = this.options.criterion === "navigable" || !(this.options.keep_cavities || hasFilledCavities(scene));
   }
 

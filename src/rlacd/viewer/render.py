@@ -145,7 +145,7 @@ def _mesh(mi: Any, triangles: npt.NDArray[np.float64], color: npt.NDArray[np.flo
     return mesh
 
 
-SERVER = "rlacd.view.render:draw"
+SERVER = "rlacd.viewer.render:draw"
 
 
 def render_apart(

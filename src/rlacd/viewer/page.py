@@ -37,7 +37,7 @@ def live_page(title: str, config: dict[str, Any]) -> tuple[str, str]:
     ----------
     title : str
     config : dict
-        Plain values for the page's controls; see `rlacd.view.server`.
+        Plain values for the page's controls; see `rlacd.viewer.server`.
     """
     imports = {f"page/{name}": f"./page/{name}.js" for name in MODULES}
     return _page(title, {"live": True, **config}, None, imports, modules="'self'", connect="'self'")
@@ -57,7 +57,7 @@ def still_page(title: str, config: dict[str, Any], scene: dict[str, Any]) -> str
     config : dict
         Plain values for the page.
     scene : dict
-        The result of `rlacd.view.scene.scene`, with ``heat`` and ``picture`` if available.
+        The result of `rlacd.viewer.scene.scene`, with ``heat`` and ``picture`` if available.
     """
     scripts = {name: base64.b64encode(_asset(f"{name}.js").encode()).decode("ascii") for name in MODULES}
     imports = {f"page/{name}": f"data:text/javascript;base64,{script}" for name, script in scripts.items()}
@@ -84,7 +84,7 @@ def _hash(text: str) -> str:
 
 
 def _asset(name: str) -> str:
-    return (resources.files("rlacd.view") / "web" / name).read_text(encoding="utf-8")
+    return (resources.files("rlacd.viewer") / "web" / name).read_text(encoding="utf-8")
 
 
 def _inert(json_text: str) -> str:
