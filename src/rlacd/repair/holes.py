@@ -238,14 +238,11 @@ class _Caps:
         return [one.described(bool(chosen[one.body]), self._soup.vertices) for one in self.holes if said[one.body]]
 
 
-def may_have_holes(state: State) -> bool:
-    """Whether bodies have free edges, and may be closed."""
-    free = int((state.soup.edges.face_count == 1).sum())
-    return 0 < free <= MOST_FREE_EDGES and state.wanted.open_bodies != "thin"
-
-
 def close_holes(state: State) -> None:
     """Cap the bodies all of whose holes may be closed."""
+    free = int((state.soup.edges.face_count == 1).sum())
+    if not 0 < free <= MOST_FREE_EDGES or state.wanted.open_bodies == "thin":
+        return
     rims = rims_of(state.soup)
     if not rims.loops:
         return

@@ -21,25 +21,13 @@ from rlacd._native import face_areas, poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
-from rlacd.repair.holes import close_holes, may_have_holes
+from rlacd.repair.holes import close_holes
 from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
-from rlacd.repair.wraps import (
-    fill_slits,
-    fill_voids,
-    is_crowd,
-    is_inside_out,
-    is_thicket,
-    keep_apart,
-    may_have_slits,
-    may_have_voids,
-    rebuild_tangles,
-    wrap_all,
-    wrap_sheets,
-)
+from rlacd.repair.walls import build_walls, skins
+from rlacd.repair.wraps import fill_slits, fill_voids, rebuild_tangles, wrap_all
 from rlacd.report import BodyRepair
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.component import DENSE
@@ -52,30 +40,15 @@ CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of its grid."""
 
 
-def _always(state: State) -> bool:
-    return True
-
-
-def _are_crowded(state: State) -> bool:
-    """Whether more than two faces meet in an edge."""
-    return bool((state.soup.edges.face_count > 2).any())
-
-
 def _sort_out(state: State) -> None:
     """Find the sides of crowded bodies by windings where angles fail."""
     state.soup = trust_windings(state.soup, state.bodies)
 
 
-def _is_nothing(state: State) -> bool:
-    return state.volume == 0
-
-
-def _may_have_lost(state: State) -> bool:
-    return not (_is_nothing(state) or state.is_apart)
-
-
 def _take_hull(state: State) -> None:
-    """Take the convex hull of all points."""
+    """Take the convex hull of all points if there is nothing else."""
+    if state.volume != 0:
+        return
     state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
     state.note(np.arange(state.bodies), "hull")
     state.solid = hull_of_points(state.surface.vertices)
@@ -87,6 +60,8 @@ def _keep_lost(state: State) -> None:
 
     So does closing cracks, of needles.
     """
+    if state.volume == 0 or state.is_apart:
+        return
     lost, own = measure(state), state.surface
     body, is_gone = state.body_of_input[lost], state.is_gone[lost]
     walls, needles = own.faces[lost[~is_gone]], np.unique(body[is_gone]).tolist()
@@ -104,24 +79,18 @@ def _keep_lost(state: State) -> None:
     state.lost[body] = HALF_THICKNESS
 
 
-STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
-    (_are_crowded, _sort_out),
-    (may_have_holes, close_holes),
-    (_always, build_walls),
-    (is_thicket, keep_apart),
-    (is_crowd, wrap_sheets),
-    (has_sheets, build_slabs),
-    (_always, State.unite_parts),
-    (is_inside_out, rebuild_tangles),
-    (may_have_voids, fill_voids),
-    (may_have_slits, fill_slits),
+STEPS: tuple[Callable[[State], None], ...] = (
+    _sort_out,
+    close_holes,
+    build_walls,
+    State.unite_parts,
+    rebuild_tangles,
+    fill_voids,
+    fill_slits,
 )
-"""Conditions and actions of a repair, in their order."""
+"""The steps of a repair, in their order: each changes nothing where it is not needed."""
 
-AT_LAST: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
-    (_may_have_lost, _keep_lost),
-    (_is_nothing, _take_hull),
-)
+AT_LAST: tuple[Callable[[State], None], ...] = (_keep_lost, _take_hull)
 """The last ones, also where bodies cross too often to be united."""
 
 
@@ -213,15 +182,13 @@ def _repaired(
 
 def _take_steps(state: State) -> None:
     try:
-        for is_needed, step in STEPS:
+        for step in STEPS:
             poll_stop()
-            if is_needed(state):
-                step(state)
+            step(state)
     except CrossingsError:
         wrap_all(state)
-    for is_needed, step in AT_LAST:
-        if is_needed(state):
-            step(state)
+    for step in AT_LAST:
+        step(state)
 
 
 def _is_inside(vertices: FloatArray, faces: Int64Array, sliver: BoolArray, threads: int | None) -> BoolArray:

@@ -154,11 +154,6 @@ def boxes_of(corners: FloatArray, patch: Int64Array) -> tuple[FloatArray, FloatA
     return lower, upper
 
 
-def no_faces(vertices: FloatArray) -> Soup:
-    """No faces."""
-    return Soup(vertices, np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64))
-
-
 def across(vertices: FloatArray, faces: Int64Array, halfedges: Int64Array) -> FloatArray:
     """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
     face, corner = halfedges // 3, halfedges % 3

@@ -14,7 +14,7 @@ from rlacd import _native
 from rlacd._native import face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import close_cracks
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
-from rlacd.repair.soup import Soup, no_faces
+from rlacd.repair.soup import Soup
 from rlacd.repair.union import Cavities, emptied, hollowed, size_of, to_arrays, unite, unite_and_fill, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.report import BodyRepair
@@ -97,8 +97,6 @@ class State:
         Greatest distance of the repaired surface from the input, and of input outside the solid from the solid.
     soup : Soup
         The faces of the input, with the caps.
-    sheets : Soup
-        The faces that become slabs, in patches.
     parts : list of Piece
         The solids built so far.
     solid : Manifold or (vertices, faces)
@@ -127,7 +125,6 @@ class State:
         self.beyond, self.lost = np.zeros((2, self.bodies))
         self.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
         self.soup = Soup(surface.vertices, faces, body, known_edges=edges)
-        self.sheets = no_faces(surface.vertices)
         self.parts: list[Piece] = []
         self.solid: Shape = Manifold()
         self.cavities = Cavities()

@@ -16,6 +16,7 @@ from rlacd.repair.soup import FLAT, Soup, face_normals, on_repeated_edge
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
 from rlacd.repair.voxels import DEFAULT_GAP
+from rlacd.repair.wraps import keep_apart, wrap_sheets
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
@@ -24,7 +25,7 @@ from rlacd.solid.topology import marked, nondegenerate
 
 
 def build_walls(state: State) -> None:
-    """Build what bounds something solid; the rest are sheets."""
+    """Build what bounds something solid, and give the rest, which are sheets, thickness."""
     walls, sheets = walls_and_sheets(state, ())
     state.parts = skins(walls)
     # Where faces of one body cross each other, they may be joined into a wrong skin: then all of them are sheets.
@@ -33,7 +34,9 @@ def build_walls(state: State) -> None:
     if wrong:
         walls, sheets = walls_and_sheets(state, wrong)
         state.parts = skins(walls)
-    state.sheets = sheets.in_patches()
+    sheets = sheets.in_patches()
+    if not (len(sheets.faces) and (keep_apart(state, sheets) or wrap_sheets(state, sheets))):
+        state.parts += skins(sheets, are_slabs=True)
 
 
 def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
@@ -41,16 +44,6 @@ def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
     vertices, faces = to_arrays(shape)
     points, _ = points_covering(vertices, faces, DEFAULT_GAP)
     return bool((surface.distance(points) > DEFAULT_GAP).any())
-
-
-def has_sheets(state: State) -> bool:
-    """Whether sheets are still to be built."""
-    return len(state.sheets.faces) > 0
-
-
-def build_slabs(state: State) -> None:
-    """Give sheets thickness."""
-    state.parts += [part._replace(is_slab=True) for part in skins(state.sheets)]
 
 
 def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup]:
@@ -77,7 +70,7 @@ def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup
     return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
 
 
-def skins(soup: Soup) -> list[Piece]:
+def skins(soup: Soup, *, are_slabs: bool = False) -> list[Piece]:
     """Build the outer side components of a soup; sheets and flat bodies get thickness."""
     if len(soup.faces) == 0:
         return []
@@ -93,7 +86,7 @@ def skins(soup: Soup) -> list[Piece]:
     vertices, faces, label = _untwisted(soup, keep, flat)
     shapes = split_labels(vertices, faces, label)
     return [
-        Piece(_solid(soup, shape, one, bool(has_sheet[one] | flat[one])), int(soup.body_of_side[one]))
+        Piece(_solid(soup, shape, one, bool(has_sheet[one] | flat[one])), int(soup.body_of_side[one]), are_slabs)
         for one, shape in zip(np.unique(label), shapes, strict=True)
     ]
 

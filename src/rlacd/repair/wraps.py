@@ -14,7 +14,7 @@ from rlacd.repair.distance import (
     spread_points,
     tangled_bodies,
 )
-from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
+from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import (
     Cavities,
@@ -54,46 +54,41 @@ _PAIRS_A_FACE = 4
 _CROWD, _CROSSINGS = 300, 1000
 
 
-def is_thicket(state: State) -> bool:
-    """Whether all is sheets that cross so often that their union would be cut into many more pieces than faces."""
-    sheets = state.sheets
+def keep_apart(state: State, sheets: Soup) -> bool:
+    """Make every face of sheets a slab, and unite none, if their union would be cut into many more pieces than faces.
+
+    Returns whether it was done: all has to be sheets, and they have to cross often.
+    """
     most = _PAIRS_A_FACE * len(sheets.faces)
-    if state.parts or not 0 < len(sheets.faces) <= _CROWD:
+    if state.parts or len(sheets.faces) > _CROWD:
         return False
-    return _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] > most
-
-
-def keep_apart(state: State) -> None:
-    """Make every face of sheets a slab, and unite none."""
-    sheets = state.sheets
+    if _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] <= most:
+        return False
     slabs = [surface_of(hull_of_points(sheets.vertices[face])) for face in sheets.faces]
     state.parts = [Piece(concatenated(slabs), int(sheets.body.min()), is_slab=True)]
-    state.sheets = no_faces(sheets.vertices)
     state.is_apart = True
     state.beyond[:] = HALF_THICKNESS
     state.warnings.append("The sheets cross too often to be united: each face is a slab of its own.")
+    return True
 
 
-def is_crowd(state: State) -> bool:
-    """Whether there are too many sheets, such as leaves or feathers, to be united one by one."""
-    if len(state.sheets.faces) == 0:
-        return False
-    patch = state.sheets.sides.label[0::2]
-    return bool(state.has("slab").sum() > _CROWD) or _crossings(state.sheets, patch) > _CROSSINGS
+def wrap_sheets(state: State, sheets: Soup) -> bool:
+    """Wrap all bodies with sheets as one if these are too many, such as leaves or feathers, to be united one by one.
 
-
-def wrap_sheets(state: State) -> None:
-    """Wrap all bodies with sheets as one."""
+    Returns whether it was done.
+    """
     is_slab = state.has("slab")
+    if is_slab.sum() <= _CROWD and _crossings(sheets, sheets.sides.label[0::2]) <= _CROSSINGS:
+        return False
     soup = state.of_bodies(is_slab)
     points, _ = points_covering(soup.vertices, soup.faces, state.reach.pitch / 2)
     wrap = _wrap(state, state.reach.around_points(points), HALF_THICKNESS / 2)
     if wrap.volume() <= 0:
-        return
+        return False
     state.note(soup.body, "wrapped")
     state.parts = [part for part in state.parts if not is_slab[part.body]]
     state.parts.append(Piece(wrap, int(soup.body.min()), is_slab=True))
-    state.sheets = no_faces(soup.vertices)
+    return True
 
 
 def wrap_all(state: State) -> None:
@@ -108,17 +103,14 @@ def wrap_all(state: State) -> None:
     )
 
 
-def is_inside_out(state: State) -> bool:
-    """Whether some bodies cross too much of their own surface to be cut."""
-    return state.volume != 0 and np.bincount(state.soup.body).min() <= DENSE and is_tangle(state.query())
-
-
 def rebuild_tangles(state: State) -> None:
     """Build bodies that cross themselves from the place of their faces alone, whatever their windings.
 
     A few faces become a slab each. Where they are many, what the ball cannot reach from outside the body is solid.
     """
     soup = state.soup
+    if state.volume == 0 or np.bincount(soup.body).min() > DENSE or not is_tangle(state.query()):
+        return
     tangled = tangled_bodies(state.query(), soup.vertices, soup.faces, soup.body)
     tangled = tangled[~state.has("slab")[tangled]].tolist()  # slabs are thin enough to be cut
     if not tangled:
@@ -138,11 +130,6 @@ def rebuild_tangles(state: State) -> None:
     state.warnings.append(f"{bodies} too often to be cut, so whatever the faces enclose is taken to be solid.")
 
 
-def may_have_voids(state: State) -> bool:
-    """Whether faces that do not touch each other may enclose voids that the ball cannot enter."""
-    return _may_fill(state) and any(_is_large(state, walls) for walls in _walls(state))
-
-
 def _walls(state: State) -> tuple[Soup, Soup]:
     """Faces that may be walls of voids: sheets and caps that nothing can reach; outer skins."""
     sheets = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
@@ -151,6 +138,8 @@ def _walls(state: State) -> tuple[Soup, Soup]:
 
 def fill_voids(state: State) -> None:
     """Fill voids with openings too narrow for the ball: all voids that sheets enclose, large ones in outer skins."""
+    if not _may_fill(state) or not any(_is_large(state, walls) for walls in _walls(state)):
+        return
     reach = state.reach
     (in_sheets, body), (in_shells, _) = (_voids_near(state, walls) for walls in _walls(state))
     large = np.unique(in_shells)
@@ -177,20 +166,16 @@ def _voids_near(state: State, walls: Soup) -> tuple[Int64Array, Int64Array]:
     return state.reach.voids_near(points).astype(np.int64), walls.body[on]
 
 
-def may_have_slits(state: State) -> bool:
-    """Whether there may be slits in outer skins and along fillings."""
-    if not _may_fill(state):
-        return False
-    return _is_large(state, state.of_bodies(_with_slits(state))) or tunnels_in(state.solid) > _TUNNELS
-
-
 def _with_slits(state: State) -> BoolArray:
     has = state.has
     return (has("outer skin") | has("wrapped") | state.by_hidden_caps) & ~state.is_tangled
 
 
 def fill_slits(state: State) -> None:
-    """Fill slits that nothing can reach: cuts would have to follow them."""
+    """Fill slits in outer skins and along fillings that nothing can reach: cuts would have to follow them."""
+    may_have_slits = _is_large(state, state.of_bodies(_with_slits(state))) or tunnels_in(state.solid) > _TUNNELS
+    if not (_may_fill(state) and may_have_slits):
+        return
     query, gap = state.query(), state.wanted.gap
     points, on = spread_points(query.vertices, query.faces, DEFAULT_GAP)
     deep = state.reach.is_deep(points, _DEEP * gap)
