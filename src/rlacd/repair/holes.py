@@ -21,7 +21,7 @@ from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_points
 from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
-from rlacd.repair.soup import FLAPS, Soup, trust_windings
+from rlacd.repair.soup import FLAPS, Soup
 from rlacd.repair.state import State
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS
@@ -134,7 +134,7 @@ class _Caps:
         query = SurfaceQuery(self._soup.vertices, others)
         return len(others) > 0 and bool((query.distance(np.concatenate([corners, middles])) <= self._gap).all())
 
-    def _leading_away(self, depth: FloatArray) -> BoolArray:
+    def leading_away(self, depth: FloatArray) -> BoolArray:
         """Return ``[bodies]`` the bodies with a cap that leads farther away from the surface, ``[H]``, than it may."""
         may_lead = self._is_damage | (self._is_small & (depth <= HOLE))
         return marked(self.body[(depth > 0) & ~may_lead], self._bodies)
@@ -142,7 +142,7 @@ class _Caps:
     def may_be_closed(self) -> BoolArray:
         """Return ``[bodies]`` the bodies all of whose holes may be closed."""
         chosen = marked(self.body, self._bodies)
-        return chosen if self._fill else chosen & ~self._leading_away(self.reached)
+        return chosen if self._fill else chosen & ~self.leading_away(self.reached)
 
     def added(self, chosen: BoolArray) -> tuple[Soup, BoolArray]:
         """The soup with the caps of chosen bodies ``[bodies]``, and which of its faces are flaps."""
@@ -153,28 +153,19 @@ class _Caps:
         owners = np.concatenate([np.where(whole, self._body, soup.body), own[some]])
         no_cap = np.zeros(int(some.sum()), dtype=bool)
         kept = first_of_doubled(faces, len(soup.vertices))
-        # Where more than two faces met without caps, which of them continue each other is a guess.
-        sure = whole & ~rims.flap & ~soup.at_edges(soup.edges.face_count > 2)
-        before = ~whole & (False if soup.trusted is None else soup.trusted)
-        trusted = np.concatenate([sure | before, ~no_cap])
-        flap = np.concatenate([rims.flap, no_cap])[kept]
-        return trust_windings(Soup(soup.vertices, faces, owners, trusted).only(kept), self._bodies, flap), flap
+        return Soup(soup.vertices, faces, owners).only(kept), np.append(rims.flap, no_cap)[kept]
 
     def useful(self, chosen: BoolArray, closed: Soup, flap: BoolArray) -> BoolArray:
         """Return ``[bodies]`` the chosen bodies to which caps give an inside: a strip whose cap lies on it has none."""
         volume = np.bincount(closed.body_of_side, np.maximum(closed.sides.volume, 0), self._bodies)
         has_volume = volume > HALF_THICKNESS / 2 * np.bincount(closed.body, closed.area, self._bodies)
-        has_inside = np.asarray(chosen & has_volume & (closed.sheet_share(self._bodies, flap) <= FLAPS))
+        has_inside = np.asarray(chosen & has_volume & (closed.share(closed.sides.sheet & ~flap, self._bodies) <= FLAPS))
         # Caps that lead away from the surface may cross the body, and turn it inside out in places.
         for one in np.flatnonzero(marked(self.body[self.depth > self._gap], self._bodies) & has_inside):
             faces = closed.faces[(closed.body == one) & ~flap]
             outward = faces if signed_tetrahedra(closed.vertices, faces).sum() > 0 else faces[:, ::-1]
             has_inside[one] = not is_tangle(SurfaceQuery(closed.vertices, outward))
         return has_inside
-
-    def by_hidden_caps(self) -> BoolArray:
-        """Return ``[bodies]`` the bodies that are closed only because nothing can reach some of their caps."""
-        return self._leading_away(self.hidden)
 
     def bodies_of(self, chosen: BoolArray) -> Int64Array:
         """The numbers of all bodies that share a hole with a chosen one ``[bodies]``."""
@@ -211,7 +202,7 @@ def close_holes(state: State) -> None:
     if (useful != chosen).any():
         closed, _ = caps.added(useful)
     state.note(caps.bodies_of(useful), "capped")
-    state.by_hidden_caps |= useful & caps.by_hidden_caps()
+    state.by_hidden_caps |= useful & caps.leading_away(caps.hidden)
     state.holes = caps.described(useful)
     if useful.any():
         state.soup = closed

@@ -22,7 +22,7 @@ from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
 from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
 from rlacd.repair.holes import close_holes
-from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
+from rlacd.repair.soup import MOST_PATCHES, Soup
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP
@@ -38,11 +38,6 @@ from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, 
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of its grid."""
-
-
-def _sort_out(state: State) -> None:
-    """Find the sides of crowded bodies by windings where angles fail."""
-    state.soup = trust_windings(state.soup, state.bodies)
 
 
 def _take_hull(state: State) -> None:
@@ -80,7 +75,6 @@ def _keep_lost(state: State) -> None:
 
 
 STEPS: tuple[Callable[[State], None], ...] = (
-    _sort_out,
     close_holes,
     build_walls,
     State.unite_parts,
