@@ -20,7 +20,7 @@ import numpy as np
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_points
-from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
+from rlacd.repair.rims import Rims, caps_of, rims_of
 from rlacd.repair.soup import FLAPS, Soup
 from rlacd.repair.state import State
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
@@ -64,7 +64,7 @@ class _Caps:
         soup, bodies = state.soup, state.bodies
         self._state, self._soup, self._rims, self._bodies = state, soup, rims, bodies
         self._gap, self._fill = state.wanted.gap, state.wanted.open_bodies == "solid"
-        self._faces, self._hole_of = caps_of(soup, rims)
+        self._faces, self._hole_of, smooth = caps_of(soup, rims)
         first_body = np.array([soup.body[beside[0]] for beside in rims.beside])
         lengths = np.array([len(loop) for loop in rims.loops])
         _, group = components(bodies, np.repeat(first_body, lengths), soup.body[np.concatenate(rims.beside)])
@@ -73,7 +73,7 @@ class _Caps:
         self._body, self.body = self._joined[soup.body], self._joined[first_body]
         self._area = np.bincount(self._body, soup.area, bodies)
         self.depth, self.reached, self.hidden = self._depths()
-        self.is_smooth = smooth_share(soup, rims, self._faces, self._hole_of) >= _GOOD_PART
+        self.is_smooth = smooth >= _GOOD_PART
         self._classify(lengths)
 
     def _depths(self) -> FloatArray:
