@@ -20,7 +20,7 @@ import numpy as np
 from rlacd._native import angles, components, least_bent, long_normals, poll_stop, principal_axes_of_points
 from rlacd.repair.soup import FLAPS, Soup, across, face_normals
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots, heights
-from rlacd.solid.topology import nondegenerate
+from rlacd.solid.topology import marked, nondegenerate
 
 _NEXT = np.array([1, 2, 0])
 
@@ -67,7 +67,9 @@ def rims_of(soup: Soup) -> Rims:
     corners, swap = soup.faces.ravel(), inverted[rim // 3]
     begin, end = np.where(swap, _following(rim), rim), np.where(swap, rim, _following(rim))
     sums = [np.bincount(corners, np.repeat(weighted[:, k], 3), len(soup.vertices)) for k in range(3)]
-    follower = _followers(soup.vertices, np.stack(sums, axis=1), corners, _fans(soup.faces, mate), begin, end)
+    follower = _followers(
+        soup.vertices, np.asarray(np.stack(sums, axis=1)), corners, _fans(soup.faces, mate), begin, end
+    )
     # Most edges around a hole are free: a loop of edges that touch other bodies bounds none.
     free = soup.edges.face_count[soup.edges.of_halfedge[rim]] == 1
     loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
@@ -77,7 +79,7 @@ def rims_of(soup: Soup) -> Rims:
 
 def _following(halfedge: Int64Array) -> Int64Array:
     """Return ``[N]`` the next halfedges around the same faces."""
-    return halfedge - halfedge % 3 + _NEXT[halfedge % 3]
+    return np.asarray(halfedge - halfedge % 3 + _NEXT[halfedge % 3])
 
 
 def _sides(soup: Soup, mate: Int64Array) -> Int64Array:
@@ -208,28 +210,21 @@ def caps_of(soup: Soup, rims: Rims) -> tuple[Int64Array, Int64Array, FloatArray]
     Returns the faces ``[C, 3]``, without those with a repeated vertex, the loop ``[C]`` of each, and ``[L]`` the share
     of each loop along which its cap continues the adjacent faces.
     """
-    count = len(soup.vertices)
-    edges = soup.edges.vertices @ np.array([count, 1])  # in ascending order
-    across: dict[int, list[int]] = {}
+    weights = np.array([len(soup.vertices), 1])
+    on_rim = marked(np.concatenate(rims.loops), len(soup.vertices))
+    used = set((soup.edges.vertices[on_rim[soup.edges.vertices].all(axis=1)] @ weights).tolist())  # edges
     caps, smooth = [], []
     for loop, beside in zip(rims.loops, rims.beside, strict=True):
         poll_stop()
         taken = None
-        if 3 < len(loop) <= _EXACT_LOOP:
-            low, high = np.minimum(loop[:, None], loop), np.maximum(loop[:, None], loop)
-            at = np.minimum(np.searchsorted(edges, low * count + high), len(edges) - 1)
-            taken = (edges[at] == low * count + high) | (low == high)
-            places: dict[int, list[int]] = {}
-            for i, vertex in enumerate(loop.tolist()):
-                places.setdefault(vertex, []).append(i)
-            for i, vertex in enumerate(loop.tolist()):
-                taken[i, [place for other in across.get(vertex, ()) for place in places.get(other, ())]] = True
+        if len(loop) <= _EXACT_LOOP:
+            chord = np.sort(np.stack(np.broadcast_arrays(loop[:, None], loop), axis=2), axis=2) @ weights
+            is_used = [one in used for one in chord.ravel().tolist()]
+            taken = np.reshape(is_used, chord.shape) | (loop[:, None] == loop)
         triangles = cap(soup.vertices[loop], rims.normals[beside], taken)
         caps.append(loop[triangles])
         smooth.append(_smooth_share(soup.vertices[loop], rims.normals[beside], triangles))
-        for a, b, c in caps[-1].tolist() if len(loop) > 3 else ():
-            for here, there in ((a, (b, c)), (b, (c, a)), (c, (a, b))):
-                across.setdefault(here, []).extend(there)
+        used.update((np.sort(caps[-1][:, [[0, 1], [1, 2], [2, 0]]], axis=2) @ weights).ravel().tolist())
     owner = np.repeat(np.arange(len(caps)), [len(some) for some in caps])
     faces = np.concatenate(caps)
     real = nondegenerate(faces)
@@ -264,8 +259,6 @@ def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) 
     Int64Array
         ``[N - 2, 3]`` corners, all of them points of the loop, oriented against the loop to match the adjacent faces.
     """
-    if len(points) <= 3:
-        return np.array([[0, 2, 1]])
     if len(points) <= _EXACT_LOOP:
         return least_bent(points, beside, taken)[:, ::-1].astype(np.int64)
     flat = heights(points - points.mean(axis=0), principal_axes_of_points(points)[:2])
