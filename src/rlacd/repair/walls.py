@@ -9,18 +9,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from manifold3d import Manifold
 
 from rlacd._native import angles, components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, face_normals, on_repeated_edge
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
+from rlacd.repair.union import slab_of_faces, split_labels, to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.wraps import keep_apart, wrap_sheets
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import Shape
 from rlacd.solid.topology import marked, nondegenerate
 
 
@@ -39,7 +39,7 @@ def build_walls(state: State) -> None:
         state.parts += skins(sheets, are_slabs=True)
 
 
-def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
+def _leads_away(shape: Manifold, surface: SurfaceQuery) -> bool:
     """Whether a skin leads farther away from the input than caps may."""
     vertices, faces = to_arrays(shape)
     points, _ = points_covering(vertices, faces, DEFAULT_GAP)
@@ -86,8 +86,9 @@ def skins(soup: Soup, *, are_slabs: bool = False) -> list[Piece]:
     vertices, faces, label = _untwisted(soup, keep, flat)
     shapes = split_labels(vertices, faces, label)
     return [
-        Piece(_solid(soup, shape, one, bool(has_sheet[one] | flat[one])), int(soup.body_of_side[one]), are_slabs)
+        Piece(solid, int(soup.body_of_side[one]), are_slabs)
         for one, shape in zip(np.unique(label), shapes, strict=True)
+        if not (solid := _solid(soup, shape, one, bool(has_sheet[one] | flat[one]))).is_empty()
     ]
 
 
@@ -114,10 +115,10 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     return vertices, faces, label
 
 
-def _solid(soup: Soup, mesh: tuple[FloatArray, Int64Array], side: int, is_thin: bool) -> Shape:
+def _solid(soup: Soup, mesh: tuple[FloatArray, Int64Array], side: int, is_thin: bool) -> Manifold:
     """A side component as a solid; a sheet narrower than thick may come out inside out: it is built face by face."""
     solid = to_manifold(*mesh)
-    if is_thin and volume_of(solid) <= 0:
+    if is_thin and solid.volume() <= 0:
         some = (soup.sides.label.reshape(-1, 2) == side).any(axis=1)
         return slab_of_faces(soup.vertices, soup.faces[some])
     return solid

@@ -16,23 +16,12 @@ from rlacd.repair.distance import (
 )
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import (
-    Cavities,
-    area_of,
-    as_manifold,
-    hull_of_points,
-    size_of,
-    slab_of_faces,
-    tunnels_in,
-    unite,
-    volume_of,
-)
+from rlacd.repair.union import hull_of_points, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import BoolArray, Int64Array
-from rlacd.solid.component import DENSE, concatenated
+from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import surface_of
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
 # Least share of the solid's volume of a void of an outer skin that is filled, and greatest of slits: voids in furniture
@@ -64,8 +53,8 @@ def keep_apart(state: State, sheets: Soup) -> bool:
         return False
     if _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] <= most:
         return False
-    slabs = [surface_of(hull_of_points(sheets.vertices[face])) for face in sheets.faces]
-    state.parts = [Piece(concatenated(slabs), int(sheets.body.min()), is_slab=True)]
+    slabs = [hull_of_points(sheets.vertices[face]) for face in sheets.faces]
+    state.parts = [Piece(Manifold.compose(slabs), int(sheets.body.min()), is_slab=True)]
     state.is_apart = True
     state.beyond[:] = HALF_THICKNESS
     state.warnings.append("The sheets cross too often to be united: each face is a slab of its own.")
@@ -94,7 +83,7 @@ def wrap_sheets(state: State, sheets: Soup) -> bool:
 def wrap_all(state: State) -> None:
     """Take what the ball cannot reach from outside all bodies to be solid."""
     gap = state.wanted.gap
-    state.solid, state.cavities = _wrapped(state, state.soup), Cavities()
+    state.solid, state.cavity_walls = _wrapped(state, state.soup), None
     state.note(state.soup.body, "wrapped")
     state.parts = [Piece(state.solid, 0)]
     state.warnings.append(
@@ -148,9 +137,9 @@ def fill_voids(state: State) -> None:
     if len(cells) == 0:
         return
     wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
-    filled = unite([as_manifold(state.solid), wrap])
-    triangles = size_of(filled) / size_of(state.solid)
-    if volume_of(filled) <= state.volume or area_of(filled) * triangles**_TRIANGLES >= area_of(state.solid):
+    filled = unite([state.solid, wrap])
+    triangles = filled.num_tri() / state.solid.num_tri()
+    if filled.volume() <= state.volume or filled.surface_area() * triangles**_TRIANGLES >= state.solid.surface_area():
         return
     wrapped = np.unique(body[np.isin(in_sheets, reach.void.ravel()[cells])])
     state.note(wrapped, "wrapped")
@@ -173,7 +162,7 @@ def _with_slits(state: State) -> BoolArray:
 
 def fill_slits(state: State) -> None:
     """Fill slits in outer skins and along fillings that nothing can reach: cuts would have to follow them."""
-    may_have_slits = _is_large(state, state.of_bodies(_with_slits(state))) or tunnels_in(state.solid) > _TUNNELS
+    may_have_slits = _is_large(state, state.of_bodies(_with_slits(state))) or state.solid.genus() > _TUNNELS
     if not (_may_fill(state) and may_have_slits):
         return
     query, gap = state.query(), state.wanted.gap
@@ -190,9 +179,9 @@ def fill_slits(state: State) -> None:
     if len(points) == 0:
         return
     wrap = _wrap(state, state.reach.around_points(points), _WRAP_ERROR, query)
-    filled = unite([as_manifold(state.solid), wrap])
-    is_little = abs(volume_of(filled) / state.volume - 1) < _SLIT_VOLUME
-    if is_little and area_of(filled) < (1 - _BARED) * area_of(state.solid):
+    filled = unite([state.solid, wrap])
+    is_little = abs(filled.volume() / state.volume - 1) < _SLIT_VOLUME
+    if is_little and filled.surface_area() < (1 - _BARED) * state.solid.surface_area():
         state.solid = filled
         state.parts.append(Piece(wrap, int(_with_slits(state).argmax())))
 
