@@ -69,8 +69,8 @@ class _Caps:
         lengths = np.array([len(loop) for loop in rims.loops])
         _, group = components(bodies, np.repeat(first_body, lengths), soup.body[np.concatenate(rims.beside)])
         _, first = np.unique(group, return_index=True)
-        self._joined = first[group]  # the first of the bodies that share holes
-        self._body, self.body = self._joined[soup.body], self._joined[first_body]
+        self.joined = first[group]  # the first of the bodies that share holes
+        self._body, self.body = self.joined[soup.body], self.joined[first_body]
         self._area = np.bincount(self._body, soup.area, bodies)
         self.depth, self.reached, self.hidden = self._depths()
         self.is_smooth = smooth >= _GOOD_PART
@@ -81,10 +81,7 @@ class _Caps:
         gap, vertices = self._gap, self._soup.vertices
         spacing = affordable(gap / 2, float(face_areas(vertices, self._faces).sum()))
         points, on = spread_points(vertices, self._faces, spacing)
-        # Only points far from their face's corners are measured: corners lie on the surface.
-        beyond = (np.linalg.norm(points[:, None] - vertices[self._faces[on]], axis=2) > min(gap, HOLE)).all(axis=1)
-        distance = np.zeros(len(points))
-        distance[beyond] = self._state.surface.distance(points[beyond])
+        distance = self._state.surface.distance(points)
         is_reached = is_far = distance > gap
         # Where cavities are kept, balls start in them too, and every point counts as reached.
         if is_far.any() and not self._fill and not self._state.wanted.keep_cavities:
@@ -167,10 +164,6 @@ class _Caps:
             has_inside[one] = not is_tangle(SurfaceQuery(closed.vertices, outward))
         return has_inside
 
-    def bodies_of(self, chosen: BoolArray) -> Int64Array:
-        """The numbers of all bodies that share a hole with a chosen one ``[bodies]``."""
-        return np.flatnonzero(chosen[self._joined])
-
     def described(self, chosen: BoolArray) -> list[Hole]:
         """The holes of chosen bodies ``[bodies]``, and those of bodies to which caps would give an inside."""
         said = chosen | (self._volume > self._gap * self._area)  # less is a leaf or cloth
@@ -201,7 +194,7 @@ def close_holes(state: State) -> None:
     useful = caps.useful(chosen, closed, flap)
     if (useful != chosen).any():
         closed, _ = caps.added(useful)
-    state.note(caps.bodies_of(useful), "capped")
+    state.note(np.flatnonzero(useful[caps.joined]), "capped")
     state.by_hidden_caps |= useful & caps.leading_away(caps.hidden)
     state.holes = caps.described(useful)
     if useful.any():

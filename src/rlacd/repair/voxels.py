@@ -112,7 +112,7 @@ class Reach:
         """Return the closed surface of a set of cells, projected onto a surface where it is near.
 
         Corners of cells move to `thickness` in front of the closest point of the surface as seen from their place,
-        so a wrap of a single sheet keeps two sides. Corners farther than two cells away span a gap and are smoothed.
+        so a wrap of a single sheet keeps two sides. Corners farther than two cells away span a gap and stay.
         Corners inside `solid`, with which the wrap will be united, stay: projected, they would leave a slit.
         """
         corners, quads = _boundary_squares(cells)
@@ -120,14 +120,11 @@ class Reach:
         closest, _ = surface.closest(points)
         away = points - closest
         distance = np.linalg.norm(away, axis=1)
-        attached = distance <= 2 * self.pitch
-        is_free = np.ones(len(points), dtype=bool)
+        moved = distance <= 2 * self.pitch
         if solid is not None:
-            is_free[attached] = ~solid.inside(points[attached])
+            moved[moved] = ~solid.inside(points[moved])
         step = thickness / np.maximum(distance, np.finfo(float).tiny)
-        moved = attached & is_free
         points[moved] = (closest + np.minimum(step, 1)[:, None] * away)[moved]
-        _smooth(points, quads, ~attached & is_free)
         return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
@@ -167,19 +164,3 @@ def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, Int64Array]:
     used, index = np.unique(flat, return_inverse=True)
     corners = np.stack(np.unravel_index(used, shape), axis=1).astype(np.float64)
     return corners, index.reshape(-1, 4)
-
-
-def _smooth(points: FloatArray, quads: Int64Array, free: BoolArray, rounds: int = 20) -> None:
-    """Pull the free points to the mean of their neighbours, in place; the others stay."""
-    if not free.any():
-        return
-    a = quads.ravel()
-    b = quads[:, [1, 2, 3, 0]].ravel()
-    tail, head = np.concatenate([a, b]), np.concatenate([b, a])
-    some = free[tail]
-    tail, head = tail[some], head[some]
-    degree = np.maximum(np.bincount(tail, minlength=len(points)), 1)
-    for _ in range(rounds):
-        poll_stop()
-        mean = np.stack([np.bincount(tail, points[head, k], len(points)) for k in range(3)], axis=1)
-        points[free] = (mean / degree[:, None])[free]

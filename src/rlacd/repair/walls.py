@@ -51,14 +51,9 @@ def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup
     soup, sides = state.soup, state.soup.sides
     front, back = sides.label[0::2], sides.label[1::2]
     none = FLAT * sides.area
-    sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
-    # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is
-    # nowhere solid, so all of it becomes slabs (whose cavities are filled later).
-    leaky = soup.body_of_side[(sides.volume < -none) & (4 * sheet_area > sides.area)]
     solid = sides.volume > none
     flat = np.abs(sides.volume) <= none
-    leaky = np.union1d(leaky, np.array(as_sheets, dtype=np.int64))
-    sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
+    sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, as_sheets)
     wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
 
     state.note(soup.body[solid[back] & wall], "reoriented")
@@ -66,8 +61,7 @@ def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup
     state.note(soup.body[soup.at_edges(soup.edges.face_count > 2)], "outer skin")
     state.note(soup.body[sheet], "slab")
     poll_stop()
-    mixed = np.bincount(soup.body[sheet], minlength=state.bodies) > 0
-    return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
+    return soup.only(~sheet), soup.only(sheet)
 
 
 def skins(soup: Soup, *, are_slabs: bool = False) -> list[Piece]:

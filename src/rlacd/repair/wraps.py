@@ -119,50 +119,37 @@ def rebuild_tangles(state: State) -> None:
     state.warnings.append(f"{bodies} too often to be cut, so whatever the faces enclose is taken to be solid.")
 
 
-def _walls(state: State) -> tuple[Soup, Soup]:
-    """Faces that may be walls of voids: sheets and caps that nothing can reach; outer skins."""
-    sheets = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
-    return state.of_bodies(sheets), state.of_bodies(state.has("outer skin") & ~state.is_tangled)
-
-
 def fill_voids(state: State) -> None:
-    """Fill voids with openings too narrow for the ball: all voids that sheets enclose, large ones in outer skins."""
-    if not _may_fill(state) or not any(_is_large(state, walls) for walls in _walls(state)):
+    """Fill large voids with openings too narrow for the ball, between faces that do not touch each other."""
+    is_open = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
+    walls = state.of_bodies(is_open | (state.has("outer skin") & ~state.is_tangled))
+    if not _may_fill(state) or not _is_large(state, walls) or not state.reach.void.any():
         return
-    reach = state.reach
-    (in_sheets, body), (in_shells, _) = (_voids_near(state, walls) for walls in _walls(state))
-    large = np.unique(in_shells)
+    points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
+    reach, void = state.reach, state.reach.voids_near(points)
+    large = np.setdiff1d(void, 0)
     large = large[reach.volumes(large) >= _SLIT_VOLUME * state.volume]
-    cells = reach.voids_outside(np.setdiff1d(np.union1d(in_sheets, large), 0), state.query())
+    cells = reach.voids_outside(large, state.query())
     if len(cells) == 0:
         return
     wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
     filled = unite([state.solid, wrap])
     triangles = filled.num_tri() / state.solid.num_tri()
-    if filled.volume() <= state.volume or filled.surface_area() * triangles**_TRIANGLES >= state.solid.surface_area():
+    bared = filled.surface_area() * triangles**_TRIANGLES
+    if filled.volume() <= state.volume or bared >= state.solid.surface_area():
         return
-    wrapped = np.unique(body[np.isin(in_sheets, reach.void.ravel()[cells])])
+    wrapped = np.unique(walls.body[on[np.isin(void, reach.void.ravel()[cells])]])
+    wrapped = wrapped[is_open[wrapped]]
     state.note(wrapped, "wrapped")
     state.solid = filled
     state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
 
 
-def _voids_near(state: State, walls: Soup) -> tuple[Int64Array, Int64Array]:
-    """For points of faces, the void whose wall each may be, 0 for none, and its body."""
-    if not state.reach.void.any() or not _is_large(state, walls):
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
-    return state.reach.voids_near(points).astype(np.int64), walls.body[on]
-
-
-def _with_slits(state: State) -> BoolArray:
-    has = state.has
-    return (has("outer skin") | has("wrapped") | state.by_hidden_caps) & ~state.is_tangled
-
-
 def fill_slits(state: State) -> None:
     """Fill slits in outer skins and along fillings that nothing can reach: cuts would have to follow them."""
-    may_have_slits = _is_large(state, state.of_bodies(_with_slits(state))) or state.solid.genus() > _TUNNELS
+    has = state.has
+    has_slits = (has("outer skin") | has("wrapped") | state.by_hidden_caps) & ~state.is_tangled
+    may_have_slits = _is_large(state, state.of_bodies(has_slits)) or state.solid.genus() > _TUNNELS
     if not (_may_fill(state) and may_have_slits):
         return
     query, gap = state.query(), state.wanted.gap
@@ -183,7 +170,7 @@ def fill_slits(state: State) -> None:
     is_little = abs(filled.volume() / state.volume - 1) < _SLIT_VOLUME
     if is_little and filled.surface_area() < (1 - _BARED) * state.solid.surface_area():
         state.solid = filled
-        state.parts.append(Piece(wrap, int(_with_slits(state).argmax())))
+        state.parts.append(Piece(wrap, int(has_slits.argmax())))
 
 
 def _may_fill(state: State) -> bool:
