@@ -20,7 +20,7 @@ from rlacd import _native
 from rlacd._native import face_areas, poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
-from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
+from rlacd.repair.distance import SurfaceQuery, is_tangle
 from rlacd.repair.holes import close_holes
 from rlacd.repair.soup import MOST_PATCHES, Soup
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
@@ -38,6 +38,10 @@ from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, 
 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of its grid."""
+
+# Points at which a triangle is tested for lying inside a body, into which it may lead, or out of which: near its
+# corners, its edges, its middle.
+_PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
 
 def _take_hull(state: State) -> None:
@@ -83,9 +87,6 @@ STEPS: tuple[Callable[[State], None], ...] = (
     fill_slits,
 )
 """The steps of a repair, in their order: each changes nothing where it is not needed."""
-
-AT_LAST: tuple[Callable[[State], None], ...] = (_keep_lost, _take_hull)
-"""The last ones, also where bodies cross too often to be united."""
 
 
 def repair(
@@ -170,28 +171,23 @@ def _repaired(
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), (*mesh.warnings, said))
     state = State(SurfaceQuery(vertices, faces, threads), frame, wanted)
-    _take_steps(state)
-    return state.result(mesh.warnings)
-
-
-def _take_steps(state: State) -> None:
     try:
         for step in STEPS:
             poll_stop()
             step(state)
     except CrossingsError:
         wrap_all(state)
-    for step in AT_LAST:
-        step(state)
+    _keep_lost(state)
+    _take_hull(state)
+    return state.result(mesh.warnings)
 
 
 def _is_inside(vertices: FloatArray, faces: Int64Array, sliver: BoolArray, threads: int | None) -> BoolArray:
     """Return ``[F]`` which slivers lie inside the other faces: where two bodies touch."""
     inside = sliver.copy()
     if sliver.any():
-        query = SurfaceQuery(vertices, faces[~sliver], threads)
-        still = np.ones(int(sliver.sum()), dtype=bool)
-        for points in probes(vertices, faces[sliver]).swapaxes(0, 1):  # most slivers fail at the first
-            still[still] = np.abs(query.winding(points[still])) > 0.75
-        inside[sliver] = still
+        corners = vertices[faces[sliver]][:, None]
+        points = sum(_PROBES[:, k, None] * corners[:, :, k] for k in range(3))
+        winding = SurfaceQuery(vertices, faces[~sliver], threads).winding(np.reshape(points, (-1, 3)))
+        inside[sliver] = (np.abs(winding).reshape(-1, len(_PROBES)) > 0.75).all(axis=1)
     return inside

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from manifold3d import Manifold
-from numpy.typing import ArrayLike
 
 from rlacd import _native
 from rlacd._native import face_areas, poll_stop, signed_tetrahedra
@@ -113,10 +112,7 @@ class State:
 
     def __init__(self, surface: SurfaceQuery, frame: Frame, wanted: Wanted) -> None:
         self.surface, self.wanted, self.frame = surface, wanted, frame
-        edges = Edges.of(surface.faces, len(surface.vertices))
-        faces, origin = close_cracks(surface.vertices, surface.faces, edges, _WELDS)
-        if faces is not surface.faces:
-            edges = Edges.of(faces, len(surface.vertices))
+        faces, origin, edges = close_cracks(surface.vertices, surface.faces, _WELDS)
         self.bodies, body = bodies_of(faces, edges)
         self.body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
         self.body_of_input[origin] = body
@@ -253,11 +249,8 @@ class State:
 
     def _places(self, holes: list[Hole]) -> str:
         """Where holes are, the most doubtful first."""
-        named = "; ".join(self._place(hole.at, hole.body) for hole in holes[:_NAMED])
-        return named + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
-
-    def _place(self, point: ArrayLike, body: int) -> str:
-        return self.frame.place(point, body if self.bodies > 1 else None)
+        some = [self.frame.place(hole.at, hole.body if self.bodies > 1 else None) for hole in holes[:_NAMED]]
+        return "; ".join(some) + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
 
 
 def measure(state: State) -> Int64Array:
