@@ -96,7 +96,7 @@ class _Caps:
     def _volume(self) -> FloatArray:
         """The volume ``[bodies]`` that each body would enclose with all its caps."""
         soup, rims, own = self._soup, self._rims, self.body[self._hole_of]
-        sign = np.where(rims.inverted, -1, 1) * ~rims.flap
+        sign = np.where(rims.inverted, -1, 1)
         volume = np.bincount(self._body, sign * signed_tetrahedra(soup.vertices, soup.faces), self._bodies)
         volume += np.bincount(own, signed_tetrahedra(soup.vertices, self._faces), self._bodies)
         return np.asarray(np.abs(volume))
@@ -141,25 +141,23 @@ class _Caps:
         chosen = marked(self.body, self._bodies)
         return chosen if self._fill else chosen & ~self.leading_away(self.reached)
 
-    def added(self, chosen: BoolArray) -> tuple[Soup, BoolArray]:
-        """The soup with the caps of chosen bodies ``[bodies]``, and which of its faces are flaps."""
+    def added(self, chosen: BoolArray) -> Soup:
+        """The soup with the caps of chosen bodies ``[bodies]``."""
         soup, rims, own = self._soup, self._rims, self.body[self._hole_of]
         some, whole = chosen[own], chosen[self._body]
         turned = np.where((whole & rims.inverted)[:, None], soup.faces[:, ::-1], soup.faces)
         faces = np.concatenate([turned, self._faces[some]])
         owners = np.concatenate([np.where(whole, self._body, soup.body), own[some]])
-        no_cap = np.zeros(int(some.sum()), dtype=bool)
-        kept = first_of_doubled(faces, len(soup.vertices))
-        return Soup(soup.vertices, faces, owners).only(kept), np.append(rims.flap, no_cap)[kept]
+        return Soup(soup.vertices, faces, owners).only(first_of_doubled(faces, len(soup.vertices)))
 
-    def useful(self, chosen: BoolArray, closed: Soup, flap: BoolArray) -> BoolArray:
+    def useful(self, chosen: BoolArray, closed: Soup) -> BoolArray:
         """Return ``[bodies]`` the chosen bodies to which caps give an inside: a strip whose cap lies on it has none."""
         volume = np.bincount(closed.body_of_side, np.maximum(closed.sides.volume, 0), self._bodies)
         has_volume = volume > HALF_THICKNESS / 2 * np.bincount(closed.body, closed.area, self._bodies)
-        has_inside = np.asarray(chosen & has_volume & (closed.share(closed.sides.sheet & ~flap, self._bodies) <= FLAPS))
+        has_inside = np.asarray(chosen & has_volume & (closed.share(closed.sides.sheet, self._bodies) <= FLAPS))
         # Caps that lead away from the surface may cross the body, and turn it inside out in places.
         for one in np.flatnonzero(marked(self.body[self.depth > self._gap], self._bodies) & has_inside):
-            faces = closed.faces[(closed.body == one) & ~flap]
+            faces = closed.faces[closed.body == one]
             outward = faces if signed_tetrahedra(closed.vertices, faces).sum() > 0 else faces[:, ::-1]
             has_inside[one] = not is_tangle(SurfaceQuery(closed.vertices, outward))
         return has_inside
@@ -190,15 +188,12 @@ def close_holes(state: State) -> None:
         return
     caps = _Caps(state, rims)
     chosen = caps.may_be_closed()
-    closed, flap = caps.added(chosen)
-    useful = caps.useful(chosen, closed, flap)
-    if (useful != chosen).any():
-        closed, _ = caps.added(useful)
+    closed = caps.added(chosen)
+    useful = caps.useful(chosen, closed)
     state.note(np.flatnonzero(useful[caps.joined]), "capped")
     state.by_hidden_caps |= useful & caps.leading_away(caps.hidden)
     state.holes = caps.described(useful)
-    if useful.any():
-        state.soup = closed
+    state.soup = closed if (useful == chosen).all() else caps.added(useful)
 
 
 def _is_round(points: FloatArray) -> bool:

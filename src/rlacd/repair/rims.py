@@ -1,12 +1,11 @@
-"""Open boundaries of a surface: flaps that stick to it, the loops of edges around its holes, and caps for these.
+"""Open boundaries of a surface: the loops of edges around its holes, and caps for these.
 
-Input: a soup. Output: its flaps, loops of vertices around its holes, and triangles that close these without new
+Input: a soup. Output: loops of vertices around its holes, and triangles that close these without new
 vertices; nothing is decided or changed here.
 
 Two faces that share an edge are mates; where more share it, those that continue each other best. Faces connected by
-mates form a patch, and all faces of a patch are wound alike, whatever the file says. A flap is a small patch attached
-to others at edges that these mate without it, or a flat patch within one loop: its free edges bound no hole. At a
-vertex where several holes meet, a loop turns from a free edge to the next one across the hole, so loops never run
+mates form a patch, and all faces of a patch are wound alike, whatever the file says. At a vertex where several holes
+meet, a loop turns from a free edge to the next one across the hole, so loops never run
 around existing faces. An island that touches its hole's rim joins that hole's loop, which visits the vertex twice.
 """
 
@@ -18,7 +17,7 @@ import mapbox_earcut
 import numpy as np
 
 from rlacd._native import angles, components, least_bent, long_normals, poll_stop, principal_axes_of_points
-from rlacd.repair.soup import FLAPS, Soup, across, face_normals
+from rlacd.repair.soup import Soup, across, face_normals
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots, heights
 from rlacd.solid.topology import marked, nondegenerate
 
@@ -39,30 +38,24 @@ class Rims:
         ``[F, 3]``, unit normals with which all faces of a patch are wound alike.
     inverted
         ``[F]``, whether a face is wound the other way.
-    flap
-        ``[F]``, whether a face belongs to a flap.
     """
 
     loops: list[Int64Array]
     beside: list[Int64Array]
     normals: FloatArray
     inverted: BoolArray
-    flap: BoolArray
 
 
 def rims_of(soup: Soup) -> Rims:
-    """Find the flaps of a soup and the loops around its holes."""
+    """Find the loops around the holes of a soup."""
     mate = _mates(soup)
     poll_stop()
     label = _sides(soup, mate)
-    low = np.minimum(label[0::2], label[1::2])
-    flap = _flaps(soup, np.unique(low, return_inverse=True)[1].reshape(-1))
-    inverted = label[0::2] > low
+    inverted = label[0::2] > label[1::2]
     poll_stop()
     weighted = long_normals(soup.vertices, soup.faces)
     weighted[inverted] *= -1
-    weighted[flap] = 0
-    rim = np.flatnonzero((mate < 0) & np.repeat(~flap, 3))
+    rim = np.flatnonzero(mate < 0)
     # Where each free halfedge begins and ends, seen from outside.
     corners, swap = soup.faces.ravel(), inverted[rim // 3]
     begin, end = np.where(swap, _following(rim), rim), np.where(swap, rim, _following(rim))
@@ -74,7 +67,7 @@ def rims_of(soup: Soup) -> Rims:
     free = soup.edges.face_count[soup.edges.of_halfedge[rim]] == 1
     loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
-    return Rims([corners[begin[loop]] for loop in loops], [rim[loop] // 3 for loop in loops], normals, inverted, flap)
+    return Rims([corners[begin[loop]] for loop in loops], [rim[loop] // 3 for loop in loops], normals, inverted)
 
 
 def _following(halfedge: Int64Array) -> Int64Array:
@@ -136,17 +129,6 @@ def _matched(one: Int64Array, other: Int64Array, cost: FloatArray, count: int) -
         if match[a] < 0 and match[b] < 0:
             match[a], match[b] = b, a
     return np.array(match, dtype=np.int64)
-
-
-def _flaps(soup: Soup, patch: Int64Array) -> BoolArray:
-    """Return ``[F]`` whether a face belongs to a small patch with free edges that is attached to other patches."""
-    count = int(patch.max(initial=-1)) + 1
-    hangs, free = (
-        np.bincount(patch[soup.at_edges(some)], minlength=count) > 0
-        for some in (soup.edges.face_count > 2, soup.edges.face_count == 1)
-    )
-    small = np.bincount(patch, soup.area, count)[patch] <= FLAPS * np.bincount(soup.body, soup.area)[soup.body]
-    return np.asarray(small & hangs[patch] & free[patch])
 
 
 def _followers(

@@ -16,7 +16,7 @@ FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
 
 FLAPS = 0.05
-"""Greatest share of a solid's area that faces sticking out of it may have, flaps not counted."""
+"""Greatest share of a solid's area that faces sticking out of it may have."""
 
 MOST_UNITED = 4000
 """Most meshes united: more are composed, since uniting takes time for each even if none overlap."""
