@@ -24,6 +24,8 @@ MOST_UNITED = 4000
 # Most sheets of a body that are thickened one by one; and average number of sheets in whose boxes a face lies above
 # which a body of more than `MOST_UNITED` faces is layers, which would take minutes to unite.
 MOST_PATCHES, _LAYERS = 100, 1.5
+# Cosine of the angle between two faces below which a sheet is folded onto itself (20 degrees).
+_FOLD = 0.94
 
 
 @dataclass(frozen=True)
@@ -90,13 +92,16 @@ class Soup:
         return share
 
     def in_patches(self) -> Soup:
-        """The same faces, split along every edge that more than two of them share.
+        """The same faces, split along folds and along every edge that more than two of them share.
 
         Sheets that meet at an edge are thickened one by one and united afterwards: if all corners of a sheet lie on
         others, or face both ways, no vertex would be left to give it thickness.
         """
         halfedge = np.argsort(self.edges.of_halfedge, kind="stable")
         halfedge = halfedge[self.edges.face_count[self.edges.of_halfedge[halfedge]] == 2].reshape(-1, 2)
+        away = [across(self.vertices, self.faces, some) for some in halfedge.T]
+        poll_stop()
+        halfedge = halfedge[dots(*away) < _FOLD]
         count, patch = components(len(self.faces), halfedge[:, 0] // 3, halfedge[:, 1] // 3)
         poll_stop()
         patches = np.unique(self.body * count + patch) // max(count, 1)

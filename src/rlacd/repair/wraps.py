@@ -120,16 +120,16 @@ def rebuild_tangles(state: State) -> None:
 
 
 def fill_voids(state: State) -> None:
-    """Fill large voids with openings too narrow for the ball, between faces that do not touch each other."""
+    """Fill voids with openings too narrow for the ball: all that sheets enclose, large ones in outer skins."""
     is_open = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
     walls = state.of_bodies(is_open | (state.has("outer skin") & ~state.is_tangled))
     if not _may_fill(state) or not _is_large(state, walls) or not state.reach.void.any():
         return
     points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
     reach, void = state.reach, state.reach.voids_near(points)
-    large = np.setdiff1d(void, 0)
-    large = large[reach.volumes(large) >= _SLIT_VOLUME * state.volume]
-    cells = reach.voids_outside(large, state.query())
+    voids = np.setdiff1d(void, 0)
+    is_large = reach.volumes(voids) >= _SLIT_VOLUME * state.volume
+    cells = reach.voids_outside(voids[is_large | np.isin(voids, void[is_open[walls.body[on]]])], state.query())
     if len(cells) == 0:
         return
     wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
