@@ -154,12 +154,3 @@ def face_normals(vertices: FloatArray, faces: Int64Array) -> FloatArray:
     """Return ``[F, 3]`` the unit normals of faces; zero for those without an area."""
     normal = long_normals(vertices, faces)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
-
-
-def on_repeated_edge(faces: Int64Array, count: int) -> BoolArray:
-    """Return ``[F]`` which faces have a directed edge that another face has too."""
-    key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
-    poll_stop()
-    _, inverse, number = np.unique(key, return_inverse=True, return_counts=True)
-    result: BoolArray = (number[inverse.reshape(-1, 3)] > 1).any(axis=1)
-    return result

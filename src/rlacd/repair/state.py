@@ -133,7 +133,7 @@ class State:
     @cached_property
     def reach(self) -> Reach:
         """Where the ball can go."""
-        return Reach.of(self.surface.vertices, self.surface.faces, self.wanted.gap, self.wanted.cells)
+        return Reach(self.surface.vertices, self.surface.faces, self.wanted.gap, self.wanted.cells)
 
     def query(self) -> SurfaceQuery:
         """Queries of the solid as it is now."""

@@ -77,20 +77,6 @@ def slab_of_faces(vertices: FloatArray, faces: Int64Array) -> Manifold:
     return unite([hull_of_points(vertices[face]) for face in faces])
 
 
-def split_labels(vertices: FloatArray, faces: Int64Array, label: Int64Array) -> list[tuple[FloatArray, Int64Array]]:
-    """Split a mesh into the faces of each label, in ascending order of the labels."""
-    if len(label) and (label == label[0]).all():
-        return [compacted(vertices, faces)]
-    order = np.argsort(label, kind="stable")
-    cuts = np.flatnonzero(np.diff(label[order])) + 1
-    parts = []
-    for some in np.split(order, cuts) if len(order) else []:
-        poll_stop()
-        used, index = np.unique(faces[some], return_inverse=True)
-        parts.append((vertices[used], index.reshape(-1, 3).astype(np.int64)))
-    return parts
-
-
 def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Manifold:
     """Unite solids and fill the cavities nothing can reach; see `unite_and_fill`."""
     united = _all_united([solid if isinstance(solid, Manifold) else to_manifold(*solid) for solid in solids])

@@ -13,9 +13,9 @@ from manifold3d import Manifold
 
 from rlacd._native import angles, components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
-from rlacd.repair.soup import FLAT, Soup, face_normals, on_repeated_edge
+from rlacd.repair.soup import FLAT, Soup, face_normals
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import slab_of_faces, split_labels, to_arrays
+from rlacd.repair.union import slab_of_faces, to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
 from rlacd.repair.wraps import keep_apart, wrap_sheets
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
@@ -78,12 +78,17 @@ def skins(soup: Soup, *, are_slabs: bool = False) -> list[Piece]:
     flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
     keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
     vertices, faces, label = _untwisted(soup, keep, flat)
-    shapes = split_labels(vertices, faces, label)
-    return [
-        Piece(solid, int(soup.body_of_side[one]), are_slabs)
-        for one, shape in zip(np.unique(label), shapes, strict=True)
-        if not (solid := _solid(soup, shape, one, bool(has_sheet[one] | flat[one]))).is_empty()
-    ]
+    order, pieces = np.argsort(label, kind="stable"), []
+    for some in np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(order) else ():
+        poll_stop()
+        used, corners = np.unique(faces[some], return_inverse=True)
+        side, solid = label[some[0]], to_manifold(vertices[used], corners.reshape(-1, 3))
+        # A sheet narrower than thick may come out inside out: it is built face by face.
+        if (has_sheet[side] or flat[side]) and solid.volume() <= 0:
+            solid = slab_of_faces(soup.vertices, soup.faces[(sides.label.reshape(-1, 2) == side).any(axis=1)])
+        if not solid.is_empty():
+            pieces.append(Piece(solid, int(soup.body_of_side[side]), are_slabs))
+    return pieces
 
 
 def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int64Array, Int64Array]:
@@ -96,7 +101,10 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     if not (soup.edges.face_count > 2).any():
         return vertices, faces, label
     sides, bodies = soup.sides, int(soup.body.max()) + 1
-    pinched = marked(soup.body_of_side[label[on_repeated_edge(faces, len(vertices))]], bodies)
+    edge = (faces * len(vertices) + np.roll(faces, -1, axis=1)).ravel()
+    order = np.argsort(edge, kind="stable")
+    repeated = order[1:][np.diff(edge[order]) == 0] // 3
+    pinched = marked(soup.body_of_side[label[repeated]], bodies)
     # Only if the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
     pinched &= np.bincount(soup.body_of_side, sides.volume > 0, bodies) == 1
     pinched[soup.body[sides.sheet]] = False
@@ -107,15 +115,6 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     vertices, faces, label = _skin(soup, (keep & ~at) | insides, flat)
     faces[insides[label]] = faces[insides[label]][:, ::-1]
     return vertices, faces, label
-
-
-def _solid(soup: Soup, mesh: tuple[FloatArray, Int64Array], side: int, is_thin: bool) -> Manifold:
-    """A side component as a solid; a sheet narrower than thick may come out inside out: it is built face by face."""
-    solid = to_manifold(*mesh)
-    if is_thin and solid.volume() <= 0:
-        some = (soup.sides.label.reshape(-1, 2) == side).any(axis=1)
-        return slab_of_faces(soup.vertices, soup.faces[some])
-    return solid
 
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
@@ -157,8 +156,6 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
         positions += HALF_THICKNESS * _fan_offsets(vertices, faces[face], back, thin[face], fan, number)
     triangles = fan.reshape(-1, 3).copy()
     triangles[back] = triangles[back][:, ::-1]
-    if not is_rim.any():
-        return positions, triangles, sides.label[kept]
     rim_label = sides.label[facing[is_rim, 0]]
     rim_faces, rim_faces_label, centers = _rims(fan[low[:, is_rim]], fan[high[:, is_rim]], rim_label, number)
     return (
@@ -182,15 +179,22 @@ def _rims(
     """Close rims: the faces ``[M, 3]``, their labels, and for every new vertex (from `number` on) a fan at its place.
 
     A rim edge runs from low to high; one side of its face is at the wedge's beginning (fans ``[0]``), one at its end.
+
+    Each rim quad leaves a link between two fans at both of its ends. Two links between the same two fans match each
+    other; where three or more free edges meet in a vertex, longer cycles bound a small polygon, closed here with a fan
+    of triangles around a new central vertex.
     """
     quads = [np.stack([high[0], low[0], low[1]], axis=1), np.stack([high[0], low[1], high[1]], axis=1)]
-    caps, cap_label, centers = _rim_caps(
-        np.concatenate([low[1], high[0]]), np.concatenate([low[0], high[1]]), np.tile(label, 2), number
-    )
+    tail, head = np.concatenate([low[1], high[0]]), np.concatenate([low[0], high[1]])
+    cycle = components(number, tail, head)[1][tail]
+    # Matched pairs need no cap: link (a, b) with (b, a).
+    unmatched = np.flatnonzero(~np.isin(tail * number + head, head * number + tail))
+    tail, head, twice = tail[unmatched], head[unmatched], np.tile(label, 2)
+    _, first, center = np.unique(cycle[unmatched], return_index=True, return_inverse=True)
     poll_stop()
-    rim_faces = np.concatenate([*quads, caps])
+    rim_faces = np.concatenate([*quads, np.stack([tail, head, number + center.reshape(-1)], axis=1)])
     real = nondegenerate(rim_faces)
-    return rim_faces[real], np.concatenate([label, label, cap_label])[real], centers
+    return rim_faces[real], np.append(twice, twice[unmatched])[real], tail[first]
 
 
 def _fan_offsets(
@@ -198,7 +202,10 @@ def _fan_offsets(
 ) -> FloatArray:
     """Return the way ``[number, 3]`` of each fan that leads 1 off all its faces; zero for fans without a sheet."""
     normal = np.repeat(face_normals(vertices, corners) * np.where(back, -1, 1)[:, None], 3, axis=0)
-    angle = _corner_angles(vertices[corners])
+    points = vertices[corners]
+    along, away = (np.roll(points, -k, axis=1) - points for k in (1, 2))
+    angle = angles(np.linalg.norm(np.cross(along, away), axis=2).ravel(), dots(along, away).ravel())
+    poll_stop()
     total = np.stack([np.bincount(fan, angle * normal[:, k], number) for k in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean = np.where(length > 1e-6, total / np.maximum(length, np.finfo(float).tiny), 0.0)
@@ -208,34 +215,3 @@ def _fan_offsets(
     sees_sheet = np.bincount(fan, np.repeat(thin, 3), number) > 0
     far = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
     return np.asarray(mean * far[:, None])
-
-
-def _corner_angles(points: FloatArray) -> FloatArray:
-    """Return ``[3 F]`` the angle at each corner of triangles ``[F, 3, 3]``."""
-    poll_stop()
-    along, across = (np.roll(points, -k, axis=1) - points for k in (1, 2))
-    sines = np.linalg.norm(np.cross(along, across), axis=2)
-    return np.asarray(angles(sines.ravel(), dots(along, across).ravel()))
-
-
-def _rim_caps(
-    tail: Int64Array, head: Int64Array, label: Int64Array, number: int
-) -> tuple[Int64Array, Int64Array, Int64Array]:
-    """Close the ends of rims where three or more free edges meet in a vertex.
-
-    Each rim quad leaves a link between two fans at both of its ends. Two links between the same two fans match each
-    other; longer cycles bound a small polygon, closed here with a fan of triangles around a new central vertex.
-
-    Returns the triangles, their labels, and for every central vertex (numbered from `number` on) a fan at its place.
-    """
-    linked = tail != head
-    tail, head, label = tail[linked], head[linked], label[linked]
-    _, cycle = components(number, tail, head)
-    cycle = cycle[tail]
-    # Matched pairs need no cap: link (a, b) with (b, a).
-    key, mate = tail * number + head, head * number + tail
-    unmatched = ~np.isin(key, mate)
-    tail, head, label, cycle = tail[unmatched], head[unmatched], label[unmatched], cycle[unmatched]
-    _, first, center = np.unique(cycle, return_index=True, return_inverse=True)
-    caps = np.stack([tail, head, number + center.reshape(-1)], axis=1) if len(tail) else np.empty((0, 3), np.int64)
-    return caps, label, tail[first] if len(tail) else np.empty(0, np.int64)

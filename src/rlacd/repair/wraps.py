@@ -186,7 +186,7 @@ def _is_large(state: State, walls: Soup) -> bool:
 
 def _wrapped(state: State, soup: Soup) -> Manifold:
     """A solid of all that the ball cannot reach from outside some faces."""
-    reach = Reach.of(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
+    reach = Reach(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
     faces = SurfaceQuery(soup.vertices, soup.faces, state.surface.threads)
     return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)
 
