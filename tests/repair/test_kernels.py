@@ -16,7 +16,7 @@ from rlacd import _native
 from rlacd._native import face_areas, long_normals, signed_tetrahedra
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
-from rlacd.repair.union import one_body, unite, volume_of
+from rlacd.repair.union import one_body, unite
 from rlacd.repair.voxels import _grown
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.topology import Edges, bodies_of, first_of_doubled
@@ -145,7 +145,8 @@ def test_one_body_is_turned_outwards_and_taken_only_where_it_has_no_pinch(major:
     ring = trimesh.creation.torus(major, 1.0, 24, 24)
     vertices, faces, _ = _native.weld(np.round(ring.vertices, 9), np.asarray(ring.faces)[:, ::-1].copy())
     taken = one_body(vertices, faces)
-    assert taken is None if major == 1 else volume_of(taken[0]) == pytest.approx(ring.volume)
+    assert (taken is None) == (major == 1)
+    assert taken is None or _native.mesh_volume(*taken[0]) == pytest.approx(ring.volume)
 
 
 @pytest.mark.parametrize("sliver", [1e-13, 1e-11])
@@ -176,6 +177,6 @@ def test_the_union_does_not_depend_on_the_order_of_solids(seed: int) -> None:
     solids = [
         Manifold.sphere(0.3 + rng.random(), 8 + 8 * int(rng.integers(8))).translate(rng.random(3)) for _ in range(12)
     ]
-    volume = volume_of(unite(solids, keep_cavities=True))
+    volume = unite(solids, keep_cavities=True).volume()
     assert volume == pytest.approx(Manifold.batch_boolean(solids, OpType.Add).volume(), rel=1e-9)
-    assert volume_of(unite(solids[::-1], keep_cavities=True)) == pytest.approx(volume, rel=1e-9)
+    assert unite(solids[::-1], keep_cavities=True).volume() == pytest.approx(volume, rel=1e-9)

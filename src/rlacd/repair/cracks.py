@@ -21,38 +21,37 @@ MOST_NEAR = 100 * MOST_FREE_EDGES
 
 
 def close_cracks(
-    vertices: FloatArray, faces: Int64Array, edges: Edges, tolerances: Sequence[float]
-) -> tuple[Int64Array, Int64Array]:
+    vertices: FloatArray, faces: Int64Array, tolerances: Sequence[float]
+) -> tuple[Int64Array, Int64Array, Edges]:
     """Merge free edges that nearly coincide, with increasing tolerances.
 
     An attempt that closes nothing, or leaves no face, is undone. No two of the faces have the same three corners.
 
-    Returns the faces ``[G, 3]``, the given ones if nothing changed, and ``[G]`` the given face each comes from.
+    Returns the faces ``[G, 3]``, ``[G]`` the given face each comes from, and their edges.
     """
-    origin = np.arange(len(faces))
-    free = free_edges(faces, edges)
+    origin, edges = np.arange(len(faces)), Edges.of(faces, len(vertices))
     for tolerance in tolerances:
         poll_stop()
-        if not 0 < len(free) <= MOST_FREE_EDGES:
+        free = edges.face_count == 1
+        if not 0 < free.sum() <= MOST_FREE_EDGES:
             break
-        welded = weld_free_vertices(vertices, faces, free, tolerance)
+        welded = weld_free_vertices(vertices, faces, np.unique(edges.vertices[free]), tolerance)
         split, parent = split_at_free_vertices(vertices, welded, tolerance)
         poll_stop()
         keep = nondegenerate(split)
         keep[keep] = first_of_doubled(split[keep], len(vertices))
-        left = free_edges(split[keep], Edges.of(split[keep], len(vertices)))
-        if len(left) < len(free) and keep.any():
-            faces, origin, free = split[keep], origin[parent[keep]], left
-    return faces, origin
+        left = Edges.of(split[keep], len(vertices))
+        if (left.face_count == 1).sum() < free.sum() and keep.any():
+            faces, origin, edges = split[keep], origin[parent[keep]], left
+    return faces, origin, edges
 
 
-def weld_free_vertices(vertices: FloatArray, faces: Int64Array, free: Int64Array, tolerance: float) -> Int64Array:
-    """Merge vertices of free edges ``[B, 2]`` that lie within `tolerance` of each other.
+def weld_free_vertices(vertices: FloatArray, faces: Int64Array, ends: Int64Array, tolerance: float) -> Int64Array:
+    """Merge vertices at the ends ``[B]`` of free edges that lie within `tolerance` of each other.
 
     Returns faces of the same number, of which some may be degenerate. Vertices keep their places: each group is
     represented by its first vertex.
     """
-    ends = np.unique(free)
     counts, near = points_within(vertices[ends], vertices[ends], np.full(len(ends), tolerance))
     if len(near) == len(ends):  # each is near itself only
         return faces
@@ -98,17 +97,14 @@ def _on_edges(
 
     Returns pairs of an edge and a vertex, in order along each edge.
     """
-    none = np.empty((2, 0), dtype=np.int64)
     poll_stop()
-    if len(corners) == 0:
-        return none[0], none[1]
     a, b, c = corners.T
     span = vertices[b] - vertices[a]
     length = np.linalg.norm(span, axis=1)
     middle = (vertices[a] + vertices[b]) / 2
     count, near = points_within(vertices[free], middle, length / 2 + tolerance, MOST_NEAR)
-    if len(near) > MOST_NEAR or len(near) == 0:
-        return none[0], none[1]
+    if len(near) > MOST_NEAR:
+        return corners[:0, 0], corners[:0, 0]
     poll_stop()
     edge, vertex = np.repeat(np.arange(len(corners)), count), free[near]
     offset = vertices[vertex] - vertices[a[edge]]
@@ -119,9 +115,3 @@ def _on_edges(
     poll_stop()
     on = on[np.lexsort((vertex[on], along[on], edge[on]))]
     return edge[on], vertex[on]
-
-
-def free_edges(faces: Int64Array, edges: Edges) -> Int64Array:
-    """Return the directed edges ``[B, 2]`` that only one face uses, as that face runs along them."""
-    face, corner = np.divmod(np.flatnonzero((edges.face_count == 1)[edges.of_halfedge]), 3)
-    return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=1)

@@ -16,9 +16,6 @@ from rlacd.solid.distance import PLACES
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.topology import first_of_doubled
 
-# Points at which a triangle is tested for lying inside a body: near its corners, its edges, its middle.
-_PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
-
 MOST_POINTS = 160_000
 """Most points spread over a surface: at the usual spacing, only stacks of hundreds of sheets need so many."""
 
@@ -59,12 +56,6 @@ class SurfaceQuery:
     def inside(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the faces, a closed outward surface, wind around each point."""
         return self.winding(points, is_closed=True) > 0.5
-
-
-def probes(vertices: FloatArray, faces: Int64Array) -> FloatArray:
-    """Return seven points of every face ``[F, 7, 3]``: a face may begin inside a body and lead out of it."""
-    corners = vertices[faces][:, None]
-    return np.asarray(sum(_PROBES[:, k, None] * corners[:, :, k] for k in range(3)))
 
 
 def points_covering(vertices: FloatArray, faces: Int64Array, spacing: float) -> tuple[FloatArray, Int64Array]:

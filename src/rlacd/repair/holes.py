@@ -13,7 +13,6 @@ sheet. Whether a hole may be closed is decided by the first of these questions t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,8 +20,8 @@ import numpy as np
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_points
-from rlacd.repair.rims import Rims, caps_of, rims_of, smooth_share
-from rlacd.repair.soup import FLAPS, Soup, trust_windings
+from rlacd.repair.rims import Rims, caps_of, rims_of
+from rlacd.repair.soup import FLAPS, Soup
 from rlacd.repair.state import State
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS
@@ -48,218 +47,153 @@ _DAMAGED = 4
 _GOOD_PART = 0.3
 
 
-@dataclass(frozen=True)
-class _Hole:
-    """One hole and the cap that would close it.
+class _Caps:
+    """The holes of a soup, the caps that would close them, and points spread over the caps.
 
     Attributes
     ----------
-    loop
-        The vertices around it.
-    body
-        The first of the bodies that share it.
-    share, of_all
-        Area of its cap, and of all caps of its body, as shares of the body's.
-    depth, reached, hidden
+    body : int64 [H]
+        The first of the bodies that share a hole.
+    depth, reached, hidden : float64 [H]
         How far the cap leads away from the surface: anywhere; where the ball can, and cannot, reach it (0 if near).
-    is_smooth, is_ring
-        Whether the cap continues the faces around it; whether it is a round ring.
-    is_tube, is_end, is_damage
-        Whether a tube ends here; whether it is the tube's only hole; whether missing faces left it.
+    is_smooth : bool [H]
+        Whether the cap continues the faces around it.
     """
-
-    loop: Int64Array
-    body: int
-    share: float
-    of_all: float
-    depth: float
-    reached: float
-    hidden: float
-    is_smooth: bool
-    is_ring: bool
-    is_tube: bool
-    is_end: bool
-    is_damage: bool = False
-
-    @property
-    def looks_damaged(self) -> bool:
-        """Whether it looks as if faces were missing: small, with few edges, and smooth or a single triangle."""
-        is_small = len(self.loop) <= _DAMAGE_EDGES and self.share <= _DAMAGE
-        return is_small and (self.is_smooth or len(self.loop) == 3)
-
-    def may_be_damage(self, is_damaged: bool) -> bool:
-        """Whether missing faces may have left it, in a mesh that is damaged or not."""
-        if not is_damaged:
-            return self.looks_damaged and not self.is_ring
-        is_harmless = self.share <= HOLE_SHARE or self.depth <= HOLE or self.is_smooth
-        return self.looks_damaged or (is_harmless and self.share <= _DAMAGE)
-
-    def may_lead(self, depth: float) -> bool:
-        """Whether its cap may lead so far away from the surface."""
-        is_no_mouth = self.is_smooth or not self.is_ring or self.is_tube
-        is_small = is_no_mouth and self.of_all <= (_END if self.is_end else HOLE_SHARE)
-        return self.is_damage or (is_small and depth <= HOLE)
-
-    def described(self, is_closed: bool, vertices: FloatArray) -> Hole:
-        """The hole as the report lists it."""
-        corners = vertices[self.loop]
-        centre = corners.mean(axis=0)
-        width = 2 * float(np.linalg.norm(corners - centre, axis=1).max())
-        at = (float(centre[0]), float(centre[1]), float(centre[2]))
-        return Hole(self.body, at, width, is_closed, self.is_smooth, self.reached if is_closed else 0.0)
-
-
-class _Caps:
-    """The holes of a soup, the caps that would close them, and points spread over the caps."""
 
     def __init__(self, state: State, rims: Rims) -> None:
         soup, bodies = state.soup, state.bodies
         self._state, self._soup, self._rims, self._bodies = state, soup, rims, bodies
         self._gap, self._fill = state.wanted.gap, state.wanted.open_bodies == "solid"
-        self._faces, self._hole_of = caps_of(soup, rims)
+        self._faces, self._hole_of, smooth = caps_of(soup, rims)
         first_body = np.array([soup.body[beside[0]] for beside in rims.beside])
-        lengths = [len(loop) for loop in rims.loops]
+        lengths = np.array([len(loop) for loop in rims.loops])
         _, group = components(bodies, np.repeat(first_body, lengths), soup.body[np.concatenate(rims.beside)])
         _, first = np.unique(group, return_index=True)
-        self._joined = first[group]  # the first of the bodies that share holes
-        self._body, self._body_of_hole = self._joined[soup.body], self._joined[first_body]
+        self.joined = first[group]  # the first of the bodies that share holes
+        self._body, self.body = self.joined[soup.body], self.joined[first_body]
         self._area = np.bincount(self._body, soup.area, bodies)
-        cap_area = face_areas(soup.vertices, self._faces)
-        self._cap_area = np.bincount(self._hole_of, cap_area, len(rims.loops))
-        spacing = affordable(self._gap / 2, float(cap_area.sum()))
-        self._points, self._on = spread_points(soup.vertices, self._faces, spacing)
-        self._distance, self._is_reached = self._looked_at()
-        self.holes = self._classified()
+        self.depth, self.reached, self.hidden = self._depths()
+        self.is_smooth = smooth >= _GOOD_PART
+        self._classify(lengths)
 
-    def _looked_at(self) -> tuple[FloatArray, BoolArray]:
-        """The distance ``[N]`` of each point from the surface, and whether the ball can reach it."""
-        gap, points = self._gap, self._points
-        # Only points far from their face's corners are measured: corners lie on the surface.
-        corners = self._soup.vertices[self._faces[self._on]]
-        beyond = (np.linalg.norm(points[:, None] - corners, axis=2) > min(gap, HOLE)).all(axis=1)
-        distance = np.zeros(len(points))
-        distance[beyond] = self._state.surface.distance(points[beyond])
-        is_reached = distance > gap
+    def _depths(self) -> FloatArray:
+        """Return ``[3, H]``, see the attributes."""
+        gap, vertices = self._gap, self._soup.vertices
+        spacing = affordable(gap / 2, float(face_areas(vertices, self._faces).sum()))
+        points, on = spread_points(vertices, self._faces, spacing)
+        distance = self._state.surface.distance(points)
+        is_reached = is_far = distance > gap
         # Where cavities are kept, balls start in them too, and every point counts as reached.
-        if is_reached.any() and not self._fill and not self._state.wanted.keep_cavities:
-            is_reached[is_reached] = self._state.reach.covers(points[is_reached])
-        return distance, is_reached
+        if is_far.any() and not self._fill and not self._state.wanted.keep_cavities:
+            is_reached = is_far.copy()
+            is_reached[is_far] = self._state.reach.covers(points[is_far])
+        depths = np.zeros((3, len(self.body)))
+        for depth, some in zip(depths, (is_far | True, is_reached, is_far & ~is_reached), strict=True):
+            np.maximum.at(depth, self._hole_of[on[some]], distance[some])
+        return depths
 
     @cached_property
     def _volume(self) -> FloatArray:
         """The volume ``[bodies]`` that each body would enclose with all its caps."""
-        soup, rims, own = self._soup, self._rims, self._body_of_hole[self._hole_of]
-        sign = np.where(rims.inverted, -1, 1) * ~rims.flap
+        soup, rims, own = self._soup, self._rims, self.body[self._hole_of]
+        sign = np.where(rims.inverted, -1, 1)
         volume = np.bincount(self._body, sign * signed_tetrahedra(soup.vertices, soup.faces), self._bodies)
         volume += np.bincount(own, signed_tetrahedra(soup.vertices, self._faces), self._bodies)
         return np.asarray(np.abs(volume))
 
-    def _classified(self) -> list[_Hole]:
-        """The holes, each with whether it is damage."""
-        holes = self._measured()
-        damaged = sum(one.looks_damaged for one in holes) >= max(_DAMAGED, _GOOD_PART * len(holes))
-        return [replace(one, is_damage=one.may_be_damage(damaged) and not self._is_plugged(one)) for one in holes]
-
-    def _measured(self) -> list[_Hole]:
-        """The holes, each measured by itself."""
-        loops, own, tiny = self._rims.loops, self._body_of_hole, np.finfo(float).tiny
+    def _classify(self, lengths: Int64Array) -> None:
+        """Tell holes that missing faces left from mouths, and from ends of tubes, given the lengths of their loops."""
+        own, tiny, loops, smooth = self.body, np.finfo(float).tiny, self._rims.loops, self.is_smooth
         body_area = np.maximum(self._area[own], tiny)
-        of_all = np.bincount(own, self._cap_area, self._bodies)[own]
-        radius = np.sqrt(np.maximum(self._cap_area, tiny) / np.pi)
+        cap_area = np.bincount(self._hole_of, face_areas(self._soup.vertices, self._faces), len(own))
+        share, of_all = cap_area / body_area, np.bincount(own, cap_area, self._bodies)[own] / body_area
+        is_ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
+        radius = np.sqrt(np.maximum(cap_area, tiny) / np.pi)
         is_tube = np.abs(self._volume[own] / body_area / radius - 0.5) <= _TUBE
         is_end = is_tube & (np.bincount(own)[own] == 1)
-        is_far, hole = self._distance > self._gap, self._hole_of[self._on]
-        depths = np.zeros((3, len(loops)))
-        for depth, some in zip(depths, (is_far | True, self._is_reached, is_far & ~self._is_reached), strict=True):
-            np.maximum.at(depth, hole[some], self._distance[some])
-        smooth = smooth_share(self._soup, self._rims, self._faces, self._hole_of) >= _GOOD_PART
-        ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
-        columns = (own, self._cap_area / body_area, of_all / body_area, *depths, smooth, ring, is_tube, is_end)
-        return [_Hole(*row) for row in zip(loops, *(column.tolist() for column in columns), strict=True)]
+        self._is_small = (smooth | ~is_ring | is_tube) & (of_all <= np.where(is_end, _END, HOLE_SHARE))
+        # It looks as if faces were missing: small, with few edges, and smooth or a single triangle.
+        damage = (lengths <= _DAMAGE_EDGES) & (share <= _DAMAGE) & (smooth | (lengths == 3))
+        if damage.sum() >= max(_DAMAGED, _GOOD_PART * len(own)):
+            damage |= ((share <= HOLE_SHARE) | (self.depth <= HOLE) | smooth) & (share <= _DAMAGE)
+        else:
+            damage &= ~is_ring
+        for hole in np.flatnonzero(damage & (self.depth > self._gap)).tolist():
+            damage[hole] = not self._is_plugged(hole)
+        self._is_damage = damage
 
-    def _is_plugged(self, hole: _Hole) -> bool:
-        """Whether the cap leads away from the surface, and another body, such as a basin, lies all along the hole."""
-        if hole.depth <= self._gap:
-            return False
-        others = self._soup.faces[self._body != hole.body]
-        corners = self._soup.vertices[hole.loop]
+    def _is_plugged(self, hole: int) -> bool:
+        """Whether another body, such as a basin, lies all along a hole."""
+        others = self._soup.faces[self._body != self.body[hole]]
+        corners = self._soup.vertices[self._rims.loops[hole]]
         middles = (corners + np.roll(corners, -1, axis=0)) / 2
         poll_stop()
         query = SurfaceQuery(self._soup.vertices, others)
         return len(others) > 0 and bool((query.distance(np.concatenate([corners, middles])) <= self._gap).all())
 
+    def leading_away(self, depth: FloatArray) -> BoolArray:
+        """Return ``[bodies]`` the bodies with a cap that leads farther away from the surface, ``[H]``, than it may."""
+        may_lead = self._is_damage | (self._is_small & (depth <= HOLE))
+        return marked(self.body[(depth > 0) & ~may_lead], self._bodies)
+
     def may_be_closed(self) -> BoolArray:
         """Return ``[bodies]`` the bodies all of whose holes may be closed."""
-        chosen = marked(self._body_of_hole, self._bodies)
-        if not self._fill:
-            chosen[[hole.body for hole in self.holes if hole.reached and not hole.may_lead(hole.reached)]] = False
-        return chosen
+        chosen = marked(self.body, self._bodies)
+        return chosen if self._fill else chosen & ~self.leading_away(self.reached)
 
-    def added(self, chosen: BoolArray) -> tuple[Soup, BoolArray]:
-        """The soup with the caps of chosen bodies ``[bodies]``, and which of its faces are flaps."""
-        soup, rims, own = self._soup, self._rims, self._body_of_hole[self._hole_of]
+    def added(self, chosen: BoolArray) -> Soup:
+        """The soup with the caps of chosen bodies ``[bodies]``."""
+        soup, rims, own = self._soup, self._rims, self.body[self._hole_of]
         some, whole = chosen[own], chosen[self._body]
         turned = np.where((whole & rims.inverted)[:, None], soup.faces[:, ::-1], soup.faces)
         faces = np.concatenate([turned, self._faces[some]])
         owners = np.concatenate([np.where(whole, self._body, soup.body), own[some]])
-        no_cap = np.zeros(int(some.sum()), dtype=bool)
-        kept = first_of_doubled(faces, len(soup.vertices))
-        # Where more than two faces met without caps, which of them continue each other is a guess.
-        sure = whole & ~rims.flap & ~soup.at_edges(soup.edges.face_count > 2)
-        before = ~whole & (False if soup.trusted is None else soup.trusted)
-        trusted = np.concatenate([sure | before, ~no_cap])
-        flap = np.concatenate([rims.flap, no_cap])[kept]
-        return trust_windings(Soup(soup.vertices, faces, owners, trusted).only(kept), self._bodies, flap), flap
+        return Soup(soup.vertices, faces, owners).only(first_of_doubled(faces, len(soup.vertices)))
 
-    def useful(self, chosen: BoolArray, closed: Soup, flap: BoolArray) -> BoolArray:
+    def useful(self, chosen: BoolArray, closed: Soup) -> BoolArray:
         """Return ``[bodies]`` the chosen bodies to which caps give an inside: a strip whose cap lies on it has none."""
         volume = np.bincount(closed.body_of_side, np.maximum(closed.sides.volume, 0), self._bodies)
         has_volume = volume > HALF_THICKNESS / 2 * np.bincount(closed.body, closed.area, self._bodies)
-        has_inside = np.asarray(chosen & has_volume & (closed.sheet_share(self._bodies, flap) <= FLAPS))
+        has_inside = np.asarray(chosen & has_volume & (closed.share(closed.sides.sheet, self._bodies) <= FLAPS))
         # Caps that lead away from the surface may cross the body, and turn it inside out in places.
-        for one in {hole.body for hole in self.holes if hole.depth > self._gap and has_inside[hole.body]}:
-            faces = closed.faces[(closed.body == one) & ~flap]
+        for one in np.flatnonzero(marked(self.body[self.depth > self._gap], self._bodies) & has_inside):
+            faces = closed.faces[closed.body == one]
             outward = faces if signed_tetrahedra(closed.vertices, faces).sum() > 0 else faces[:, ::-1]
             has_inside[one] = not is_tangle(SurfaceQuery(closed.vertices, outward))
         return has_inside
 
-    def by_hidden_caps(self) -> BoolArray:
-        """Return ``[bodies]`` the bodies that are closed only because nothing can reach some of their caps."""
-        hidden = [hole.body for hole in self.holes if hole.hidden and not hole.may_lead(hole.hidden)]
-        return marked(np.array(hidden, dtype=np.int64), self._bodies)
-
-    def bodies_of(self, chosen: BoolArray) -> Int64Array:
-        """The numbers of all bodies that share a hole with a chosen one ``[bodies]``."""
-        return np.flatnonzero(chosen[self._joined])
-
     def described(self, chosen: BoolArray) -> list[Hole]:
         """The holes of chosen bodies ``[bodies]``, and those of bodies to which caps would give an inside."""
         said = chosen | (self._volume > self._gap * self._area)  # less is a leaf or cloth
-        return [one.described(bool(chosen[one.body]), self._soup.vertices) for one in self.holes if said[one.body]]
+        holes = np.flatnonzero(said[self.body]).tolist()
+        return [self._described(hole, bool(chosen[self.body[hole]])) for hole in holes]
 
-
-def may_have_holes(state: State) -> bool:
-    """Whether bodies have free edges, and may be closed."""
-    free = int((state.soup.edges.face_count == 1).sum())
-    return 0 < free <= MOST_FREE_EDGES and state.wanted.open_bodies != "thin"
+    def _described(self, hole: int, is_closed: bool) -> Hole:
+        """The hole as the report lists it."""
+        corners = self._soup.vertices[self._rims.loops[hole]]
+        centre = corners.mean(axis=0)
+        width = 2 * float(np.linalg.norm(corners - centre, axis=1).max())
+        x, y, z = centre.tolist()
+        depth = float(self.reached[hole]) if is_closed else 0.0
+        return Hole(int(self.body[hole]), (x, y, z), width, is_closed, bool(self.is_smooth[hole]), depth)
 
 
 def close_holes(state: State) -> None:
     """Cap the bodies all of whose holes may be closed."""
+    free = int((state.soup.edges.face_count == 1).sum())
+    if not 0 < free <= MOST_FREE_EDGES or state.wanted.open_bodies == "thin":
+        return
     rims = rims_of(state.soup)
     if not rims.loops:
         return
     caps = _Caps(state, rims)
     chosen = caps.may_be_closed()
-    closed, flap = caps.added(chosen)
-    useful = caps.useful(chosen, closed, flap)
-    if (useful != chosen).any():
-        closed, _ = caps.added(useful)
-    state.note(caps.bodies_of(useful), "capped")
-    state.by_hidden_caps |= useful & caps.by_hidden_caps()
+    closed = caps.added(chosen)
+    useful = caps.useful(chosen, closed)
+    state.note(np.flatnonzero(useful[caps.joined]), "capped")
+    state.by_hidden_caps |= useful & caps.leading_away(caps.hidden)
     state.holes = caps.described(useful)
-    if useful.any():
-        state.soup = closed
+    state.soup = closed if (useful == chosen).all() else caps.added(useful)
 
 
 def _is_round(points: FloatArray) -> bool:

@@ -20,26 +20,14 @@ from rlacd import _native
 from rlacd._native import face_areas, poll_stop
 from rlacd.errors import EmptyMeshError
 from rlacd.memory import BYTES_REPAIRED, require_memory
-from rlacd.repair.distance import SurfaceQuery, is_tangle, probes
-from rlacd.repair.holes import close_holes, may_have_holes
-from rlacd.repair.soup import MOST_PATCHES, Soup, trust_windings
+from rlacd.repair.distance import SurfaceQuery, is_tangle
+from rlacd.repair.holes import close_holes
+from rlacd.repair.soup import MOST_PATCHES, Soup
 from rlacd.repair.state import Piece, State, Wanted, measure, query_of
 from rlacd.repair.union import CrossingsError, hull_of_points, one_body, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP
-from rlacd.repair.walls import build_slabs, build_walls, has_sheets, skins
-from rlacd.repair.wraps import (
-    fill_slits,
-    fill_voids,
-    is_crowd,
-    is_inside_out,
-    is_thicket,
-    keep_apart,
-    may_have_slits,
-    may_have_voids,
-    rebuild_tangles,
-    wrap_all,
-    wrap_sheets,
-)
+from rlacd.repair.walls import build_walls, skins
+from rlacd.repair.wraps import fill_slits, fill_voids, rebuild_tangles, wrap_all
 from rlacd.report import BodyRepair
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.component import DENSE
@@ -51,31 +39,15 @@ from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of its grid."""
 
-
-def _always(state: State) -> bool:
-    return True
-
-
-def _are_crowded(state: State) -> bool:
-    """Whether more than two faces meet in an edge."""
-    return bool((state.soup.edges.face_count > 2).any())
-
-
-def _sort_out(state: State) -> None:
-    """Find the sides of crowded bodies by windings where angles fail."""
-    state.soup = trust_windings(state.soup, state.bodies)
-
-
-def _is_nothing(state: State) -> bool:
-    return state.volume == 0
-
-
-def _may_have_lost(state: State) -> bool:
-    return not (_is_nothing(state) or state.is_apart)
+# Points at which a triangle is tested for lying inside a body, into which it may lead, or out of which: near its
+# corners, its edges, its middle.
+_PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
 
 def _take_hull(state: State) -> None:
-    """Take the convex hull of all points."""
+    """Take the convex hull of all points if there is nothing else."""
+    if state.volume != 0:
+        return
     state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
     state.note(np.arange(state.bodies), "hull")
     state.solid = hull_of_points(state.surface.vertices)
@@ -87,6 +59,8 @@ def _keep_lost(state: State) -> None:
 
     So does closing cracks, of needles.
     """
+    if state.volume == 0 or state.is_apart:
+        return
     lost, own = measure(state), state.surface
     body, is_gone = state.body_of_input[lost], state.is_gone[lost]
     walls, needles = own.faces[lost[~is_gone]], np.unique(body[is_gone]).tolist()
@@ -104,25 +78,15 @@ def _keep_lost(state: State) -> None:
     state.lost[body] = HALF_THICKNESS
 
 
-STEPS: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
-    (_are_crowded, _sort_out),
-    (may_have_holes, close_holes),
-    (_always, build_walls),
-    (is_thicket, keep_apart),
-    (is_crowd, wrap_sheets),
-    (has_sheets, build_slabs),
-    (_always, State.unite_parts),
-    (is_inside_out, rebuild_tangles),
-    (may_have_voids, fill_voids),
-    (may_have_slits, fill_slits),
+STEPS: tuple[Callable[[State], None], ...] = (
+    close_holes,
+    build_walls,
+    State.unite_parts,
+    rebuild_tangles,
+    fill_voids,
+    fill_slits,
 )
-"""Conditions and actions of a repair, in their order."""
-
-AT_LAST: tuple[tuple[Callable[[State], bool], Callable[[State], None]], ...] = (
-    (_may_have_lost, _keep_lost),
-    (_is_nothing, _take_hull),
-)
-"""The last ones, also where bodies cross too often to be united."""
+"""The steps of a repair, in their order: each changes nothing where it is not needed."""
 
 
 def repair(
@@ -207,30 +171,23 @@ def _repaired(
         body = BodyRepair(0, "hull", len(mesh.faces), solid.num_tri(), 0.0)
         return Solid(solid, surface, frame, (body,), (*mesh.warnings, said))
     state = State(SurfaceQuery(vertices, faces, threads), frame, wanted)
-    _take_steps(state)
-    return state.result(mesh.warnings)
-
-
-def _take_steps(state: State) -> None:
     try:
-        for is_needed, step in STEPS:
+        for step in STEPS:
             poll_stop()
-            if is_needed(state):
-                step(state)
+            step(state)
     except CrossingsError:
         wrap_all(state)
-    for is_needed, step in AT_LAST:
-        if is_needed(state):
-            step(state)
+    _keep_lost(state)
+    _take_hull(state)
+    return state.result(mesh.warnings)
 
 
 def _is_inside(vertices: FloatArray, faces: Int64Array, sliver: BoolArray, threads: int | None) -> BoolArray:
     """Return ``[F]`` which slivers lie inside the other faces: where two bodies touch."""
     inside = sliver.copy()
     if sliver.any():
-        query = SurfaceQuery(vertices, faces[~sliver], threads)
-        still = np.ones(int(sliver.sum()), dtype=bool)
-        for points in probes(vertices, faces[sliver]).swapaxes(0, 1):  # most slivers fail at the first
-            still[still] = np.abs(query.winding(points[still])) > 0.75
-        inside[sliver] = still
+        corners = vertices[faces[sliver]][:, None]
+        points = sum(_PROBES[:, k, None] * corners[:, :, k] for k in range(3))
+        winding = SurfaceQuery(vertices, faces[~sliver], threads).winding(np.reshape(points, (-1, 3)))
+        inside[sliver] = (np.abs(winding).reshape(-1, len(_PROBES)) > 0.75).all(axis=1)
     return inside

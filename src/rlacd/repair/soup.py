@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
 
 FLAPS = 0.05
-"""Greatest share of a solid's area that faces sticking out of it may have, flaps not counted."""
+"""Greatest share of a solid's area that faces sticking out of it may have."""
 
 MOST_UNITED = 4000
 """Most meshes united: more are composed, since uniting takes time for each even if none overlap."""
@@ -32,13 +32,12 @@ _FOLD = 0.94
 class Soup:
     """Faces during repair; `body` ``[F]`` is the body of each, by numbers that stay the same throughout.
 
-    The windings of `trusted` faces have been checked and corrected. `known_edges` are those of the faces, if known.
+    `known_edges` are those of the faces, if known.
     """
 
     vertices: FloatArray
     faces: Int64Array
     body: Int64Array
-    trusted: BoolArray | None = None
     known_edges: Edges | None = None
 
     @cached_property
@@ -48,8 +47,27 @@ class Soup:
 
     @cached_property
     def sides(self) -> Sides:
-        """The components that the sides of the faces form."""
-        return sides_of(self.vertices, self.faces, self.edges, self.trusted)
+        """The components that the sides of the faces form.
+
+        Around an edge, faces follow each other by their angles; in closed bodies by their windings, if angles join the
+        inside with the outside. Where corners were rounded, slivers fold over, and noise turns faces that nearly lie in
+        one plane: then angles around an edge with four faces are wrong.
+        """
+        by_angles = sides_of(self.vertices, self.faces, self.edges)
+        is_crowded = self.edges.face_count > 2
+        if not is_crowded.any():
+            return by_angles
+        is_uneven = ~is_balanced(self.faces, self.edges)
+        crowded, uneven = (
+            marked(self.body[self.at_edges(some)], int(self.body.max()) + 1) for some in (is_crowded, is_uneven)
+        )
+        share = self.share(by_angles.sheet)
+        doubted = crowded & ~uneven & (share > FLAPS)
+        if not doubted.any():
+            return by_angles
+        by_windings = sides_of(self.vertices, self.faces, self.edges, doubted[self.body])
+        better = doubted & (self.share(by_windings.sheet) < share / 2)
+        return sides_of(self.vertices, self.faces, self.edges, better[self.body])
 
     @cached_property
     def area(self) -> FloatArray:
@@ -67,10 +85,10 @@ class Soup:
         result[self.sides.label] = np.repeat(self.body, 2)
         return result
 
-    def sheet_share(self, bodies: int, flap: BoolArray | bool = False) -> FloatArray:
-        """Return ``[bodies]`` the share of the area of each body that has no inside and is no flap."""
-        sheet = np.bincount(self.body, self.area * (self.sides.sheet & ~np.asarray(flap)), bodies)
-        share: FloatArray = sheet / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
+    def share(self, faces: BoolArray, bodies: int = 0) -> FloatArray:
+        """Return ``[bodies]`` the share of the area of each body that some faces ``[F]`` have."""
+        some = np.bincount(self.body, self.area * faces, bodies)
+        share: FloatArray = some / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
         return share
 
     def in_patches(self) -> Soup:
@@ -102,39 +120,7 @@ class Soup:
         """The marked faces; the same soup if these are all."""
         if keep.all():
             return self
-        trusted = None if self.trusted is None else self.trusted[keep]
-        return Soup(self.vertices, self.faces[keep], self.body[keep], trusted)
-
-
-def trust_windings(soup: Soup, bodies: int, flap: BoolArray | bool = False) -> Soup:
-    """Trust the windings of closed bodies if the angles between their faces join the inside with the outside.
-
-    Where corners were rounded, slivers fold over, and noise turns faces that nearly lie in one plane: then angles
-    around an edge with four faces are wrong.
-
-    Parameters
-    ----------
-    soup
-    bodies
-        Number of bodies.
-    flap
-        Faces ``[F]`` that need no inside.
-    """
-    is_crowded = soup.edges.face_count > 2
-    if not is_crowded.any():
-        return soup
-    crowded = marked(soup.body[soup.at_edges(is_crowded)], bodies)
-    uneven = marked(soup.body[soup.at_edges(~is_balanced(soup.faces, soup.edges))], bodies)
-    if not (crowded & ~uneven).any():
-        return soup
-    share = soup.sheet_share(bodies, flap)
-    doubted = crowded & ~uneven & (share > FLAPS)
-    if not doubted.any():
-        return soup
-    before = False if soup.trusted is None else soup.trusted
-    trusting = replace(soup, known_edges=soup.edges, trusted=before | doubted[soup.body])
-    better = doubted & (trusting.sheet_share(bodies, flap) < share / 2)
-    return replace(soup, known_edges=soup.edges, trusted=before | better[soup.body]) if better.any() else soup
+        return Soup(self.vertices, self.faces[keep], self.body[keep])
 
 
 def _layers(corners: FloatArray, patch: Int64Array) -> float:
@@ -154,11 +140,6 @@ def boxes_of(corners: FloatArray, patch: Int64Array) -> tuple[FloatArray, FloatA
     return lower, upper
 
 
-def no_faces(vertices: FloatArray) -> Soup:
-    """No faces."""
-    return Soup(vertices, np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64))
-
-
 def across(vertices: FloatArray, faces: Int64Array, halfedges: Int64Array) -> FloatArray:
     """Return the unit direction ``[N, 3]`` in which each halfedge's face leads away from it."""
     face, corner = halfedges // 3, halfedges % 3
@@ -173,12 +154,3 @@ def face_normals(vertices: FloatArray, faces: Int64Array) -> FloatArray:
     """Return ``[F, 3]`` the unit normals of faces; zero for those without an area."""
     normal = long_normals(vertices, faces)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny))
-
-
-def on_repeated_edge(faces: Int64Array, count: int) -> BoolArray:
-    """Return ``[F]`` which faces have a directed edge that another face has too."""
-    key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
-    poll_stop()
-    _, inverse, number = np.unique(key, return_inverse=True, return_counts=True)
-    result: BoolArray = (number[inverse.reshape(-1, 3)] > 1).any(axis=1)
-    return result

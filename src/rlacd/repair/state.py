@@ -8,14 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 from manifold3d import Manifold
-from numpy.typing import ArrayLike
 
 from rlacd import _native
 from rlacd._native import face_areas, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import close_cracks
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
-from rlacd.repair.soup import Soup, no_faces
-from rlacd.repair.union import Cavities, emptied, hollowed, size_of, to_arrays, unite, unite_and_fill, volume_of
+from rlacd.repair.soup import Soup
+from rlacd.repair.union import Walls, cavities_in, emptied, hollowed, to_arrays, unite, unite_and_fill
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.report import BodyRepair
 from rlacd.solid.arrays import BoolArray, Int64Array
@@ -66,13 +65,13 @@ class Piece(NamedTuple):
 
     Attributes
     ----------
-    shape : Manifold or (vertices, faces)
+    shape : Manifold
     body : int
     is_slab : bool
         Whether it was built of sheets.
     """
 
-    shape: Shape
+    shape: Manifold
     body: int
     is_slab: bool = False
 
@@ -97,14 +96,12 @@ class State:
         Greatest distance of the repaired surface from the input, and of input outside the solid from the solid.
     soup : Soup
         The faces of the input, with the caps.
-    sheets : Soup
-        The faces that become slabs, in patches.
     parts : list of Piece
         The solids built so far.
-    solid : Manifold or (vertices, faces)
+    solid : Manifold
         The union of `parts`, with cavities filled or kept.
-    cavities : Cavities
-        Filled cavities that windings bound.
+    cavity_walls : (vertices, faces), optional
+        Walls of filled cavities that windings bound.
     by_hidden_caps, is_tangled : bool [bodies]
         Whether a body was capped only because nothing can reach the caps; whether it was built without its windings.
     is_apart : bool
@@ -115,10 +112,7 @@ class State:
 
     def __init__(self, surface: SurfaceQuery, frame: Frame, wanted: Wanted) -> None:
         self.surface, self.wanted, self.frame = surface, wanted, frame
-        edges = Edges.of(surface.faces, len(surface.vertices))
-        faces, origin = close_cracks(surface.vertices, surface.faces, edges, _WELDS)
-        if faces is not surface.faces:
-            edges = Edges.of(faces, len(surface.vertices))
+        faces, origin, edges = close_cracks(surface.vertices, surface.faces, _WELDS)
         self.bodies, body = bodies_of(faces, edges)
         self.body_of_input = np.zeros(len(surface.faces), dtype=np.int64)
         self.body_of_input[origin] = body
@@ -127,20 +121,19 @@ class State:
         self.beyond, self.lost = np.zeros((2, self.bodies))
         self.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
         self.soup = Soup(surface.vertices, faces, body, known_edges=edges)
-        self.sheets = no_faces(surface.vertices)
         self.parts: list[Piece] = []
-        self.solid: Shape = Manifold()
-        self.cavities = Cavities()
+        self.solid = Manifold()
+        self.cavity_walls: Walls | None = None
         self.by_hidden_caps, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
         self.is_apart = False
         self.holes: list[Hole] = []
         self.warnings: list[str] = []
-        self._asked: tuple[Shape, SurfaceQuery] | None = None
+        self._asked: tuple[Manifold, SurfaceQuery] | None = None
 
     @cached_property
     def reach(self) -> Reach:
         """Where the ball can go."""
-        return Reach.of(self.surface.vertices, self.surface.faces, self.wanted.gap, self.wanted.cells)
+        return Reach(self.surface.vertices, self.surface.faces, self.wanted.gap, self.wanted.cells)
 
     def query(self) -> SurfaceQuery:
         """Queries of the solid as it is now."""
@@ -160,7 +153,7 @@ class State:
     @property
     def volume(self) -> float:
         """Volume of the solid."""
-        return volume_of(self.solid)
+        return float(self.solid.volume())
 
     def set_apart(self, faces: Int64Array) -> None:
         """Make bodies of their own of faces of the input, which become slabs."""
@@ -181,19 +174,19 @@ class State:
         inward = np.bincount(self.soup.body, signed_tetrahedra(self.soup.vertices, self.soup.faces), self.bodies) < 0
         is_wound = [not (part.is_slab or self.is_tangled[part.body]) for part in self.parts]
         wound = [part for part, is_one in zip(self.parts, is_wound, strict=True) if is_one]
-        rest = [part.shape for part, is_one in zip(self.parts, is_wound, strict=True) if not is_one]
         closed = [part.shape for part in wound]
+        rest = [part.shape for part, is_one in zip(self.parts, is_wound, strict=True) if not is_one]
         bounded = hollowed(closed, [bool(inward[part.body]) for part in wound])
         if self.wanted.keep_cavities:
             self.solid = unite([*bounded, *rest], keep_cavities=True)
             return
-        self.solid, self.cavities = unite_and_fill([part.shape for part in self.parts])
-        if bounded is not closed or (rest and self.cavities.count):
-            filled, self.cavities = unite_and_fill(bounded)
+        self.solid, self.cavity_walls = unite_and_fill([part.shape for part in self.parts])
+        if bounded is not closed or (rest and self.cavity_walls):
+            filled, self.cavity_walls = unite_and_fill(bounded)
             if bounded is not closed:
                 whole = unite(closed) if rest else self.solid
-                if volume_of(whole) - volume_of(filled) > _CREVICES * volume_of(whole):
-                    self.cavities = emptied(whole, bounded)
+                if whole.volume() - filled.volume() > _CREVICES * whole.volume():
+                    self.cavity_walls = emptied(whole, bounded)
 
     def of_bodies(self, marked: BoolArray) -> Soup:
         """The faces of marked bodies."""
@@ -205,7 +198,7 @@ class State:
         self._warn_of_cavities()
         faces_out = np.zeros(self.bodies, dtype=np.int64)
         for part in self.parts:
-            faces_out[part.body] += size_of(part.shape)
+            faces_out[part.body] += part.shape.num_tri()
         faces_in = np.bincount(self.body_of_input, minlength=self.bodies)
         columns = self.step, faces_in, faces_out, np.maximum(self.beyond, self.lost)
         rows = zip(*(column.tolist() for column in columns), strict=True)
@@ -220,15 +213,16 @@ class State:
             is_apart=self.is_apart,
             index=self.surface.index,
             pieces=[part.shape for part in self.parts] if len(self.parts) > 1 and not self.wanted.keep_cavities else [],
-            cavity_walls=self.cavities.walls,
+            cavity_walls=self.cavity_walls,
         )
 
     def _warn_of_cavities(self) -> None:
         """Say which cavities were filled, unless that changes nothing but crevices between walls that nearly touch."""
-        if self.cavities.walls is None or -volume_of(self.cavities.walls) < _CREVICES * self.volume:
+        walls = self.cavity_walls
+        if walls is None or -_native.mesh_volume(*walls) < _CREVICES * self.volume:
             return
-        volume = self.frame.told_in.cubic_words(-mass_of(*self.cavities.walls, self.frame).volume_abs)
-        said = "1 closed cavity was" if self.cavities.count == 1 else f"{self.cavities.count} closed cavities were"
+        volume, count = self.frame.told_in.cubic_words(-mass_of(*walls, self.frame).volume_abs), cavities_in(walls)
+        said = "1 closed cavity was" if count == 1 else f"{count} closed cavities were"
         self.warnings.append(
             f"{said} filled, as nothing can get in (volume {volume}, which the mass leaves out); --keep-cavities "
             "(keep_cavities=True) keeps what is closed empty."
@@ -255,11 +249,8 @@ class State:
 
     def _places(self, holes: list[Hole]) -> str:
         """Where holes are, the most doubtful first."""
-        named = "; ".join(self._place(hole.at, hole.body) for hole in holes[:_NAMED])
-        return named + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
-
-    def _place(self, point: ArrayLike, body: int) -> str:
-        return self.frame.place(point, body if self.bodies > 1 else None)
+        some = [self.frame.place(hole.at, hole.body if self.bodies > 1 else None) for hole in holes[:_NAMED]]
+        return "; ".join(some) + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
 
 
 def measure(state: State) -> Int64Array:

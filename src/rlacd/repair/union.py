@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from manifold3d import Manifold, OpType
-from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd._native import poll_stop
@@ -34,6 +33,10 @@ _MOST_CROSSINGS, _PER_TRIANGLE = 200_000, 5
 
 # Depth of the points that tell where a solid lies: far more than rounding, far less than a slab is thick.
 _HAIR = 1e-6
+
+
+Walls: TypeAlias = tuple[FloatArray, IntArray]
+"""Vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]`` around cavities and what stands in them."""
 
 
 class CrossingsError(Exception):
@@ -63,32 +66,6 @@ def one_body(vertices: FloatArray, faces: IntArray) -> tuple[tuple[FloatArray, I
     return _native.along_a_curve(vertices, outward), volume < 0
 
 
-def as_manifold(solid: Shape) -> Manifold:
-    """Return a solid in the form that booleans take."""
-    return solid if isinstance(solid, Manifold) else to_manifold(*solid)
-
-
-def volume_of(solid: Shape) -> float:
-    """Return the volume of a solid."""
-    return solid.volume() if isinstance(solid, Manifold) else _native.mesh_volume(*solid)
-
-
-def area_of(solid: Shape) -> float:
-    """Return the surface area of a solid."""
-    return solid.surface_area() if isinstance(solid, Manifold) else _native.mesh_area(*solid)
-
-
-def size_of(solid: Shape) -> int:
-    """Return the number of triangles of a solid."""
-    return solid.num_tri() if isinstance(solid, Manifold) else len(solid[1])
-
-
-def tunnels_in(solid: Shape) -> int:
-    """Return the number of tunnels through a solid, less one for each of its surfaces but the first."""
-    vertices = solid.num_vert() if isinstance(solid, Manifold) else len(solid[0])
-    return 1 - (vertices - size_of(solid) // 2) // 2
-
-
 def hull_of_points(points: FloatArray) -> Manifold:
     """Return the hull of points ``[N, 3]``, thickened along the axes in which they have no extent."""
     poll_stop()
@@ -97,49 +74,24 @@ def hull_of_points(points: FloatArray) -> Manifold:
 
 def slab_of_faces(vertices: FloatArray, faces: Int64Array) -> Manifold:
     """Return the union of triangles, each of them thickened."""
-    return as_manifold(unite([hull_of_points(vertices[face]) for face in faces]))
+    return unite([hull_of_points(vertices[face]) for face in faces])
 
 
-def split_labels(vertices: FloatArray, faces: Int64Array, label: Int64Array) -> list[tuple[FloatArray, Int64Array]]:
-    """Split a mesh into the faces of each label, in ascending order of the labels."""
-    if len(label) and (label == label[0]).all():
-        return [compacted(vertices, faces)]
-    order = np.argsort(label, kind="stable")
-    cuts = np.flatnonzero(np.diff(label[order])) + 1
-    parts = []
-    for some in np.split(order, cuts) if len(order) else []:
-        poll_stop()
-        used, index = np.unique(faces[some], return_inverse=True)
-        parts.append((vertices[used], index.reshape(-1, 3).astype(np.int64)))
-    return parts
-
-
-@dataclass(frozen=True)
-class Cavities:
-    """Cavities of a solid that were filled.
-
-    Attributes
-    ----------
-    count : int
-    walls : (vertices, faces), optional
-        The faces dropped to fill them, as they were wound: with those of the filled solid, the surface before.
-    """
-
-    count: int = 0
-    walls: tuple[FloatArray, NDArray[np.int32]] | None = None
-
-
-def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Shape:
+def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Manifold:
     """Unite solids and fill the cavities nothing can reach; see `unite_and_fill`."""
-    if not keep_cavities:
-        return unite_and_fill(solids)[0]
-    united = _all_united(solids)
+    united = _all_united([solid if isinstance(solid, Manifold) else to_manifold(*solid) for solid in solids])
     # More cavity than solid means shells that came out inside out, not cavities.
-    return united if volume_of(united) > 0 else _filled(united)[0]
+    return united if keep_cavities and united.volume() > 0 else _filled(united)[0]
 
 
-def unite_and_fill(solids: Sequence[Shape]) -> tuple[Shape, Cavities]:
-    """Unite solids and fill the cavities that nothing can reach; one given as arrays has none (`one_body`).
+def unite_and_fill(solids: Sequence[Manifold]) -> tuple[Manifold, Walls | None]:
+    """Unite solids and fill the cavities that nothing can reach.
+
+    Returns
+    -------
+    tuple
+        The solid, and the faces dropped to fill cavities as they were wound: with those of the solid, the surface
+        before. None if there were no cavities.
 
     Raises
     ------
@@ -149,67 +101,65 @@ def unite_and_fill(solids: Sequence[Shape]) -> tuple[Shape, Cavities]:
     return _filled(_all_united(solids))
 
 
-def emptied(whole: Shape, bounded: Sequence[Shape]) -> Cavities:
-    """What is solid only in the whole, also where it opens to the outside, at a wall without thickness."""
-    vertices, faces = surface_of(as_manifold(whole) - as_manifold(_all_united(bounded)))
-    shells = _native.closed_bodies(vertices, faces)
+def emptied(whole: Manifold, bounded: Sequence[Manifold]) -> Walls:
+    """Walls of what is solid only in the whole, also where it opens to the outside, at a wall without thickness."""
+    vertices, faces = surface_of(whole - _all_united(bounded))
+    return vertices, np.ascontiguousarray(faces[:, ::-1])
+
+
+def cavities_in(walls: Walls) -> int:
+    """Return the number of cavities that walls bound."""
+    shells = _native.closed_bodies(*walls)
     assert shells is not None, "two faces of a manifold share an edge"
-    return Cavities(int((shells[1] > 0).sum()), (vertices, np.ascontiguousarray(faces[:, ::-1])))
+    return int((shells[1] <= 0).sum())
 
 
-def _all_united(solids: Sequence[Shape]) -> Shape:
-    if len(solids) == 1 and not isinstance(solids[0], Manifold):
-        return solids[0]
-    manifolds = [manifold for solid in solids if not (manifold := as_manifold(solid)).is_empty()]
-    if not manifolds:
+def _all_united(solids: Sequence[Manifold]) -> Manifold:
+    some = [solid for solid in solids if not solid.is_empty()]
+    if not some:
         return Manifold()
-    return Manifold.compose(manifolds) if len(manifolds) > MOST_UNITED else _united(manifolds)
+    return Manifold.compose(some) if len(some) > MOST_UNITED else _united(some)
 
 
-def hollowed(shapes: Sequence[Shape], inward: Sequence[bool]) -> Sequence[Shape]:
+def hollowed(solids: list[Manifold], inward: list[bool]) -> list[Manifold]:
     """Cut cavities out of solids where others, wound inside out, bound them; what stands in a cavity stays.
 
     Parameters
     ----------
-    shapes : sequence of Manifold or (vertices, faces)
-        Each with positive volume.
-    inward : sequence of bool
+    solids
+        None of them is empty.
+    inward
         Which of them the input winds inside out: cavities are wound opposite to the outermost solid around them.
 
     Returns
     -------
-    sequence of Manifold or (vertices, faces)
+    list of Manifold
         The same if there are no cavities.
     """
     if len(set(inward)) < 2:
-        return shapes
-    solids = [as_manifold(shape) for shape in shapes]
-    kept = [i for i, solid in enumerate(solids) if not solid.is_empty()]
-    around = {kept[i]: [kept[j] for j in others] for i, others in enumerate(_around([solids[i] for i in kept]))}
-    outermost = {i: max(around[i], key=lambda j: solids[j].volume(), default=i) for i in kept}
-    cavities = {i for i in kept if inward[i] != inward[outermost[i]]}
+        return solids
+    around = _around(solids)
+    outermost = [max(others, key=lambda j: solids[j].volume(), default=i) for i, others in enumerate(around)]
+    cavities = [i for i, one in enumerate(outermost) if inward[i] != inward[one]]
     if not cavities:
-        return shapes
-    inside: dict[int, list[Manifold]] = {j: [solids[i] for i in sorted(cavities) if j in around[i]] for j in kept}
-    return [solids[j] - as_manifold(unite(inside[j])) if inside[j] else solids[j] for j in kept if j not in cavities]
+        return solids
+    inside = [[solids[i] for i in cavities if j in around[i]] for j in range(len(solids))]
+    return [solids[j] - unite(some) if some else solids[j] for j, some in enumerate(inside) if j not in cavities]
 
 
 def _around(solids: list[Manifold]) -> list[list[int]]:
     """The solids that contain each solid, if it crosses none."""
     boxes = np.reshape([solid.bounding_box() for solid in solids], (-1, 2, 3))
+    points = np.stack([_point_in(solid) for solid in solids])
     around: list[list[int]] = [[] for _ in solids]
     for j, solid in enumerate(solids):
         poll_stop()
         inner = (boxes[:, 0] >= boxes[j, 0]).all(axis=1) & (boxes[:, 1] <= boxes[j, 1]).all(axis=1)
         inner[j] = False
-        if not inner.any():
-            continue
-        vertices, faces = to_arrays(solid)
-        surface = _native.Surface(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int32))
-        candidates = np.flatnonzero(inner)
-        points = np.stack([_point_in(solids[i]) for i in candidates])
-        for i in candidates[surface.winding(points, is_closed=True) > 0]:
-            around[i].append(j)
+        if inner.any():
+            winding = _native.Surface(*surface_of(solid)).winding(points[inner], is_closed=True)
+            for i in np.flatnonzero(inner)[winding > 0]:
+                around[i].append(j)
     return around
 
 
@@ -222,21 +172,20 @@ def _point_in(solid: Manifold) -> FloatArray:
     return np.asarray(vertices[faces[largest]].mean(axis=0) + _HAIR * down)
 
 
-def _filled(solid: Shape) -> tuple[Shape, Cavities]:
+def _filled(solid: Manifold) -> tuple[Manifold, Walls | None]:
     """Fill the cavities: drop the shells that bound them, and what stands in them.
 
     manifold3d's own decomposition takes time in proportion to the number of shells times that of the faces, and noise
     between overlapping walls leaves hundreds of tiny cavities.
     """
-    if not isinstance(solid, Manifold) or solid.is_empty():
-        return solid, Cavities()
     vertices, faces = surface_of(solid)
     shells = _native.closed_bodies(vertices, faces)
-    assert shells is not None, "two faces of a manifold share an edge"
+    if shells is None:  # there are no faces
+        return solid, None
     shell, volume, _, boxes = shells[:4]
     is_cavity = volume <= 0
     if not is_cavity.any() or is_cavity.all():
-        return solid, Cavities()
+        return solid, None
     kept = ~is_cavity
     order = np.argsort(shell, kind="stable")
     begin = np.searchsorted(shell[order], np.arange(len(volume) + 1))  # where the faces of each shell begin
@@ -250,8 +199,7 @@ def _filled(solid: Shape) -> tuple[Shape, Cavities]:
         standing = around.winding(vertices[faces[order[begin[some]], 0]], is_closed=True) < 0
         kept[some[standing]] = False
     is_kept = kept[shell]
-    walls = compacted(vertices, faces[~is_kept])
-    return compacted(vertices, faces[is_kept]), Cavities(int(is_cavity.sum()), walls)
+    return to_manifold(*compacted(vertices, faces[is_kept])), compacted(vertices, faces[~is_kept])
 
 
 def _united(solids: list[Manifold]) -> Manifold:

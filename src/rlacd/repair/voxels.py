@@ -8,7 +8,6 @@ point of its boundary is within about 1.4 radii of the surface.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,9 +21,17 @@ DEFAULT_GAP = 0.03
 """Default radius of the ball, and greatest distance of a cap from the input's surface, in the frame."""
 
 
-@dataclass(frozen=True)
 class Reach:
-    """Reachable space on a grid of cubic cells.
+    """Space that a ball can reach, rolled around a surface on a grid of cubic cells.
+
+    Parameters
+    ----------
+    vertices, faces
+        Of the surface.
+    radius
+        Of the ball.
+    resolution
+        Number of cells along the longest side of the frame.
 
     Attributes
     ----------
@@ -32,36 +39,21 @@ class Reach:
         ``[3]``, the centre of cell (0, 0, 0).
     pitch
         Edge length of a cell.
-    radius
-        Radius of the ball.
     reached
         ``[X, Y, Z]``, cells the ball can cover.
-    occupied
-        ``[X, Y, Z]``, cells of the surface.
     void
         ``[X, Y, Z]``, label of each void: connected cells where the ball fits but which it cannot enter; 0 elsewhere.
     """
 
-    origin: FloatArray
-    pitch: float
-    radius: float
-    reached: BoolArray
-    occupied: BoolArray
-    void: Int64Array
-
-    @classmethod
-    def of(cls, vertices: FloatArray, faces: Int64Array, radius: float, resolution: int) -> Reach:
-        """Roll a ball around a surface; the longest side of the frame has `resolution` cells."""
-        pitch = 2.0 / resolution
-        margin = int(np.ceil(radius / pitch)) + 3
-        origin, marks, shape = _native.mark_cells(vertices, faces.astype(np.int64), pitch / 2, pitch, margin)
-        occupied = np.frombuffer(marks, dtype=bool).reshape(shape)
+    def __init__(self, vertices: FloatArray, faces: Int64Array, radius: float, resolution: int) -> None:
+        self.pitch, self.radius = 2.0 / resolution, radius
+        margin = int(np.ceil(radius / self.pitch)) + 3
+        marked = _native.mark_cells(vertices, faces.astype(np.int64), self.pitch / 2, self.pitch, margin)
+        self.origin, occupied = marked[0], np.frombuffer(marked[1], dtype=bool).reshape(marked[2])
         poll_stop()
-        label = label_cells(~_grown(occupied, radius / pitch)).reshape(occupied.shape)
+        label = label_cells(~_grown(occupied, radius / self.pitch)).reshape(occupied.shape)
         outside = label == label[0, 0, 0]
-        reached = _grown(outside, radius / pitch)
-        void = np.where(outside, 0, label)
-        return cls(origin, pitch, radius, reached, occupied, void)
+        self.reached, self.void = _grown(outside, radius / self.pitch), np.where(outside, 0, label)
 
     def covers(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the ball can reach each point; it can reach all points off the grid."""
@@ -120,14 +112,13 @@ class Reach:
         closest, _ = surface.closest(points)
         away = points - closest
         distance = np.linalg.norm(away, axis=1)
-        attached = distance <= 2 * self.pitch
-        is_free = np.ones(len(points), dtype=bool)
+        is_far = distance > 2 * self.pitch
+        moved = ~is_far
         if solid is not None:
-            is_free[attached] = ~solid.inside(points[attached])
+            moved[moved] = ~solid.inside(points[moved])
         step = thickness / np.maximum(distance, np.finfo(float).tiny)
-        moved = attached & is_free
         points[moved] = (closest + np.minimum(step, 1)[:, None] * away)[moved]
-        _smooth(points, quads, ~attached & is_free)
+        _smooth(points, quads, is_far)
         return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
@@ -171,15 +162,11 @@ def _boundary_squares(solid: BoolArray) -> tuple[FloatArray, Int64Array]:
 
 def _smooth(points: FloatArray, quads: Int64Array, free: BoolArray, rounds: int = 20) -> None:
     """Pull the free points to the mean of their neighbours, in place; the others stay."""
-    if not free.any():
-        return
-    a = quads.ravel()
-    b = quads[:, [1, 2, 3, 0]].ravel()
+    a, b = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
     tail, head = np.concatenate([a, b]), np.concatenate([b, a])
-    some = free[tail]
-    tail, head = tail[some], head[some]
+    tail, head = tail[free[tail]], head[free[tail]]
     degree = np.maximum(np.bincount(tail, minlength=len(points)), 1)
-    for _ in range(rounds):
+    for _ in range(rounds if free.any() else 0):
         poll_stop()
         mean = np.stack([np.bincount(tail, points[head, k], len(points)) for k in range(3)], axis=1)
         points[free] = (mean / degree[:, None])[free]

@@ -9,22 +9,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from manifold3d import Manifold
 
 from rlacd._native import angles, components, poll_stop
 from rlacd.repair.distance import SurfaceQuery, points_covering
-from rlacd.repair.soup import FLAT, Soup, face_normals, on_repeated_edge
+from rlacd.repair.soup import FLAT, Soup, face_normals
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import slab_of_faces, split_labels, to_arrays, volume_of
+from rlacd.repair.union import slab_of_faces, to_arrays
 from rlacd.repair.voxels import DEFAULT_GAP
+from rlacd.repair.wraps import keep_apart, wrap_sheets
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import Shape
 from rlacd.solid.topology import marked, nondegenerate
 
 
 def build_walls(state: State) -> None:
-    """Build what bounds something solid; the rest are sheets."""
+    """Build what bounds something solid, and give the rest, which are sheets, thickness."""
     walls, sheets = walls_and_sheets(state, ())
     state.parts = skins(walls)
     # Where faces of one body cross each other, they may be joined into a wrong skin: then all of them are sheets.
@@ -33,24 +34,16 @@ def build_walls(state: State) -> None:
     if wrong:
         walls, sheets = walls_and_sheets(state, wrong)
         state.parts = skins(walls)
-    state.sheets = sheets.in_patches()
+    sheets = sheets.in_patches()
+    if not (len(sheets.faces) and (keep_apart(state, sheets) or wrap_sheets(state, sheets))):
+        state.parts += skins(sheets, are_slabs=True)
 
 
-def _leads_away(shape: Shape, surface: SurfaceQuery) -> bool:
+def _leads_away(shape: Manifold, surface: SurfaceQuery) -> bool:
     """Whether a skin leads farther away from the input than caps may."""
     vertices, faces = to_arrays(shape)
     points, _ = points_covering(vertices, faces, DEFAULT_GAP)
     return bool((surface.distance(points) > DEFAULT_GAP).any())
-
-
-def has_sheets(state: State) -> bool:
-    """Whether sheets are still to be built."""
-    return len(state.sheets.faces) > 0
-
-
-def build_slabs(state: State) -> None:
-    """Give sheets thickness."""
-    state.parts += [part._replace(is_slab=True) for part in skins(state.sheets)]
 
 
 def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup]:
@@ -58,14 +51,9 @@ def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup
     soup, sides = state.soup, state.soup.sides
     front, back = sides.label[0::2], sides.label[1::2]
     none = FLAT * sides.area
-    sheet_area = np.bincount(front, soup.area * sides.sheet, len(none))
-    # A component that is mostly sheet yet has negative volume joins the inside with the outside: its body is
-    # nowhere solid, so all of it becomes slabs (whose cavities are filled later).
-    leaky = soup.body_of_side[(sides.volume < -none) & (4 * sheet_area > sides.area)]
     solid = sides.volume > none
     flat = np.abs(sides.volume) <= none
-    leaky = np.union1d(leaky, np.array(as_sheets, dtype=np.int64))
-    sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, leaky)
+    sheet = (sides.sheet & (sides.volume >= -none)[front]) | (flat[front] & flat[back]) | np.isin(soup.body, as_sheets)
     wall = (solid[front] | solid[back]) & ~sides.sheet & ~sheet
 
     state.note(soup.body[solid[back] & wall], "reoriented")
@@ -73,11 +61,10 @@ def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup
     state.note(soup.body[soup.at_edges(soup.edges.face_count > 2)], "outer skin")
     state.note(soup.body[sheet], "slab")
     poll_stop()
-    mixed = np.bincount(soup.body[sheet], minlength=state.bodies) > 0
-    return soup.only(~sheet & (wall | ~mixed[soup.body])), soup.only(sheet)
+    return soup.only(~sheet), soup.only(sheet)
 
 
-def skins(soup: Soup) -> list[Piece]:
+def skins(soup: Soup, *, are_slabs: bool = False) -> list[Piece]:
     """Build the outer side components of a soup; sheets and flat bodies get thickness."""
     if len(soup.faces) == 0:
         return []
@@ -91,11 +78,17 @@ def skins(soup: Soup) -> list[Piece]:
     flat = (np.abs(sides.volume) <= none) & ~has_sheet & is_front
     keep = (sides.volume > none) | (has_sheet & (sides.volume >= -none)) | flat
     vertices, faces, label = _untwisted(soup, keep, flat)
-    shapes = split_labels(vertices, faces, label)
-    return [
-        Piece(_solid(soup, shape, one, bool(has_sheet[one] | flat[one])), int(soup.body_of_side[one]))
-        for one, shape in zip(np.unique(label), shapes, strict=True)
-    ]
+    order, pieces = np.argsort(label, kind="stable"), []
+    for some in np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(order) else ():
+        poll_stop()
+        used, corners = np.unique(faces[some], return_inverse=True)
+        side, solid = label[some[0]], to_manifold(vertices[used], corners.reshape(-1, 3))
+        # A sheet narrower than thick may come out inside out: it is built face by face.
+        if (has_sheet[side] or flat[side]) and solid.volume() <= 0:
+            solid = slab_of_faces(soup.vertices, soup.faces[(sides.label.reshape(-1, 2) == side).any(axis=1)])
+        if not solid.is_empty():
+            pieces.append(Piece(solid, int(soup.body_of_side[side]), are_slabs))
+    return pieces
 
 
 def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int64Array, Int64Array]:
@@ -108,7 +101,10 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     if not (soup.edges.face_count > 2).any():
         return vertices, faces, label
     sides, bodies = soup.sides, int(soup.body.max()) + 1
-    pinched = marked(soup.body_of_side[label[on_repeated_edge(faces, len(vertices))]], bodies)
+    edge = (faces * len(vertices) + np.roll(faces, -1, axis=1)).ravel()
+    order = np.argsort(edge, kind="stable")
+    repeated = order[1:][np.diff(edge[order]) == 0] // 3
+    pinched = marked(soup.body_of_side[label[repeated]], bodies)
     # Only if the skin is one piece: volumes of crossing pieces do not add up to those of the insides.
     pinched &= np.bincount(soup.body_of_side, sides.volume > 0, bodies) == 1
     pinched[soup.body[sides.sheet]] = False
@@ -119,15 +115,6 @@ def _untwisted(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray
     vertices, faces, label = _skin(soup, (keep & ~at) | insides, flat)
     faces[insides[label]] = faces[insides[label]][:, ::-1]
     return vertices, faces, label
-
-
-def _solid(soup: Soup, mesh: tuple[FloatArray, Int64Array], side: int, is_thin: bool) -> Shape:
-    """A side component as a solid; a sheet narrower than thick may come out inside out: it is built face by face."""
-    solid = to_manifold(*mesh)
-    if is_thin and volume_of(solid) <= 0:
-        some = (soup.sides.label.reshape(-1, 2) == side).any(axis=1)
-        return slab_of_faces(soup.vertices, soup.faces[some])
-    return solid
 
 
 # A sharp fold would push its vertex far out to keep the distance to both flanks; stop at this multiple.
@@ -169,8 +156,6 @@ def _skin(soup: Soup, keep: BoolArray, flat: BoolArray) -> tuple[FloatArray, Int
         positions += HALF_THICKNESS * _fan_offsets(vertices, faces[face], back, thin[face], fan, number)
     triangles = fan.reshape(-1, 3).copy()
     triangles[back] = triangles[back][:, ::-1]
-    if not is_rim.any():
-        return positions, triangles, sides.label[kept]
     rim_label = sides.label[facing[is_rim, 0]]
     rim_faces, rim_faces_label, centers = _rims(fan[low[:, is_rim]], fan[high[:, is_rim]], rim_label, number)
     return (
@@ -194,15 +179,22 @@ def _rims(
     """Close rims: the faces ``[M, 3]``, their labels, and for every new vertex (from `number` on) a fan at its place.
 
     A rim edge runs from low to high; one side of its face is at the wedge's beginning (fans ``[0]``), one at its end.
+
+    Each rim quad leaves a link between two fans at both of its ends. Two links between the same two fans match each
+    other; where three or more free edges meet in a vertex, longer cycles bound a small polygon, closed here with a fan
+    of triangles around a new central vertex.
     """
     quads = [np.stack([high[0], low[0], low[1]], axis=1), np.stack([high[0], low[1], high[1]], axis=1)]
-    caps, cap_label, centers = _rim_caps(
-        np.concatenate([low[1], high[0]]), np.concatenate([low[0], high[1]]), np.tile(label, 2), number
-    )
+    tail, head = np.concatenate([low[1], high[0]]), np.concatenate([low[0], high[1]])
+    cycle = components(number, tail, head)[1][tail]
+    # Matched pairs need no cap: link (a, b) with (b, a).
+    unmatched = np.flatnonzero(~np.isin(tail * number + head, head * number + tail))
+    tail, head, twice = tail[unmatched], head[unmatched], np.tile(label, 2)
+    _, first, center = np.unique(cycle[unmatched], return_index=True, return_inverse=True)
     poll_stop()
-    rim_faces = np.concatenate([*quads, caps])
+    rim_faces = np.concatenate([*quads, np.stack([tail, head, number + center.reshape(-1)], axis=1)])
     real = nondegenerate(rim_faces)
-    return rim_faces[real], np.concatenate([label, label, cap_label])[real], centers
+    return rim_faces[real], np.append(twice, twice[unmatched])[real], tail[first]
 
 
 def _fan_offsets(
@@ -210,7 +202,10 @@ def _fan_offsets(
 ) -> FloatArray:
     """Return the way ``[number, 3]`` of each fan that leads 1 off all its faces; zero for fans without a sheet."""
     normal = np.repeat(face_normals(vertices, corners) * np.where(back, -1, 1)[:, None], 3, axis=0)
-    angle = _corner_angles(vertices[corners])
+    points = vertices[corners]
+    along, away = (np.roll(points, -k, axis=1) - points for k in (1, 2))
+    angle = angles(np.linalg.norm(np.cross(along, away), axis=2).ravel(), dots(along, away).ravel())
+    poll_stop()
     total = np.stack([np.bincount(fan, angle * normal[:, k], number) for k in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean = np.where(length > 1e-6, total / np.maximum(length, np.finfo(float).tiny), 0.0)
@@ -220,34 +215,3 @@ def _fan_offsets(
     sees_sheet = np.bincount(fan, np.repeat(thin, 3), number) > 0
     far = np.where(sees_sheet, 1 / np.maximum(steepest, 1 / _LONGEST_MITER), 0.0)
     return np.asarray(mean * far[:, None])
-
-
-def _corner_angles(points: FloatArray) -> FloatArray:
-    """Return ``[3 F]`` the angle at each corner of triangles ``[F, 3, 3]``."""
-    poll_stop()
-    along, across = (np.roll(points, -k, axis=1) - points for k in (1, 2))
-    sines = np.linalg.norm(np.cross(along, across), axis=2)
-    return np.asarray(angles(sines.ravel(), dots(along, across).ravel()))
-
-
-def _rim_caps(
-    tail: Int64Array, head: Int64Array, label: Int64Array, number: int
-) -> tuple[Int64Array, Int64Array, Int64Array]:
-    """Close the ends of rims where three or more free edges meet in a vertex.
-
-    Each rim quad leaves a link between two fans at both of its ends. Two links between the same two fans match each
-    other; longer cycles bound a small polygon, closed here with a fan of triangles around a new central vertex.
-
-    Returns the triangles, their labels, and for every central vertex (numbered from `number` on) a fan at its place.
-    """
-    linked = tail != head
-    tail, head, label = tail[linked], head[linked], label[linked]
-    _, cycle = components(number, tail, head)
-    cycle = cycle[tail]
-    # Matched pairs need no cap: link (a, b) with (b, a).
-    key, mate = tail * number + head, head * number + tail
-    unmatched = ~np.isin(key, mate)
-    tail, head, label, cycle = tail[unmatched], head[unmatched], label[unmatched], cycle[unmatched]
-    _, first, center = np.unique(cycle, return_index=True, return_inverse=True)
-    caps = np.stack([tail, head, number + center.reshape(-1)], axis=1) if len(tail) else np.empty((0, 3), np.int64)
-    return caps, label, tail[first] if len(tail) else np.empty(0, np.int64)

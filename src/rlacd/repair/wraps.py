@@ -14,25 +14,14 @@ from rlacd.repair.distance import (
     spread_points,
     tangled_bodies,
 )
-from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals, no_faces
+from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
-from rlacd.repair.union import (
-    Cavities,
-    area_of,
-    as_manifold,
-    hull_of_points,
-    size_of,
-    slab_of_faces,
-    tunnels_in,
-    unite,
-    volume_of,
-)
+from rlacd.repair.union import hull_of_points, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import BoolArray, Int64Array
-from rlacd.solid.component import DENSE, concatenated
+from rlacd.solid.component import DENSE
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
-from rlacd.solid.solid import surface_of
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
 # Least share of the solid's volume of a void of an outer skin that is filled, and greatest of slits: voids in furniture
@@ -54,52 +43,47 @@ _PAIRS_A_FACE = 4
 _CROWD, _CROSSINGS = 300, 1000
 
 
-def is_thicket(state: State) -> bool:
-    """Whether all is sheets that cross so often that their union would be cut into many more pieces than faces."""
-    sheets = state.sheets
+def keep_apart(state: State, sheets: Soup) -> bool:
+    """Make every face of sheets a slab, and unite none, if their union would be cut into many more pieces than faces.
+
+    Returns whether it was done: all has to be sheets, and they have to cross often.
+    """
     most = _PAIRS_A_FACE * len(sheets.faces)
-    if state.parts or not 0 < len(sheets.faces) <= _CROWD:
+    if state.parts or len(sheets.faces) > _CROWD:
         return False
-    return _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] > most
-
-
-def keep_apart(state: State) -> None:
-    """Make every face of sheets a slab, and unite none."""
-    sheets = state.sheets
-    slabs = [surface_of(hull_of_points(sheets.vertices[face])) for face in sheets.faces]
-    state.parts = [Piece(concatenated(slabs), int(sheets.body.min()), is_slab=True)]
-    state.sheets = no_faces(sheets.vertices)
+    if _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] <= most:
+        return False
+    slabs = [hull_of_points(sheets.vertices[face]) for face in sheets.faces]
+    state.parts = [Piece(Manifold.compose(slabs), int(sheets.body.min()), is_slab=True)]
     state.is_apart = True
     state.beyond[:] = HALF_THICKNESS
     state.warnings.append("The sheets cross too often to be united: each face is a slab of its own.")
+    return True
 
 
-def is_crowd(state: State) -> bool:
-    """Whether there are too many sheets, such as leaves or feathers, to be united one by one."""
-    if len(state.sheets.faces) == 0:
-        return False
-    patch = state.sheets.sides.label[0::2]
-    return bool(state.has("slab").sum() > _CROWD) or _crossings(state.sheets, patch) > _CROSSINGS
+def wrap_sheets(state: State, sheets: Soup) -> bool:
+    """Wrap all bodies with sheets as one if these are too many, such as leaves or feathers, to be united one by one.
 
-
-def wrap_sheets(state: State) -> None:
-    """Wrap all bodies with sheets as one."""
+    Returns whether it was done.
+    """
     is_slab = state.has("slab")
+    if is_slab.sum() <= _CROWD and _crossings(sheets, sheets.sides.label[0::2]) <= _CROSSINGS:
+        return False
     soup = state.of_bodies(is_slab)
     points, _ = points_covering(soup.vertices, soup.faces, state.reach.pitch / 2)
     wrap = _wrap(state, state.reach.around_points(points), HALF_THICKNESS / 2)
     if wrap.volume() <= 0:
-        return
+        return False
     state.note(soup.body, "wrapped")
     state.parts = [part for part in state.parts if not is_slab[part.body]]
     state.parts.append(Piece(wrap, int(soup.body.min()), is_slab=True))
-    state.sheets = no_faces(soup.vertices)
+    return True
 
 
 def wrap_all(state: State) -> None:
     """Take what the ball cannot reach from outside all bodies to be solid."""
     gap = state.wanted.gap
-    state.solid, state.cavities = _wrapped(state, state.soup), Cavities()
+    state.solid, state.cavity_walls = _wrapped(state, state.soup), None
     state.note(state.soup.body, "wrapped")
     state.parts = [Piece(state.solid, 0)]
     state.warnings.append(
@@ -108,17 +92,14 @@ def wrap_all(state: State) -> None:
     )
 
 
-def is_inside_out(state: State) -> bool:
-    """Whether some bodies cross too much of their own surface to be cut."""
-    return state.volume != 0 and np.bincount(state.soup.body).min() <= DENSE and is_tangle(state.query())
-
-
 def rebuild_tangles(state: State) -> None:
     """Build bodies that cross themselves from the place of their faces alone, whatever their windings.
 
     A few faces become a slab each. Where they are many, what the ball cannot reach from outside the body is solid.
     """
     soup = state.soup
+    if state.volume == 0 or np.bincount(soup.body).min() > DENSE or not is_tangle(state.query()):
+        return
     tangled = tangled_bodies(state.query(), soup.vertices, soup.faces, soup.body)
     tangled = tangled[~state.has("slab")[tangled]].tolist()  # slabs are thin enough to be cut
     if not tangled:
@@ -138,59 +119,39 @@ def rebuild_tangles(state: State) -> None:
     state.warnings.append(f"{bodies} too often to be cut, so whatever the faces enclose is taken to be solid.")
 
 
-def may_have_voids(state: State) -> bool:
-    """Whether faces that do not touch each other may enclose voids that the ball cannot enter."""
-    return _may_fill(state) and any(_is_large(state, walls) for walls in _walls(state))
-
-
-def _walls(state: State) -> tuple[Soup, Soup]:
-    """Faces that may be walls of voids: sheets and caps that nothing can reach; outer skins."""
-    sheets = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
-    return state.of_bodies(sheets), state.of_bodies(state.has("outer skin") & ~state.is_tangled)
-
-
 def fill_voids(state: State) -> None:
-    """Fill voids with openings too narrow for the ball: all voids that sheets enclose, large ones in outer skins."""
-    reach = state.reach
-    (in_sheets, body), (in_shells, _) = (_voids_near(state, walls) for walls in _walls(state))
-    large = np.unique(in_shells)
-    large = large[reach.volumes(large) >= _SLIT_VOLUME * state.volume]
-    cells = reach.voids_outside(np.setdiff1d(np.union1d(in_sheets, large), 0), state.query())
+    """Fill voids with openings too narrow for the ball: all that sheets enclose, large ones in outer skins."""
+    is_open = (state.has("slab") | state.by_hidden_caps) & ~state.is_tangled
+    walls = state.of_bodies(is_open | (state.has("outer skin") & ~state.is_tangled))
+    if not _may_fill(state) or not _is_large(state, walls) or not state.reach.void.any():
+        return
+    points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
+    reach, void = state.reach, state.reach.voids_near(points)
+    voids = np.setdiff1d(void, 0)
+    is_large = reach.volumes(voids) >= _SLIT_VOLUME * state.volume
+    cells = reach.voids_outside(voids[is_large | np.isin(voids, void[is_open[walls.body[on]]])], state.query())
     if len(cells) == 0:
         return
     wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
-    filled = unite([as_manifold(state.solid), wrap])
-    triangles = size_of(filled) / size_of(state.solid)
-    if volume_of(filled) <= state.volume or area_of(filled) * triangles**_TRIANGLES >= area_of(state.solid):
+    filled = unite([state.solid, wrap])
+    triangles = filled.num_tri() / state.solid.num_tri()
+    bared = filled.surface_area() * triangles**_TRIANGLES
+    if filled.volume() <= state.volume or bared >= state.solid.surface_area():
         return
-    wrapped = np.unique(body[np.isin(in_sheets, reach.void.ravel()[cells])])
+    wrapped = np.unique(walls.body[on[np.isin(void, reach.void.ravel()[cells])]])
+    wrapped = wrapped[is_open[wrapped]]
     state.note(wrapped, "wrapped")
     state.solid = filled
     state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
 
 
-def _voids_near(state: State, walls: Soup) -> tuple[Int64Array, Int64Array]:
-    """For points of faces, the void whose wall each may be, 0 for none, and its body."""
-    if not state.reach.void.any() or not _is_large(state, walls):
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
-    return state.reach.voids_near(points).astype(np.int64), walls.body[on]
-
-
-def may_have_slits(state: State) -> bool:
-    """Whether there may be slits in outer skins and along fillings."""
-    if not _may_fill(state):
-        return False
-    return _is_large(state, state.of_bodies(_with_slits(state))) or tunnels_in(state.solid) > _TUNNELS
-
-
-def _with_slits(state: State) -> BoolArray:
-    has = state.has
-    return (has("outer skin") | has("wrapped") | state.by_hidden_caps) & ~state.is_tangled
-
-
 def fill_slits(state: State) -> None:
-    """Fill slits that nothing can reach: cuts would have to follow them."""
+    """Fill slits in outer skins and along fillings that nothing can reach: cuts would have to follow them."""
+    has = state.has
+    has_slits = (has("outer skin") | has("wrapped") | state.by_hidden_caps) & ~state.is_tangled
+    may_have_slits = _is_large(state, state.of_bodies(has_slits)) or state.solid.genus() > _TUNNELS
+    if not (_may_fill(state) and may_have_slits):
+        return
     query, gap = state.query(), state.wanted.gap
     points, on = spread_points(query.vertices, query.faces, DEFAULT_GAP)
     deep = state.reach.is_deep(points, _DEEP * gap)
@@ -205,11 +166,11 @@ def fill_slits(state: State) -> None:
     if len(points) == 0:
         return
     wrap = _wrap(state, state.reach.around_points(points), _WRAP_ERROR, query)
-    filled = unite([as_manifold(state.solid), wrap])
-    is_little = abs(volume_of(filled) / state.volume - 1) < _SLIT_VOLUME
-    if is_little and area_of(filled) < (1 - _BARED) * area_of(state.solid):
+    filled = unite([state.solid, wrap])
+    is_little = abs(filled.volume() / state.volume - 1) < _SLIT_VOLUME
+    if is_little and filled.surface_area() < (1 - _BARED) * state.solid.surface_area():
         state.solid = filled
-        state.parts.append(Piece(wrap, int(_with_slits(state).argmax())))
+        state.parts.append(Piece(wrap, int(has_slits.argmax())))
 
 
 def _may_fill(state: State) -> bool:
@@ -225,7 +186,7 @@ def _is_large(state: State, walls: Soup) -> bool:
 
 def _wrapped(state: State, soup: Soup) -> Manifold:
     """A solid of all that the ball cannot reach from outside some faces."""
-    reach = Reach.of(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
+    reach = Reach(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
     faces = SurfaceQuery(soup.vertices, soup.faces, state.surface.threads)
     return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)
 
