@@ -46,7 +46,8 @@ take a hundred."""
 
 
 EXACT, EXACT_WORK = 0.02, 0.25e6
-"""Share of the goal under which pieces are exact, and the work that may take: furniture of ten boards takes 0.22e6."""
+"""Share of the goal under which pieces are exact, and the work that may take, if cutting and merging took no more:
+furniture of ten boards takes 0.22e6."""
 
 FEW_SIDES = 6
 """So many planes a part are few: those of a box, if no two boxes share one."""
@@ -243,7 +244,7 @@ class _Decomposer:
         """
         if self.model.proxy is not None or self.problem.root.sides > FEW_SIDES * len(parts) or not may_grow(goal):
             return parts
-        with self.run.limited(EXACT_WORK):
+        with self.run.limited(max(self.run.work.done, EXACT_WORK)):
             finer = goal.scaled(EXACT)
             pieces, left = self.tree.cut_until(finer)
             found = [] if left else grown_parts(pieces, len(parts), finer, self.run)

@@ -189,13 +189,15 @@ class Component(Part):
 
     @property
     def sides(self) -> int:
-        """Number of planes that its faces lie in, to rounding."""
+        """Number of planes that its faces lie in, without the smallest, which hold 1 % of the area."""
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        lengths = np.linalg.norm(normals, axis=1)
-        normals = normals[lengths > 0] / lengths[lengths > 0, None]
-        planes = np.concatenate([normals, dots(normals, corners[lengths > 0, 0])[:, None]], axis=1)
-        return len(np.unique(np.round(planes / FLAT), axis=0))
+        areas = np.linalg.norm(normals, axis=1)
+        normals = normals[areas > 0] / areas[areas > 0, None]
+        planes = np.concatenate([normals, dots(normals, corners[areas > 0, 0])[:, None]], axis=1)
+        _, side = np.unique(np.round(planes / FLAT), axis=0, return_inverse=True)
+        shares = np.sort(np.bincount(side.ravel(), areas[areas > 0] / areas.sum()))
+        return int(np.count_nonzero(np.cumsum(shares) > 0.01))
 
     @cached_property
     def against(self) -> _native.Against:
