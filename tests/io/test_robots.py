@@ -16,6 +16,7 @@ from lxml import etree
 import rlacd
 import rlacd.cli.decompose
 from rlacd.cli.main import app
+from rlacd.cli.terminal import rewrite_summary
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.io.robots import decomposed
 from tests.io.urdf_files import EAR, collisions, urdf, without_collision_meshes, write_ear
@@ -129,7 +130,8 @@ def test_a_link_of_sheets_and_points_is_covered(tmp_path: Path) -> None:
 
 
 def test_lengths_are_shares_of_the_robot_at_rest(lever: Path) -> None:
-    size = np.ptp(np.concatenate([mesh.vertices for mesh in collision_meshes(lever)]), axis=0).max()
+    ball = np.array([[-1, -1, 4], [1, 1, 6]])
+    size = np.ptp(np.concatenate([ball, *(mesh.vertices for mesh in collision_meshes(lever))]), axis=0).max()
     assert size > 10, "the joint turns the hand away"
     for how, length in (({}, 0.015 * size), ({"threshold": 0.1}, 0.05 * size), ({"threshold_abs": 0.2}, 0.2)):
         done = rlacd.rewrite_robot(lever, lever.with_name("out.urdf"), links={"h.nd": 0.01}, threads=1, **how)  # type: ignore[arg-type]
@@ -348,9 +350,53 @@ def test_a_mass_that_follows_from_hulls_is_told(tmp_path: Path) -> None:
 def test_info_shows_the_links_of_a_robot(ear: Path) -> None:
     run = CliRunner().invoke(app, ["info", str(ear)])
     assert run.exit_code == 0, run.output
-    assert re.search(r"2 with collision meshes\n +base +1 mesh +\d+ triangles\n +tip +2 meshes", run.stdout)
+    assert re.search(
+        r"2 that collide, 2 with meshes\n +base +1 mesh +\d+ triangles, 1 box\n +tip +2 meshes", run.stdout
+    )
     facts = json.loads(CliRunner().invoke(app, ["info", str(ear), "--json"]).stdout)
     assert [(link["name"], len(link["meshes"])) for link in facts["links"]] == [("base", 1), ("tip", 2)]
+
+
+def test_links_of_primitives_alone_count_and_are_told(tmp_path: Path) -> None:
+    """For the size, in tables and in the matrix: a mesh of 10 cm between a pole and a ball, 3 m apart."""
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "box.stl")
+    shapes = {"pole": '<cylinder radius="0.1" length="2"/>', "tool": '<mesh filename="box.stl"/>'}
+    shapes |= {"tip": '<sphere radius="0.5"/>', "world": '<box size="9 9 9"/>'}
+    along = '<origin xyz="0 0 0" rpy="0 1.5707963 0"/>'
+    links = [
+        f'<link name="{name}"><collision>{along}<geometry>{shape}</geometry></collision></link>'
+        for name, shape in shapes.items()
+    ]
+    joints = [
+        f"""<joint name="{child}_" type="revolute"><parent link="{parent}"/><child link="{child}"/>
+        <origin xyz="{x} 0 0"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+        for parent, child, x in (("world", "pole", 0), ("pole", "tool", 1.5), ("tool", "tip", 1.5))
+    ]
+    robot = tmp_path / "r.urdf"
+    robot.write_text(f"<robot name='r'>{''.join(links + joints)}</robot>")
+    matrix = tmp_path / "r.srdf"
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", srdf=matrix, samples=10, threads=1)
+    assert done.size == pytest.approx(1 + 3 + 0.5, rel=0.01), "the pole lies along x"
+    assert done.links[1].results[0].report.options["threshold_abs"] == pytest.approx(0.015 * done.size, rel=0.01)
+    assert [(link.name, len(link.hulls), link.primitives) for link in done.links] == [
+        ("pole", 0, 1),
+        ("tool", 1, 0),
+        ("tip", 0, 1),
+    ]
+    assert [link.name for link in done.replaced] == ["tool"]
+    assert re.search(
+        r"\n  pole +1 primitive\n  tool +1 mesh +1 hull +farthest .*\n  tip +1 primitive\n", rewrite_summary(done)
+    )
+    said = {tuple(pair.attrib.values()) for pair in etree.parse(str(matrix)).iterfind("disable_collisions")}
+    assert said == {("pole", "tool", "Adjacent"), ("tool", "tip", "Adjacent"), ("pole", "tip", "Never")}
+    facts = json.loads(CliRunner().invoke(app, ["info", str(robot), "--json"]).stdout)
+    assert [link["primitives"] for link in facts["links"]] == [["cylinder"], [], ["sphere"]]
+    with pytest.raises(OptionError, match="matches the regular expression 'tip': tool"):
+        rlacd.rewrite_robot(robot, tmp_path / "no.urdf", links={"tip": 0.01})
+    robot.write_text(robot.read_text().replace(shapes["tool"], '<box size="0.1 0.1 0.1"/>'))
+    bare = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", srdf=matrix, samples=10, threads=1)
+    assert {tuple(pair.attrib.values()) for pair in etree.parse(str(matrix)).iterfind("disable_collisions")} == said
+    assert bare.path.read_text() == robot.read_text()
 
 
 def test_a_log_tells_which_link_is_under_way(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:

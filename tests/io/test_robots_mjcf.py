@@ -169,6 +169,48 @@ def tensors(model: Any) -> np.ndarray:
     return np.array([turn * inertia @ turn.T for turn, inertia in zip(turns, model.body_inertia, strict=True)])
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_primitives_are_where_mujoco_puts_them(tmp_path: Path, seed: int) -> None:
+    """Of random kinds, sizes and places, stated in every way: by classes, within frames, from one end to the other."""
+    pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    rng = np.random.default_rng(seed)
+    kinds = ["box", "sphere", "capsule", "cylinder", "ellipsoid"]
+
+    def numbers(count: int) -> str:
+        return " ".join(map(repr, rng.normal(size=count).round(3).tolist()))
+
+    def turned() -> str:
+        ways = {"quat": 4, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "euler": 3}
+        way = rng.choice([*ways, "none"])
+        return "" if way == "none" else f'{way}="{numbers(ways[way])}"'
+
+    def geom() -> str:
+        kind, size = rng.choice(kinds), " ".join(map(str, rng.uniform(0.1, 1, 3).round(3)))
+        how = rng.choice(["", 'class="c"', 'class="d"', 'contype="0"', 'contype="0" conaffinity="0"'])
+        if kind != "sphere" and rng.random() < 0.3:
+            return f'<geom type="{kind}" size="{size.split()[0]}" fromto="{numbers(6)}" class="e"/>'
+        own = f'<geom type="{kind}" size="{size}" pos="{numbers(3)}" {turned()} {how}/>'
+        return own if rng.random() < 0.5 else f'<frame pos="{numbers(3)}" {turned()}>{own}</frame>'
+
+    def body(depth: int) -> str:
+        inner = "".join(body(depth - 1) for _ in range(2)) if depth else ""
+        return f'<body pos="{numbers(3)}" {turned()}><joint/>{"".join(geom() for _ in range(3))}{inner}</body>'
+
+    given = """<default><geom friction="1"/><default class="c"><geom size=".3 .3 .3" zaxis="1 2 3"/></default>
+    <default class="d"><geom contype="0" conaffinity="0"/></default><default class="e"/></default>"""
+    (tmp_path / "r.xml").write_text(f"<mujoco>{given}<worldbody>{geom()}{body(3)}</worldbody></mujoco>")
+    robot = read_robot(tmp_path / "r.xml")
+    motion = robot.motion(0, 0)
+    assert list(motion.links) == [one.name for one in robot.bodies], "all that MuJoCo finds to collide"
+    for one, pose, own in zip(robot.bodies, motion.poses[0], motion.solids, strict=True):
+        assert pose == pytest.approx(one.pose, abs=1e-6)
+        both = [sorted(each, key=lambda p: (p.kind, *p.sizes.round(9))) for each in (one.primitives, own.primitives)]
+        for ours, theirs in zip(*both, strict=True):
+            assert ours.kind == theirs.kind
+            assert ours.sizes == pytest.approx(theirs.sizes)
+            assert np.abs(ours.place - theirs.place).max() < 1e-6
+
+
 HAND = """<mujoco>
 <compiler angle="{angle}" eulerseq="xZy" autolimits="true"/>
 <default><default class="c"><geom type="mesh" group="3" quat="1 0 0.2 0"/></default></default>

@@ -72,10 +72,10 @@ _Shape = tuple[str, Sequence[float], FloatArray]
 def _solids(shapes: Iterable[_Shape]) -> Solids:
     primitives, others = list[Primitive](), list[str]()
     for kind, sizes, place in shapes:
-        if kind in PRIMITIVES and min(sizes[: PRIMITIVES[kind]]) > 0:
-            primitives.append(Primitive(kind, sizes, place))
-        else:
+        if (own := Primitive.read(kind, sizes, place)) is None:
             others.append(kind)
+        else:
+            primitives.append(own)
     meshes = others.count("mesh")
     return Solids(primitives, meshes, len(others) - meshes)
 

@@ -166,12 +166,12 @@ def _motion(robot: Robot, samples: int, seed: int) -> tuple[Motion, list[str]]:
 
 def options_of_bodies(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> list[dict[str, Any]]:
     """The options of each body; raises as `decomposed_robot`."""
-    names = [body.name for body in robot.bodies]
+    names, replaced = ([body.name for body in bodies] for bodies in (robot.bodies, robot.replaced))
     lengths: dict[str, float] = {}
     for pattern, length in (asked.links or {}).items():
-        matched = [name for name in names if re.fullmatch(pattern, name)]
+        matched = [name for name in replaced if re.fullmatch(pattern, name)]
         if not matched:
-            known = ", ".join(names)
+            known = ", ".join(replaced)
             raise OptionError(f"no link with a collision mesh matches the regular expression {pattern!r}: {known}.")
         lengths |= dict.fromkeys(matched, length)
     whole = _relative_to_robot(options, robot)
@@ -217,9 +217,9 @@ def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> d
 
 
 def _links(bodies: Sequence[Body], results: Results, motion: Motion) -> Iterator[Moving]:
-    """Those with meshes, and then those that have primitives only."""
+    """Those of the file, and then those whose primitives the motion alone knows."""
     nothing = Surface(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32))
-    solids = motion.solids or [Solids()] * len(bodies)
+    solids = motion.solids or [Solids(body.primitives) for body in bodies]
     for i, (name, own) in enumerate(zip(motion.links, solids, strict=True)):
         moving = _moving(bodies[i], results) if i < len(bodies) else Moving(name, nothing)
         replaced = sum(len(collider.meshes) for collider in bodies[i].colliders) if i < len(bodies) else 0

@@ -24,14 +24,15 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from rlacd.clear import LinkPair, Motion, mjcf_motion
+from rlacd.clear import PRIMITIVES, LinkPair, Motion, Primitive, mjcf_motion
 from rlacd.io.robots.document import Document, Files, HullFiles, opened, unused_stem
 from rlacd.io.robots.matrix import excludes
-from rlacd.io.robots.mjcf_model import FILES, TURNED, Compiler, Defaults, mujoco_reads, read_model
-from rlacd.io.robots.poses import Angles, read_scale
+from rlacd.io.robots.mjcf_model import FILES, TURNED, Compiler, Defaults, geom_numbers, mujoco_reads, read_model
+from rlacd.io.robots.poses import Angles, numbers, read_scale
 from rlacd.io.robots.robot import Body, Collider, MeshFile, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
 from rlacd.options.robots import RobotOptions
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.poses import inverse
 
 SHOWN, HIDDEN = ("0", "1", "2"), "3"
@@ -172,31 +173,48 @@ def read_mjcf(source: Path, files: Files, *, apart: bool) -> Mjcf:
     rewritten = {mesh.asset for mesh in meshes.values()}
     names = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
     relative = [name for name in names if name and not Path(name).is_absolute()]
-    bodies, found = _bodies(geoms, meshes, compiler, apart=apart)
+    primitives = [own for body in bodies_of for own in _primitives(body, defaults, compiler, paired)]
+    bodies, found = _bodies(geoms, primitives, meshes, compiler, apart=apart)
     return Mjcf(
         source, bodies, warnings, 1.0, "z", root, files.references, relative, compiler, [*assets], meshes, found
     )
 
 
 def _bodies(
-    geoms: Sequence[_Geom], meshes: Mapping[str, _Mesh], compiler: Compiler, *, apart: bool
+    geoms: Sequence[_Geom],
+    primitives: Sequence[tuple[Element, Primitive]],
+    meshes: Mapping[str, _Mesh],
+    compiler: Compiler,
+    *,
+    apart: bool,
 ) -> tuple[list[Body], dict[Collider, list[_Geom]]]:
     """Sort geoms by their bodies, and by what may become one solid."""
     of_body: dict[Element, list[_Geom]] = {}
     for geom in geoms:
         of_body.setdefault(geom.body, []).append(geom)
+    others: dict[Element, list[Primitive]] = {}
+    for element, one in primitives:
+        others.setdefault(element, []).append(one)
     order = [element for element in compiler.root.walk() if element.tag == "body"]
     bodies: list[Body] = []
     found: dict[Collider, list[_Geom]] = {}
-    for element, own in of_body.items():
+    chosen = [each for each in compiler.root.walk() if each in of_body or (each in others and _is_single(each))]
+    for element in chosen:
+        own = of_body.get(element, [])
         name = "world" if element.tag == "worldbody" else element.attributes.get("name")
         name = f"body_{order.index(element) + 1}" if name is None else name
         placed = [replace(meshes[g.mesh].placed, to_body=compiler.to_body(g.element, g.attributes)) for g in own]
         uses = [(None if apart else geom.kind, at, geom) for geom, at in zip(own, placed, strict=True)]
         joined = colliders(name, uses)
-        bodies.append(Body(name, compiler.pose(element.up()), [*joined], element.tag == "worldbody"))
+        is_world = element.tag == "worldbody"
+        bodies.append(Body(name, compiler.pose(element.up()), [*joined], is_world, others.get(element, ())))
         found |= joined
     return bodies, found
+
+
+def _is_single(body: Element) -> bool:
+    """Whether it is a body, and one only: copies of a ``<replicate>`` have names that only MuJoCo knows."""
+    return body.tag == "body" and all(element.tag != "replicate" for element in body.up())
 
 
 def _hull_assets(
@@ -341,6 +359,32 @@ def _colliding(
         if full.get("type") == "mesh" and "mesh" in full and _collides(full, paired):
             is_seen = full.get("group", "0").strip() in SHOWN and full["mesh"] not in seen
             yield _Geom(geom, full, full["mesh"], is_seen, compiler.is_weighed(geom, full))
+
+
+def _primitives(
+    body: Element, defaults: Defaults, compiler: Compiler, paired: Collection[str | None]
+) -> Iterator[tuple[Element, Primitive]]:
+    """Yield the geoms of one body that collide as primitives; not those that MuJoCo fits to meshes."""
+    childclass = next((e.attributes["childclass"] for e in body.up() if "childclass" in e.attributes), None)
+    for geom in body.named("geom"):
+        full = defaults.full(geom, childclass)
+        kind = full.get("type", "sphere")
+        if kind not in PRIMITIVES or "mesh" in full or not _collides(full, paired):
+            continue
+        where = f"geom {full.get('name', 'without a name')} of {geom.file.path}"
+        sizes = geom_numbers(geom, full, "size", "0")
+        if (ends := numbers(full, "fromto", 6, where)) is not None:
+            first, last = np.array(ends[:3]), np.array(ends[3:])
+            size, middle, along = sizes[:1], (first + last) / 2, first - last
+            sizes = size * (PRIMITIVES[kind] - 1) + [float(np.linalg.norm(along)) / 2]
+            full = {"pos": _words(middle), "zaxis": _words(along)} if sizes[-1] > 0 else {}
+        own = Primitive.read(kind, sizes, compiler.to_body(geom, full))
+        owner = next(element for element in geom.up() if element.tag in ("body", "worldbody"))
+        yield from [] if own is None else [(owner, own)]
+
+
+def _words(vector: FloatArray) -> str:
+    return " ".join(map(repr, vector.tolist()))
 
 
 def _collides(attributes: Mapping[str, str], paired: Collection[str | None]) -> bool:

@@ -6,7 +6,7 @@ Links that fixed joints connect stay apart: programs name them, and attach senso
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -14,11 +14,11 @@ from typing import NamedTuple
 import networkx
 import numpy as np
 
-from rlacd.clear import LinkPair, Motion, urdf_motion
+from rlacd.clear import LinkPair, Motion, Primitive, urdf_motion
 from rlacd.errors import MeshFileError
 from rlacd.io.robots.document import Document, Files, HullFiles, opened
 from rlacd.io.robots.matrix import srdf
-from rlacd.io.robots.poses import read_scale, urdf_origin
+from rlacd.io.robots.poses import numbers, read_scale, urdf_origin
 from rlacd.io.robots.robot import Body, Collider, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
 from rlacd.io.write import write_file
@@ -93,14 +93,16 @@ def read_urdf(source: Path, files: Files, *, apart: bool) -> Urdf:
     root = opened(source, "robot")
     if any(element.tag.startswith("xacro:") for element in root.walk()):
         raise MeshFileError(f"{source} holds xacro macros: expand it with the tool xacro first.")
-    poses, bodies = _link_poses(root), []
+    poses, bodies = _link_poses(root), list[Body]()
     found: dict[Collider, list[_Collision]] = {}
     for link in root.named("link"):
         name = link.attributes.get("name", "?")
         collisions = [each for element in link.named("collision") if (each := _collision(element, link, files))]
         own = colliders(name, [(None if apart else each.kind, each.placed, each) for each in collisions])
         found |= own
-        bodies += [Body(name, poses.get(name, np.eye(4)), [*own])] if own else []
+        primitives = [one for element in link.named("collision") for one in _primitives(element, link)]
+        if own or (primitives and name != "world"):
+            bodies.append(Body(name, poses.get(name, np.eye(4)), [*own], primitives=primitives))
     replaced = {collision.mesh for collisions in found.values() for collision in collisions}
     others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced]
     names = [each.attributes.get("filename", "") for each in others]
@@ -111,7 +113,7 @@ def read_urdf(source: Path, files: Files, *, apart: bool) -> Urdf:
 def _of_mass(root: Element, bodies: Sequence[Body]) -> list[str]:
     """What to say of links whose mass is for a simulator to find from their collision geometry."""
     stated = {link.attributes.get("name") for link in root.named("link") if any(link.named("inertial"))}
-    light = [body.name for body in bodies if body.name not in stated]
+    light = [body.name for body in bodies if body.colliders and body.name not in stated]
     if not light:
         return []
     some = f"The link {light[0]} has" if len(light) == 1 else f"{len(light)} links, such as {light[0]}, have"
@@ -129,6 +131,22 @@ def _collision(element: Element, link: Element, files: Files) -> _Collision | No
         raise MeshFileError(f"a collision mesh of {where} has no filename: give it one.")
     scale, file = read_scale(mesh.attributes.get("scale"), where), files.mesh(reference, link.file.folder)
     return _Collision(element, mesh, PlacedMesh(file, scale, _origin(element, where), np.eye(4)))
+
+
+SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1}}
+"""What a primitive states of its sizes, and how many numbers that is."""
+
+
+def _primitives(element: Element, link: Element) -> Iterator[Primitive]:
+    """What collides as a primitive, if it does."""
+    where = f"link {link.attributes.get('name', '?')} of {link.file.path}"
+    for shape in (shape for geometry in element.named("geometry") for shape in geometry.named(*SIZES)):
+        said = [numbers(shape.attributes, name, count, where) or [] for name, count in SIZES[shape.tag].items()]
+        sizes = [value for values in said for value in values]
+        whole = 0 if shape.tag == "box" else 1  # radii are whole, lengths are halved
+        halved = [*sizes[:whole], *(value / 2 for value in sizes[whole:])]
+        if (own := Primitive.read(shape.tag, halved, _origin(element, where))) is not None:
+            yield own
 
 
 def _origin(element: Element, where: str) -> FloatArray:
