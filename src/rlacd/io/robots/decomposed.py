@@ -45,9 +45,6 @@ link (geometric mean), and MuJoCo takes twice as many steps a second as with eac
 LINK = "link "
 """What the stage of a report of progress begins with that names a link, before the reports of its meshes."""
 
-MOST_SAID = 5
-"""Pairs that touch, each with a warning of its own."""
-
 
 @dataclass(frozen=True)
 class Checked:
@@ -135,9 +132,8 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
             raise
         return Checked(results, [f"Links were not checked against each other: {error}"])
     found = warnings_of(cleared, motion, robot.unit.words)
-    more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
     ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in motion.warnings]
-    return Checked(results, [*said, *ranges, *found[:MOST_SAID], *more], motion, cleared)
+    return Checked(results, [*said, *ranges, *found], motion, cleared)
 
 
 def _teller(total: int, progress: ProgressCallback | None) -> Callable[[str, int], None]:
