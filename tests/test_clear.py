@@ -289,6 +289,50 @@ def test_primitives_touch_where_mujoco_says(tmp_path: Path) -> None:
     assert 50 < close < 150
 
 
+def ball_and_wall(folder: Path, dent: float) -> Path:
+    """An egg with a dent in its side that slides past a wall, 1 mm away at its nearest."""
+    egg = trimesh.creation.icosphere(subdivisions=3)
+    egg.apply_scale([0.15, 0.06, 0.05])
+    if dent:
+        hollow = trimesh.creation.icosphere(subdivisions=2, radius=0.04).apply_translation((0, -0.1 + dent, 0))
+        egg = trimesh.boolean.difference([egg, hollow])
+    wall = block((-1, 0.061, -0.5), (1, 0.1, 0.5))
+    slide = Joint("prismatic", "wall", "egg", (1, 0, 0), (0, 0, 0), (-0.5, 0.5))
+    return Robot("egg", {"wall": wall, "egg": egg}, (slide,)).write(folder)
+
+
+@pytest.mark.parametrize("dent", [0.0, 0.02])
+@pytest.mark.promise("links-clear")
+def test_hulls_are_exact_where_simpler_ones_would_touch(tmp_path: Path, dent: float) -> None:
+    robot, options = ball_and_wall(tmp_path, dent), {"threads": 1, "samples": 50, "quality": "fast"}
+    simple = rlacd.rewrite_robot(
+        robot, tmp_path / "simple.urdf", threshold_abs=0.03, detail="simple", links={"wall": 0.01}, **options
+    )
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threshold_abs=0.03, **options)
+    assert [len(link.hulls) for link in done.links] == [1, 1]
+    (pair,) = done.pairs
+    assert (pair.share, pair.kept_clear) == (0, dent > 0)
+    (egg,) = done.links[1].hulls
+    given = trimesh.load_mesh(tmp_path / "egg.stl")
+    assert egg.volume == pytest.approx(given.convex_hull.volume, rel=1e-6)
+    (rough,) = simple.links[1].hulls
+    assert len(rough.vertices) < len(egg.vertices) / 2
+
+
+@pytest.mark.promise("links-clear")
+def test_convex_meshes_come_back_as_they_are(tmp_path: Path) -> None:
+    """Also where nothing is near; unless simple hulls are asked for, or an engine's limit binds."""
+    robot = ball_and_wall(tmp_path, 0.0)
+    given = trimesh.load_mesh(tmp_path / "egg.stl")
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threads=1, samples=0)
+    (egg,) = done.links[1].hulls
+    corners = {tuple(corner) for corner in given.vertices.astype("<f4").tolist()}
+    assert {tuple(corner) for corner in egg.vertices.astype("<f4").tolist()} == corners
+    for options in ({"detail": "simple"}, {"max_vertices": 64}):
+        other = rlacd.rewrite_robot(robot, tmp_path / "other.urdf", threads=1, samples=0, **options)
+        assert len(other.links[1].hulls[0].vertices) < len(corners)
+
+
 def test_joints_of_mjcf_are_sampled_in_their_limits_or_told(arm: Path) -> None:
     motion = mjcf_motion(arm, 100, seed=3)
     assert [joint.name for joint in motion.sampled] == ["j"]

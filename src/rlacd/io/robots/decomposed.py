@@ -29,7 +29,7 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
-from rlacd.options import LENGTHS, Options
+from rlacd.options import LENGTHS, DetailName, Options
 from rlacd.options.fields import LONGEST_SIDE, shown
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Progress, ProgressCallback
@@ -41,6 +41,9 @@ from rlacd.solid.topology import used_points
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
+
+FULL: DetailName = "full"
+"""Hulls with all their corners: simpler ones hold them, and a little more."""
 
 LINK = "link "
 """What the stage of a report of progress begins with that names a link, before the reports of its meshes."""
@@ -103,12 +106,17 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     tell = _teller(len(bodies), options.get("progress"))
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
-    for number, (body, own) in enumerate(zip(bodies, each, strict=True)):
+
+    def decompose_body(number: int) -> None:
+        body, own = bodies[number], each[number]
         tell(LINK + body.name, number)
         for collider in body.colliders:
-            if (key := (collider.key, own.get("threshold_abs"))) not in done:
+            if (key := (collider.key, own.get("threshold_abs"), own.get("detail"))) not in done:
                 done[key] = decomposed(body, collider, own, robot.unit)
             results[collider] = done[key]
+
+    for number in range(len(bodies)):
+        decompose_body(number)
     if robot.is_alone:
         return Checked(results)
     if not all(result.report.complete for result in results.values()):
@@ -123,10 +131,17 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         results.update(again)
         return hulls
 
+    def exact(number: int) -> list[Surface] | None:
+        if "detail" in each[number] or all(collider.is_convex for collider in bodies[number].colliders):
+            return None
+        each[number] |= {"detail": FULL}
+        decompose_body(number)
+        return _moving(bodies[number], results).hulls
+
     tell("clear", 0)
     try:
         motion, said = _motion(robot, asked.samples, options.get("seed") or 0)
-        cleared = kept_clear([*_links(bodies, results, motion)], motion, redo)
+        cleared = kept_clear([*_links(bodies, results, motion)], motion, redo, exact)
     except (MissingExtraError, CrowdedError) as error:
         if asked.exclude or asked.srdf:
             raise
@@ -191,7 +206,7 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
     """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
-        return decompose_in(unit, (mesh.vertices, mesh.faces), **_fitting(mesh, options, body))
+        return decompose_in(unit, (mesh.vertices, mesh.faces), **_fitting(mesh, options, body, collider))
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
@@ -200,10 +215,15 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
         raise type(error)(f"{path}: {error}") from error
 
 
-def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> dict[str, Any]:
-    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's."""
+def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body, collider: Collider) -> dict[str, Any]:
+    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's.
+
+    What is convex keeps its corners.
+    """
     fitting = dict(options)
     scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
+    if collider.is_convex:
+        fitting.setdefault("detail", FULL)
     for name, (least, most) in LENGTHS.items():
         if isinstance(length := fitting.get(f"{name}_abs"), (int, float)):
             unit = LONGEST_SIDE[name] / 2 * scale
