@@ -24,6 +24,7 @@ from rlacd.options import FAST, Options
 from rlacd.options.fields import about, check_callback
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.distance import hull_distances
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
 
 FACTORS = (1, 1.25, 1.5, 2, 2.5, 4, 6, 10, 15, 25)
@@ -129,17 +130,32 @@ def tradeoff(
     if options.get(name) is None:
         usual = about(Options, name).kind.read(getattr(chosen, name))
         chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options, name: FINEST * usual})
-    finest = getattr(chosen, name)
     check_callback("progress", progress, "a `rlacd.Progress`")
-    choices: list[Choice] = []
     with Run(chosen.threads, chosen.timeout, progress) as run:
         with run.stage("load"):
             source = in_metres(load_mesh(mesh, faces, file_type), chosen)
-        for factor, reached in zip(FACTORS, find_parts_under(source, chosen, FACTORS, run), strict=False):
-            unit = 1.0 if chosen.threshold_abs is None else reached.solid.frame.scale
-            choices.append(_choice(finest * factor, reached, unit, run))
+        choices = choices_of(source, chosen, getattr(chosen, name), FACTORS, run)
         complete = run.stopped_by is None
-    return Tradeoff(Path(source.name).stem, name, choices, _pick(choices, max_hulls), complete, source.unit)
+    return Tradeoff(
+        Path(source.name).stem,
+        name,
+        choices,
+        picked([(choice.threshold, choice.hulls) for choice in choices], max_hulls),
+        complete,
+        source.unit,
+    )
+
+
+def choices_of(source: InputMesh, options: Options, finest: float, factors: Sequence[float], run: Run) -> list[Choice]:
+    """What the threshold of options, of the value `finest`, leads to times each factor, the first of them 1.
+
+    Those behind a single hull are left out, and those that there is no time for.
+    """
+    choices = []
+    for factor, reached in zip(factors, find_parts_under(source, options, factors, run), strict=False):
+        unit = 1.0 if options.threshold_abs is None else reached.solid.frame.scale
+        choices.append(_choice(finest * factor, reached, unit, run))
+    return choices
 
 
 def _choice(threshold: float, reached: Reached, unit: float, run: Run) -> Choice:
@@ -153,17 +169,16 @@ def _choice(threshold: float, reached: Reached, unit: float, run: Run) -> Choice
     return Choice(threshold, len(hulls), sum(len(hull.faces) for hull in hulls), over / unit, added)
 
 
-def _pick(choices: Sequence[Choice], most: int | None) -> int | None:
-    """The finest with at most so many hulls, or the knee: the point farthest below the line between the ends.
+def picked(points: Sequence[tuple[float, int]], most: int | None) -> int | None:
+    """The finest threshold with at most so many hulls, or the knee: the point farthest below the line between the ends.
 
     The threshold counts by its logarithm; both axes are scaled to the same length (Satopää et al., "Finding a
     'Kneedle' in a Haystack", 2011).
     """
     if most is not None:
-        return next((i for i, choice in enumerate(choices) if choice.hulls <= most), None)
-    if len(choices) < 3 or choices[0].hulls == choices[-1].hulls:
-        return len(choices) - 1 if choices else None
-    x = np.log([choice.threshold for choice in choices])
-    y = np.array([choice.hulls for choice in choices], dtype=np.float64)
+        return next((i for i, (_, hulls) in enumerate(points) if hulls <= most), None)
+    if len(points) < 3 or points[0][1] == points[-1][1]:
+        return len(points) - 1 if points else None
+    x, y = np.log([threshold for threshold, _ in points]), np.array([hulls for _, hulls in points], dtype=np.float64)
     below = (y[0] - y) / (y[0] - y[-1]) - (x - x[0]) / (x[-1] - x[0])
     return int(below.argmax())

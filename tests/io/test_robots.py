@@ -399,6 +399,62 @@ def test_links_of_primitives_alone_count_and_are_told(tmp_path: Path) -> None:
     assert bare.path.read_text() == robot.read_text()
 
 
+@pytest.fixture
+def rings(tmp_path: Path) -> Path:
+    """A ring, a bowl that is open at the top, and a box, which no joint connects."""
+    trimesh.creation.torus(0.4, 0.1, major_sections=64, minor_sections=24).export(tmp_path / "ring.stl")
+    bowl = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
+    trimesh.Trimesh(bowl.vertices, bowl.faces[bowl.triangles_center[:, 2] < 0.3]).export(tmp_path / "bowl.stl")
+    trimesh.creation.box().export(tmp_path / "box.stl")
+    collision = '<link name="{0}"><collision><geometry><mesh filename="{0}.stl"/></geometry></collision></link>'
+    links = "".join(map(collision.format, ("ring", "bowl", "box")))
+    (tmp_path / "rings.urdf").write_text(f'<robot name="r">{links}</robot>')
+    return tmp_path / "rings.urdf"
+
+
+def test_a_link_of_many_hulls_is_told_with_what_makes_it_fewer(rings: Path) -> None:
+    options: dict[str, Any] = {"threshold_abs": 0.004, "samples": 0, "threads": 1, "quality": "fast"}
+    done = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), **options)
+    counts = {link.name: len(link.hulls) for link in done.links}
+    told = [warning for warning in done.warnings if " at twice the tolerance " in warning]
+    assert [warning.split()[0] for warning in told] == [name for name, count in counts.items() if count > 20]
+    ((twice, four),) = re.findall(r"about (\d+) at twice .* and (\d+) at four times, --link 'ring=0.016'", told[0])
+    assert counts["ring"] > int(twice) > int(four)
+    again = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), links={"ring": 0.016}, **options)
+    assert len(again.links[0].hulls) == int(four)
+    assert told[0].startswith(f"ring is {counts['ring']} hulls; ")
+    assert told[0].endswith("'.")
+    ((filled,),) = (re.findall(r"with its open bodies filled (\d+), --open solid\.", told[1]),)
+    solid = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), open="solid", **options)
+    assert len(solid.links[1].hulls) == int(filled) < counts["bowl"]
+    own = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), relative_to="mesh", threads=1, samples=0)
+    assert not [warning for warning in own.warnings if "twice" in warning]
+
+
+def test_a_robots_tradeoff_has_the_hulls_of_each_link(rings: Path) -> None:
+    run = CliRunner().invoke(
+        app, ["tradeoff", str(rings), "--threads", "1", "-t", "8mm", "--json", "--max-hulls", "20"]
+    )
+    assert run.exit_code == 0, run.output
+    found = json.loads(run.stdout)
+    assert found["thresholds_abs"][:4] == pytest.approx([0.008, 0.01, 0.012, 0.016])
+    assert list(found["links"]) == ["ring", "bowl", "box"]
+    assert found["total"] == [sum(counts) for counts in zip(*found["links"].values(), strict=True)]
+    assert found["links"]["box"] == [1] * 10
+    assert found["total"][found["pick"]] <= 20 < found["total"][found["pick"] - 1]
+    options: dict[str, Any] = {"samples": 0, "threads": 1, "quality": "fast"}
+    done = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), threshold_abs=0.016, **options)
+    assert [len(link.hulls) for link in done.links] == [counts[3] for counts in found["links"].values()]
+    table = CliRunner().invoke(app, ["tradeoff", str(rings), "--threads", "1", "-t", "8mm"]).stdout.splitlines()
+    assert table[0].split()[:3] == ["threshold_abs", "8", "mm"]
+    assert table[1].split() == ["ring", *map(str, found["links"]["ring"])]
+    assert table[-1].split()[2:] == [*map(str, found["total"])]
+    for words, says in ((["--criterion", "volume"], "lengths"), (["--scale", "2"], "single mesh")):
+        refused = CliRunner().invoke(app, ["tradeoff", str(rings), *words])
+        assert refused.exit_code == 2
+        assert says in refused.stderr
+
+
 def test_a_log_tells_which_link_is_under_way(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rlacd.cli.decompose, "LOG_EVERY", 0.0)
     run = CliRunner().invoke(app, ["decompose", str(ear), "--threads", "1"])

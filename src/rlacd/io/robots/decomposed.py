@@ -206,7 +206,7 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
     """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
-        return decompose_in(unit, (mesh.vertices, mesh.faces), **_fitting(mesh, options, body, collider))
+        return decompose_in(unit, (mesh.vertices, mesh.faces), **fitting(mesh, options, body, collider))
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
@@ -215,21 +215,21 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
         raise type(error)(f"{path}: {error}") from error
 
 
-def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body, collider: Collider) -> dict[str, Any]:
+def fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body, collider: Collider) -> dict[str, Any]:
     """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's.
 
     What is convex keeps its corners.
     """
-    fitting = dict(options)
+    fitted = dict(options)
     scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
     if collider.is_convex:
-        fitting.setdefault("detail", FULL)
+        fitted.setdefault("detail", FULL)
     for name, (least, most) in LENGTHS.items():
-        if isinstance(length := fitting.get(f"{name}_abs"), (int, float)):
+        if isinstance(length := fitted.get(f"{name}_abs"), (int, float)):
             unit = LONGEST_SIDE[name] / 2 * scale
             length = max(length, least / unit * (1 + ROUNDING)) if body.is_world else length
-            fitting[f"{name}_abs"] = min(length, most / unit * (1 - ROUNDING))
-    return fitting
+            fitted[f"{name}_abs"] = min(length, most / unit * (1 - ROUNDING))
+    return fitted
 
 
 def _links(bodies: Sequence[Body], results: Results, motion: Motion) -> Iterator[Moving]:

@@ -13,7 +13,8 @@ from typing import Any
 
 from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
 from rlacd.fit import Unit
-from rlacd.io.robots.decomposed import check_options, decomposed_robot
+from rlacd.io.robots.coarser import many_told
+from rlacd.io.robots.decomposed import check_options, decomposed_robot, options_of_bodies
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
 from rlacd.io.robots.rewritten import Rewritten, rewritten
 from rlacd.io.robots.robot import Robot
@@ -124,6 +125,9 @@ def rewrite(
     check_options(options)
     check_places(robot.source, place, asked, keep_input=keep_input)
     done = decomposed_robot(robot, options, asked)
+    if all(result.report.complete for result in done.results.values()):
+        many = many_told(robot, done.results, options_of_bodies(robot, options, asked))
+        done = replace(done, warnings=[*many, *done.warnings])
     pairs = done.pairs if done.samples or robot.is_alone else None
     written = robot.write(place, done.results, pairs, asked, whole=keep_input)
     return rewritten(robot, done, place, written, began)
