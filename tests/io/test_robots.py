@@ -399,6 +399,56 @@ def test_links_of_primitives_alone_count_and_are_told(tmp_path: Path) -> None:
     assert bare.path.read_text() == robot.read_text()
 
 
+SHOWN = """<robot name="r">
+<link name="arm">
+  <visual name="v"><origin xyz="1 0 0" rpy="0 .5 0"/><geometry><mesh filename="bar.stl" scale="1 2 1"/></geometry>
+    <material name="m"><color rgba="1 0 0 1"/></material></visual>
+  <visual><geometry><mesh filename="bar.stl"/></geometry></visual>
+  <visual><geometry><sphere radius=".1"/></geometry></visual></link>
+<link name="pole"><visual><origin xyz="0 1 0"/><geometry><cylinder radius=".1" length="1"/></geometry></visual></link>
+<link name="cover"><collision><geometry><box size="1 1 1"/></geometry></collision>
+  <visual><geometry><mesh filename="bar.stl"/></geometry></visual></link>
+<joint name="j" type="revolute"><parent link="arm"/><child link="pole"/><origin xyz="0 0 5"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="k" type="revolute"><parent link="pole"/><child link="cover"/><origin xyz="0 0 5"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_links_without_collision_geometry_get_it_from_what_they_show(tmp_path: Path) -> None:
+    """Where asked; those that have some keep that, and what is shown stays byte for byte."""
+    trimesh.creation.box((1, 0.2, 0.2)).export(tmp_path / "bar.stl")
+    robot = tmp_path / "r.urdf"
+    robot.write_text(SHOWN)
+    asked: dict[str, Any] = {"srdf": tmp_path / "r.srdf", "samples": 20, "threads": 1}
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", from_visual=True, **asked)
+    after = done.path.read_text()
+    assert re.sub(r"\s*<collision>((?!<box).)*?</collision>", "", after) == SHOWN
+    assert [(len(link.hulls), link.primitives) for link in done.links] == [(2, 1), (0, 1), (0, 1)]
+    root = etree.fromstring(after)
+    arm, pole, _ = root.iterfind("link")
+    for link in (arm, pole):
+        shown = [(v.find("origin"), v.find("geometry")[0]) for v in link.iterfind("visual")]
+        primitives = [(o, g) for o, g in shown if g.tag != "mesh"]
+        own = [(c.find("origin"), c.find("geometry")[0]) for c in link.iterfind("collision")]
+        found = [(o, g) for o, g in own if g.tag != "mesh"]
+        for (origin, shape), (other, same) in zip(primitives, found, strict=True):
+            assert dict(shape.attrib) == dict(same.attrib)
+            assert (origin is None and other is None) or dict(origin.attrib) == dict(other.attrib)
+    bars = [trimesh.load_mesh(tmp_path / "bar.stl") for _ in range(2)]
+    turn = trimesh.transformations.euler_matrix(0, 0.5, 0)
+    bars[0].apply_transform(np.diag([1.0, 2.0, 1.0, 1.0])).apply_transform(turn).apply_translation((1, 0, 0))
+    assert inside(done.links[0].hulls, np.concatenate([bar.vertices for bar in bars]), 1e-6).all()
+    said = {tuple(pair.attrib.values()) for pair in etree.parse(str(asked["srdf"])).iterfind("disable_collisions")}
+    assert said == {("arm", "pole", "Adjacent"), ("pole", "cover", "Adjacent"), ("arm", "cover", "Never")}
+    plain = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", **asked)
+    assert plain.path.read_text() == SHOWN
+    assert any(warning.endswith("--from-visual makes some from what it shows.") for warning in plain.warnings)
+    run = CliRunner().invoke(app, ["decompose", str(robot), "--from-visual", "--threads", "1", "--samples", "5"])
+    assert run.exit_code == 0, run.output
+    assert (tmp_path / "r_hulls.urdf").read_text().count("<collision>") == after.count("<collision>")
+
+
 @pytest.fixture
 def rings(tmp_path: Path) -> Path:
     """A ring, a bowl that is open at the top, and a box, which no joint connects."""

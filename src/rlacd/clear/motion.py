@@ -253,7 +253,8 @@ def _adjacent(file: _Urdf | _Mjcf, carried: Sequence[int], chosen: Sequence[int]
 
     edges = [(link, file.parents[link]) for link in carried if file.parents[link] != file.world]
     graph, new = networkx.Graph(edges), {link: place for place, link in enumerate(chosen)}
-    between = networkx.connected_components(graph.subgraph([link for link in graph if link not in file.solids]))
+    empty = [link for link in graph if link not in file.solids and link not in new]
+    between = networkx.connected_components(graph.subgraph(empty))
     joined = [*map(set, graph.edges), *({near for link in part for near in graph[link]} for part in between)]
     places = (sorted(new[link] for link in links if link in new) for links in joined)
     return frozenset(pair for near in places for pair in combinations(near, 2))

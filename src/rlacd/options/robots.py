@@ -60,6 +60,11 @@ class RobotOptions:
 
     It stands for `threshold_abs`: ``{"finger.*": 0.001}``.
     """
+    from_visual: bool = option(False)
+    """Links without collision geometry get it from what they show: hulls of the meshes, and the same primitives.
+
+    What is shown stays. Of an MJCF model, these are bodies none of whose geoms collides.
+    """
     samples: int = option(500, least=0, most=100_000)
     """Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
     extra rlacd[clear].

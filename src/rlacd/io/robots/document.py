@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rlacd.clear import LinkPair
+from rlacd.clear import LinkPair, Motion, Solids
 from rlacd.errors import MeshFileError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
@@ -59,6 +59,8 @@ class Document(Robot):
     root: Element
     references: References
     others: list[str]  # files that it names relative to its folder: they break if the result goes elsewhere
+    seen: Sequence[Element] = field(default=(), kw_only=True)  # primitives that are shown, and are to collide too
+    bare: frozenset[str] = field(default=frozenset(), kw_only=True)  # bodies that collide as what they show
 
     kind = ""
 
@@ -77,6 +79,18 @@ class Document(Robot):
 
         `copies` of meshes that the consumer cannot read are named by their paths; what is to be said is added.
         """
+
+    def with_seen(self, motion: Motion) -> Motion:
+        """A motion that was read without what bodies are to collide as, with it."""
+        if not self.bare:
+            return motion
+        own = [
+            Solids(body.primitives, sum(len(collider.meshes) for collider in body.colliders))
+            if body.name in self.bare
+            else solids
+            for body, solids in zip(self.bodies, motion.solids, strict=False)
+        ]
+        return replace(motion, solids=(*own, *motion.solids[len(own) :]))
 
     def copied(self, stem: str) -> dict[MeshFile, str]:
         """Names for copies of the meshes that consumers cannot read."""

@@ -23,8 +23,12 @@ def is_robot(path: str | os.PathLike[str]) -> bool:
     return Path(path).suffix.lower() in KINDS
 
 
-def read_robot(source: Path, package_dirs: Sequence[str] = (), *, apart: bool = False) -> Robot:
+def read_robot(
+    source: Path, package_dirs: Sequence[str] = (), *, apart: bool = False, from_visual: bool = False
+) -> Robot:
     """Read a URDF, MJCF or USD file, to be decomposed by its meshes or, not `apart`, by its links.
+
+    With `from_visual`, links without collision geometry collide as what they show; not those of a stage.
 
     Raises
     ------
@@ -37,7 +41,7 @@ def read_robot(source: Path, package_dirs: Sequence[str] = (), *, apart: bool = 
     if ending in STAGES:
         return read_stage(source, apart=apart)
     files = Files(References(source, package_dirs))
-    robot = (read_urdf if ending == ".urdf" else read_mjcf)(source, files, apart=apart)
+    robot = (read_urdf if ending == ".urdf" else read_mjcf)(source, files, apart=apart, from_visual=from_visual)
     robot.warnings.extend(grouped(files.said))
     return robot
 

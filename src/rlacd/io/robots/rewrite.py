@@ -107,7 +107,9 @@ def rewrite_in(
     check_places(source, place, asked, keep_input=keep_input)
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     began = time.perf_counter()
-    description = replace(read_robot(source, packages, apart=asked.per == "mesh"), told_in=told_in)
+    description = replace(
+        read_robot(source, packages, apart=asked.per == "mesh", from_visual=asked.from_visual), told_in=told_in
+    )
     return rewrite(description, place, options, asked, keep_input=keep_input, began=began)
 
 
@@ -156,6 +158,8 @@ def check_places(source: Path, place: Path, asked: RobotOptions, *, keep_input: 
         raise OptionError(f"{place} would overwrite the input; choose another name.")
     check_name(place)
     check_file(place)
+    if asked.from_visual and stages:
+        raise OptionError("from_visual (--from-visual) is for URDF and MJCF: in a stage, apply PhysicsCollisionAPI.")
     if not stages:
         check_folder(mesh_folder(place, KINDS[ending]))
     if asked.exclude and ending == ".urdf":
