@@ -443,7 +443,11 @@ def test_links_without_collision_geometry_get_it_from_what_they_show(tmp_path: P
     assert said == {("arm", "pole", "Adjacent"), ("pole", "cover", "Adjacent"), ("arm", "cover", "Never")}
     plain = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", **asked)
     assert plain.path.read_text() == SHOWN
-    assert any(warning.endswith("--from-visual makes some from what it shows.") for warning in plain.warnings)
+    assert any(warning.endswith("has no collision mesh, so this is a copy.") for warning in plain.warnings)
+    robot.write_text(re.sub("<collision.*?</collision>", "", SHOWN))
+    (said,) = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threads=1).warnings
+    assert said.endswith("so this is a copy; --from-visual makes collision geometry of what it shows.")
+    robot.write_text(SHOWN)
     run = CliRunner().invoke(app, ["decompose", str(robot), "--from-visual", "--threads", "1", "--samples", "5"])
     assert run.exit_code == 0, run.output
     assert (tmp_path / "r_hulls.urdf").read_text().count("<collision>") == after.count("<collision>")

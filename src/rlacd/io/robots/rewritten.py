@@ -16,7 +16,6 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError
 from rlacd.fit import ANY, Unit
 from rlacd.io.robots.decomposed import Checked
-from rlacd.io.robots.document import Document
 from rlacd.io.robots.robot import Body, Collider, Results, Robot, Written
 from rlacd.plain_json import as_plain
 from rlacd.report import kind_of
@@ -141,7 +140,7 @@ class Rewritten:
 def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began: float) -> Rewritten:
     """What became of a robot that was written, since a time of `time.perf_counter`."""
     links = [RewrittenLink.of(body, done.results, written.names) for body in robot.bodies]
-    how = ": --from-visual makes some from what it shows" if isinstance(robot, Document) else ""
+    how = "" if robot.bodies else "; --from-visual makes collision geometry of what it shows"
     said = [] if robot.replaced else [f"{robot.source} has no collision mesh, so this is a copy{how}."]
     said += [*robot.warnings, *written.warnings, *warnings_of(robot, done.results), *done.warnings]
     seconds, of_links = time.perf_counter() - began, (done.pairs, done.samples)
