@@ -349,6 +349,19 @@ def test_joints_of_mjcf_are_sampled_in_their_limits_or_told(arm: Path) -> None:
     assert motion.poses[0, a] == pytest.approx(np.eye(4))
 
 
+def test_joints_without_limits_are_told_in_one_sentence_and_a_floating_base_in_none(arm: Path) -> None:
+    geom = '<geom type="mesh" mesh="box"/>'
+    wheels = "".join(f'<body pos="{x} 0 0"><joint name="w{x}" axis="0 1 0"/>{geom}</body>' for x in range(2, 6))
+    asset = '<asset><mesh name="box" file="box.obj"/></asset>'
+    base = f'<body name="base"><freejoint/>{geom}{wheels}</body>'
+    for more in ("", f'<body name="ball" pos="0 0 9"><freejoint/>{geom}</body>'):
+        arm.write_text(f"<mujoco>{asset}<worldbody>{base}{more}</worldbody></mujoco>")
+        motion = mjcf_motion(arm, 10)
+        turns = "the joint w2 has no limits, so a whole turn was looked at (as for 3 more)"
+        apart = "the joint number 0 is free or a ball, so it was looked at only at rest (as for 1 more)"
+        assert {*motion.warnings} == {turns, apart} if more else {turns}
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_joints_follow_in_a_chain_whatever_the_order_of_the_lines(arm: Path, order: tuple[int, int]) -> None:
     def body(number: int, inner: str) -> str:

@@ -31,7 +31,7 @@ class Files:
     """The files that a description refers to, each read once."""
 
     references: References
-    said: list[tuple[str, str, float]] = field(default_factory=list)  # a file's name, a sentence about it, how bad
+    said: list[tuple[Path, str]] = field(default_factory=list)  # a file, and a sentence about it
     _known: dict[Path, MeshFile] = field(default_factory=dict)
 
     def mesh(self, reference: str, folder: Path) -> MeshFile:
@@ -42,12 +42,12 @@ class Files:
         path = self.references.find(reference, folder)
         if path not in self._known:
             mesh, unit = load_mesh(path), 1.0
-            self.said += [(path.name, warning, 0.0) for warning in mesh.warnings]
+            self.said += [(path, warning) for warning in mesh.warnings]
             if path.suffix.lower() == ".dae":
                 unit = mesh.metres or 1.0
                 if mesh.up != "z":
                     turned = f"{mesh.up.upper()}_UP is declared, and some programs rotate such a file when they read it"
-                    self.said.append((path.name, f"{turned}; hulls keep its coordinates.", 0.0))
+                    self.said.append((path, f"{turned}; hulls keep its coordinates."))
             self._known[path] = MeshFile(path, mesh.vertices * unit, mesh.faces)
         return self._known[path]
 

@@ -42,7 +42,9 @@ def read_robot(
         return read_stage(source, apart=apart)
     files = Files(References(source, package_dirs))
     robot = (read_urdf if ending == ".urdf" else read_mjcf)(source, files, apart=apart, from_visual=from_visual)
-    robot.warnings.extend(grouped(files.said))
+    meshes = [(mesh.file.path, body.name) for body in robot.bodies for one in body.colliders for mesh in one.meshes]
+    links = {path: f"{name} ({path.name})" for path, name in reversed(meshes)}  # the first link of each
+    robot.warnings.extend(grouped([(links.get(path, path.name), said, 0.0) for path, said in files.said]))
     return robot
 
 
