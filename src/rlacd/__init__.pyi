@@ -233,6 +233,7 @@ def rewrite_robot(
     progress: ProgressCallback | None = None,
     per: Per | None = "link",
     links: Mapping[str, float | str] | None = None,
+    from_visual: bool | None = False,
     samples: int | None = 500,
     exclude: str | Sequence[PairKind] | None = (),
     srdf: str | os.PathLike[str] | None = None,
@@ -293,6 +294,9 @@ def rewrite_robot(
     links : Mapping[str, float | str] | None
         Another distance for the links whose whole name matches a regular expression; the last that matches counts.
         ``{"finger.*": "1mm"}``, or a number in the robot's own unit, as `threshold_abs`.
+    from_visual : bool
+        Links without collision geometry get it from what they show: hulls of the meshes, and the same primitives. What
+        is shown stays. Of an MJCF model, these are bodies none of whose geoms collides. Default: false.
     samples : int
         Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
         extra rlacd[clear]. Where hulls of such links would touch, they are cut finer, or a warning names both. USD
