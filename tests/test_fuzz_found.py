@@ -10,7 +10,7 @@ import trimesh
 
 import rlacd
 from fuzz.recipes import make_shape
-from fuzz.rows import draw_options
+from fuzz.choices import draw_options
 from fuzz.trials import Laboratory, Trial
 from rlacd import _native
 from rlacd.io.read.load import load_mesh
