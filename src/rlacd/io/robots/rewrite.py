@@ -54,7 +54,7 @@ def rewrite_robot(
     progress : callable, optional
         As for `rlacd.decompose`; the `stage` ``link NAME`` comes before those of each link, `done` of `total`.
     **options
-        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
+        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5% of
         the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
         ``relative_to="mesh"`` to each solid, whose criterion and threshold are then those of `rlacd.decompose`. Lengths
         such as `threshold_abs` are in the robot's unit, after the scale of a mesh. A `timeout` applies to each solid.
