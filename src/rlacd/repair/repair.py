@@ -46,7 +46,7 @@ _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2
 
 def _take_hull(state: State) -> None:
     """Take the convex hull of all points if there is nothing else."""
-    if state.volume != 0:
+    if state.solid.volume() != 0:
         return
     state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
     state.note(np.arange(state.bodies), "hull")
@@ -59,7 +59,7 @@ def _keep_lost(state: State) -> None:
 
     So does closing cracks, of needles.
     """
-    if state.volume == 0 or state.is_apart:
+    if state.solid.volume() == 0 or state.is_apart:
         return
     lost, own = measure(state), state.surface
     body, is_gone = state.body_of_input[lost], state.is_gone[lost]

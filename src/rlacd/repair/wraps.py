@@ -98,7 +98,7 @@ def rebuild_tangles(state: State) -> None:
     A few faces become a slab each. Where they are many, what the ball cannot reach from outside the body is solid.
     """
     soup = state.soup
-    if state.volume == 0 or np.bincount(soup.body).min() > DENSE or not is_tangle(state.query()):
+    if state.solid.volume() == 0 or np.bincount(soup.body).min() > DENSE or not is_tangle(state.query()):
         return
     tangled = tangled_bodies(state.query(), soup.vertices, soup.faces, soup.body)
     tangled = tangled[~state.has("slab")[tangled]].tolist()  # slabs are thin enough to be cut
@@ -128,7 +128,7 @@ def fill_voids(state: State) -> None:
     points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
     reach, void = state.reach, state.reach.voids_near(points)
     voids = np.setdiff1d(void, 0)
-    is_large = reach.volumes(voids) >= _SLIT_VOLUME * state.volume
+    is_large = reach.volumes(voids) >= _SLIT_VOLUME * state.solid.volume()
     cells = reach.voids_outside(voids[is_large | np.isin(voids, void[is_open[walls.body[on]]])], state.query())
     if len(cells) == 0:
         return
@@ -136,7 +136,7 @@ def fill_voids(state: State) -> None:
     filled = unite([state.solid, wrap])
     triangles = filled.num_tri() / state.solid.num_tri()
     bared = filled.surface_area() * triangles**_TRIANGLES
-    if filled.volume() <= state.volume or bared >= state.solid.surface_area():
+    if filled.volume() <= state.solid.volume() or bared >= state.solid.surface_area():
         return
     wrapped = np.unique(walls.body[on[np.isin(void, reach.void.ravel()[cells])]])
     wrapped = wrapped[is_open[wrapped]]
@@ -167,7 +167,7 @@ def fill_slits(state: State) -> None:
         return
     wrap = _wrap(state, state.reach.around_points(points), _WRAP_ERROR, query)
     filled = unite([state.solid, wrap])
-    is_little = abs(filled.volume() / state.volume - 1) < _SLIT_VOLUME
+    is_little = abs(filled.volume() / state.solid.volume() - 1) < _SLIT_VOLUME
     if is_little and filled.surface_area() < (1 - _BARED) * state.solid.surface_area():
         state.solid = filled
         state.parts.append(Piece(wrap, int(has_slits.argmax())))
@@ -176,7 +176,7 @@ def fill_slits(state: State) -> None:
 def _may_fill(state: State) -> bool:
     """Whether what nothing can reach may become solid."""
     fills = state.wanted.open_bodies != "thin" and not state.wanted.keep_cavities and not state.is_apart
-    return fills and state.volume != 0 and len(state.parts) <= MOST_UNITED  # more of them overlap each other
+    return fills and state.solid.volume() != 0 and len(state.parts) <= MOST_UNITED  # more of them overlap each other
 
 
 def _is_large(state: State, walls: Soup) -> bool:
