@@ -135,7 +135,6 @@ def repair(
     points, corners = compacted(mesh.vertices, mesh.faces) if len(mesh.faces) else (mesh.vertices, mesh.faces)
     if len(points) == 0:
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
-    poll_stop()
     frame = Frame.of(points, mesh.unit)
     cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
     wanted = Wanted(open_bodies, gap, cells, keep_cavities)

@@ -7,13 +7,7 @@ from manifold3d import Manifold
 
 from rlacd import _native
 from rlacd._native import poll_stop
-from rlacd.repair.distance import (
-    SurfaceQuery,
-    is_tangle,
-    points_covering,
-    spread_points,
-    tangled_bodies,
-)
+from rlacd.repair.distance import SurfaceQuery, is_tangle, points_covering, spread_points, tangled_bodies
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import hull_of_points, slab_of_faces, unite
@@ -48,10 +42,8 @@ def keep_apart(state: State, sheets: Soup) -> bool:
 
     Returns whether it was done: all has to be sheets, and they have to cross often.
     """
-    most = _PAIRS_A_FACE * len(sheets.faces)
-    if state.parts or len(sheets.faces) > _CROWD:
-        return False
-    if _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] <= most:
+    most, faces = _PAIRS_A_FACE * len(sheets.faces), sheets.faces.astype(np.int32)
+    if state.parts or len(faces) > _CROWD or _native.crossings(sheets.vertices, faces, sheets.body, most)[0] <= most:
         return False
     slabs = [hull_of_points(sheets.vertices[face]) for face in sheets.faces]
     state.parts = [Piece(Manifold.compose(slabs), int(sheets.body.min()), is_slab=True)]
@@ -82,13 +74,12 @@ def wrap_sheets(state: State, sheets: Soup) -> bool:
 
 def wrap_all(state: State) -> None:
     """Take what the ball cannot reach from outside all bodies to be solid."""
-    gap = state.wanted.gap
     state.solid, state.cavity_walls = _wrapped(state, state.soup), None
     state.note(state.soup.body, "wrapped")
     state.parts = [Piece(state.solid, 0)]
     state.warnings.append(
         "The surface crosses itself too often to be united exactly, so the solid is what a ball of radius "
-        f"{state.frame.unit.words(gap)} cannot reach from outside."
+        f"{state.frame.unit.words(state.wanted.gap)} cannot reach from outside."
     )
 
 
@@ -138,8 +129,8 @@ def fill_voids(state: State) -> None:
     bared = filled.surface_area() * triangles**_TRIANGLES
     if filled.volume() <= state.solid.volume() or bared >= state.solid.surface_area():
         return
-    wrapped = np.unique(walls.body[on[np.isin(void, reach.void.ravel()[cells])]])
-    wrapped = wrapped[is_open[wrapped]]
+    around = walls.body[on[np.isin(void, reach.void.ravel()[cells])]]
+    wrapped = around[is_open[around]]
     state.note(wrapped, "wrapped")
     state.solid = filled
     state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
