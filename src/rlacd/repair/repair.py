@@ -39,8 +39,8 @@ from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of its grid."""
 
-# Points at which a triangle is tested for lying inside a body, into which it may lead, or out of which: near its
-# corners, its edges, its middle.
+# Points at which a triangle is tested for lying inside a body, as it may begin inside and lead out: near its corners,
+# its edges, its middle.
 _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
 
