@@ -20,7 +20,7 @@ WORKERS ?= 1
 SEED    ?= 0
 MESHES  ?= ../shared/meshes
 
-.PHONY: install demo docs pictures benchmarks test test-fast test-all test-native nightly engines lint soak soak-light soak-totals stubs sanitize sanitize-address sanitize-thread format clean
+.PHONY: install demo docs pictures tables benchmarks test test-fast test-all test-native nightly engines lint soak soak-light soak-totals stubs sanitize sanitize-address sanitize-thread format clean
 
 install: $(VENV)/installed
 
@@ -28,7 +28,7 @@ $(VENV)/tools: constraints-dev.txt
 	@echo "making an environment in $(VENV) and fetching the build tools (half a minute) ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/pip install --quiet --upgrade pip
-	@$(BIN)/pip install --quiet --constraint constraints-dev.txt scikit-build-core nanobind cmake ninja
+	@$(BIN)/pip install --quiet --constraint constraints-dev.txt scikit-build-core hatch-fancy-pypi-readme nanobind cmake ninja
 	@touch $@
 
 $(VENV)/installed: $(VENV)/tools $(NATIVE_SOURCES)
@@ -65,6 +65,10 @@ benchmarks: $(VENV)/bench
 $(VENV)/bench: $(VENV)/installed
 	$(BIN)/pip install --quiet --constraint constraints-dev.txt --group bench
 	@touch $@
+
+# The page of options and the public signatures, from where options are stated.
+tables: $(VENV)/installed
+	$(BIN)/python -m tests.option_table
 
 # The types of the kernels, as they were last built.
 stubs: $(VENV)/installed
@@ -130,7 +134,7 @@ sanitize-address sanitize-thread: sanitize-%: build/sanitize-%/installed
 build/sanitize-%/installed: $(NATIVE_SOURCES)
 	test -x build/sanitize-$*/bin/python || $(PYTHON) -m venv build/sanitize-$*
 	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt \
-	  scikit-build-core nanobind cmake ninja pytest hypothesis point-cloud-utils pycollada rtree usd-core
+	  scikit-build-core hatch-fancy-pypi-readme nanobind cmake ninja pytest hypothesis point-cloud-utils pycollada rtree usd-core
 	build/sanitize-$*/bin/pip install --quiet --constraint constraints-dev.txt --no-build-isolation --editable . \
 	  --config-settings=build-dir=build/sanitize-$*/native --config-settings=cmake.build-type=RelWithDebInfo \
 	  --config-settings=cmake.define.RLACD_SANITIZE=$(SANITIZE_$*) --config-settings=cmake.define.RLACD_BUILD_TESTS=ON

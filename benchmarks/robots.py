@@ -56,7 +56,7 @@ def rewritten(robot: Path, way: str, options: dict[str, Any], packages: list[str
             how: dict[str, Any] = {"per": "mesh", "relative_to": "mesh"} if way == "own" else {}
             done = rlacd.rewrite_robot(robot, place, package_dirs=packages, threads=1, **how, **options)
             cpu, deepest = time.process_time() - began, max((pair.new_depth for pair in done.pairs), default=0.0)
-            row = {**done.as_dict(), "links": len(done.links), "cpu": cpu, "deepest": deepest}
+            row = {**done.as_dict(), "links": len(done.replaced), "cpu": cpu, "deepest": deepest}
         write_file(kept, json.dumps(row).encode())
     return {**json.loads(kept.read_bytes()), "place": place}
 

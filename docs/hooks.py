@@ -1,18 +1,44 @@
-"""What the site is made from at each build: commands' help, a schema, the promises, the notebook, a mesh to turn."""
+"""What the site is made from at each build: figures, commands' help, a schema, the promises, the notebook, a mesh."""
 
 from __future__ import annotations
 
 import json
 import re
 import sys
+from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
+FIGURE = re.compile(r"\{\{ (.+?)(?::([^:}]*))? \}\}")
+"""``{{ EXPRESSION:FORMAT }}`` of constants of the package by their modules, or ``{{ results.NAME }}``."""
+
+RESULTS = ROOT / "docs" / "results.json"
+"""Figures that a run of some meshes gives; `tests/test_figures.py` measures them again every night."""
+
+
+def with_figures(markdown: str) -> str:
+    """Put figures in the place of what names them."""
+    results = json.loads(RESULTS.read_text(encoding="utf-8"))
+
+    def constant(found: re.Match[str]) -> str:
+        return repr(attrgetter(found[2])(import_module(f"rlacd.{found[1]}")))
+
+    def figure(found: re.Match[str]) -> str:
+        if found[1].startswith("results."):
+            return str(results[found[1].removeprefix("results.")]["value"])
+        expression = re.sub(r"\b([a-z_]+(?:\.[a-z_]+)*)\.(_?[A-Z][A-Z_]*(?:\.[a-z]+)*)\b", constant, found[1])
+        return format(eval(expression, {"__builtins__": {}}), found[2] or "")
+
+    return FIGURE.sub(figure, markdown)
+
+
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put the README's table, the notebook, the commands and the promises' tests into the pages that ask for them."""
+    """Put figures, the README's table, the notebook, the commands and the promises' tests where pages ask for them."""
+    markdown = with_figures(markdown)
     if page.file.src_uri == "index.md":
         readme = (ROOT / "README.md").read_text(encoding="utf-8")
         return markdown.replace("<!-- table -->", re.findall(r"(?:^\|.*\n)+", readme, re.MULTILINE)[0])

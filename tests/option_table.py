@@ -15,7 +15,7 @@ from typing import Any
 
 from rlacd.decompose_mesh import decompose
 from rlacd.io.robots import rewrite_robot
-from rlacd.options import Options
+from rlacd.options import RUN, Options
 from rlacd.options.fields import About
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
@@ -25,33 +25,39 @@ PAGE = Path(__file__).parents[1] / "docs" / "reference" / "options.md"
 
 HEAD = ["| command line, Python | default | values | meaning |", "|---|---|---|---|"]
 
+BEGIN, END = '<div class="options" markdown>', "</div>"
+
 FLAG = re.compile(r"--[a-z][a-z-]*")
 
 PROGRESS = "| `progress` | – | | a function called between steps; returning `False` stops |"
 
 
 def options_table() -> str:
-    """All options in Markdown, one per row."""
-    rows = [*_rows(Options), PROGRESS, *_rows(NavigableSpace), *_rows(OutputOptions), *_rows(RobotOptions)]
-    return "\n".join([*HEAD, *rows, ""])
+    """All options in Markdown: a table under each heading of the command's help, a row an option, with an anchor."""
+    panels: dict[str, list[str]] = {}
+    for options in (Options, NavigableSpace, OutputOptions, RobotOptions):
+        for panel, row in _rows(options):
+            panels.setdefault(panel, []).append(row)
+    panels[RUN].append(PROGRESS)
+    return "\n".join(line for panel, rows in panels.items() for line in (f"### {panel}", "", *HEAD, *rows, ""))
 
 
-def _rows(options: type[Any]) -> Iterator[str]:
+def _rows(options: type[Any]) -> Iterator[tuple[str, str]]:
+    """The rows of options, each with its heading."""
     for field in dataclasses.fields(options):
         known: About = field.metadata["option"]
         typed = ", ".join(f"`{name}`" for name in sorted(known.flags, key=len))
         python = f"<br>`{known.python}`".replace(", ", "`, `") if known.python else ""
         meaning = FLAG.sub(r"`\g<0>`", known.help)
-        cells = [typed + python, known.usual or "–", known.kind.values, meaning]
-        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        cells = [f'<a id="option-{field.name}"></a>{typed}{python}', known.usual or "–", known.kind.values, meaning]
+        yield str(known.panel), "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def written(page: str) -> str:
     """The page with the table in place of the one it has."""
     lines = page.splitlines()
-    begin = next(i for i, line in enumerate(lines) if line.startswith("| command line"))
-    end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("|"))
-    return "\n".join([*lines[:begin], *options_table().splitlines(), *lines[end:], ""])
+    begin, end = lines.index(BEGIN) + 2, lines.index(END)
+    return "\n".join([*lines[:begin], options_table(), *lines[end:], ""])
 
 
 STUB = Path(__file__).parents[1] / "src" / "rlacd" / "__init__.pyi"

@@ -116,14 +116,31 @@ def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: 
     assert done.as_dict()["pairs"][1]["contact"] == "always"
 
 
-@pytest.mark.parametrize("count", [1, 2])
-def test_pairs_that_touch_a_little_earlier_are_told_and_counted(count: int) -> None:
-    offence = Offence(0, np.eye(4), 0.5)
-    touching = Touching(np.array([True, True]), np.array([True, False]), (offence,))
-    bodies = [Body(name, Surface(np.empty((0, 3)), np.empty((0, 3), int))) for name in "abc"]
-    found = {(0, 1): touching, (1, 2): touching} if count == 2 else {(0, 1): touching}
-    (said,) = warnings_of(Cleared(bodies, found), at_rest([*"abc"]), str)
-    assert said.endswith("not cut finer (2 such pairs)." if count == 2 else "not cut finer.")
+def test_all_pairs_with_new_contacts_are_named() -> None:
+    """Links that collide themselves in one sentence; of others the deepest in one each, the rest in another."""
+    letters = [*"abcdefgh"]
+    bodies = [Body(name, Surface(np.empty((0, 3)), np.empty((0, 3), int))) for name in letters]
+
+    def touching(depth: float, *meshes: bool) -> Touching:
+        return Touching(np.array([True, True]), np.array(meshes), (Offence(0, np.eye(4), depth),))
+
+    found = {(0, i): touching(i, False, False) for i in range(1, 8)}
+    found |= {
+        (1, 2): touching(0.5, True, False),
+        (1, 3): touching(0.25, True, False),
+        (2, 3): touching(0.5, True, True),
+    }
+    said = warnings_of(Cleared(bodies, found), at_rest(letters), str)
+    assert said == [
+        *(
+            f"Hulls of a and {letters[i]} touch though the links do not, up to {i} deep at rest."
+            for i in (7, 6, 5, 4, 3)
+        ),
+        "Hulls of other links touch too though the links do not, up to 2 deep: a with b, c.",
+        "Hulls of links that often collide themselves touch a little earlier, up to 0.5 deep, as they were not cut "
+        "finer: b with c, d; c with d.",
+        "c and d touch in the input itself wherever the joints are.",
+    ]
 
 
 ARM = """<mujoco><asset><mesh name="box" file="box.obj"/></asset><worldbody>
@@ -272,6 +289,50 @@ def test_primitives_touch_where_mujoco_says(tmp_path: Path) -> None:
     assert 50 < close < 150
 
 
+def ball_and_wall(folder: Path, dent: float) -> Path:
+    """An egg with a dent in its side that slides past a wall, 1 mm away at its nearest."""
+    egg = trimesh.creation.icosphere(subdivisions=3)
+    egg.apply_scale([0.15, 0.06, 0.05])
+    if dent:
+        hollow = trimesh.creation.icosphere(subdivisions=2, radius=0.04).apply_translation((0, -0.1 + dent, 0))
+        egg = trimesh.boolean.difference([egg, hollow])
+    wall = block((-1, 0.061, -0.5), (1, 0.1, 0.5))
+    slide = Joint("prismatic", "wall", "egg", (1, 0, 0), (0, 0, 0), (-0.5, 0.5))
+    return Robot("egg", {"wall": wall, "egg": egg}, (slide,)).write(folder)
+
+
+@pytest.mark.parametrize("dent", [0.0, 0.02])
+@pytest.mark.promise("links-clear")
+def test_hulls_are_exact_where_simpler_ones_would_touch(tmp_path: Path, dent: float) -> None:
+    robot, options = ball_and_wall(tmp_path, dent), {"threads": 1, "samples": 50, "quality": "fast"}
+    simple = rlacd.rewrite_robot(
+        robot, tmp_path / "simple.urdf", threshold_abs=0.03, detail="simple", links={"wall": 0.01}, **options
+    )
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threshold_abs=0.03, **options)
+    assert [len(link.hulls) for link in done.links] == [1, 1]
+    (pair,) = done.pairs
+    assert (pair.share, pair.kept_clear) == (0, dent > 0)
+    (egg,) = done.links[1].hulls
+    given = trimesh.load_mesh(tmp_path / "egg.stl")
+    assert egg.volume == pytest.approx(given.convex_hull.volume, rel=1e-6)
+    (rough,) = simple.links[1].hulls
+    assert len(rough.vertices) < len(egg.vertices) / 2
+
+
+@pytest.mark.promise("links-clear")
+def test_convex_meshes_come_back_as_they_are(tmp_path: Path) -> None:
+    """Also where nothing is near; unless simple hulls are asked for, or an engine's limit binds."""
+    robot = ball_and_wall(tmp_path, 0.0)
+    given = trimesh.load_mesh(tmp_path / "egg.stl")
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threads=1, samples=0)
+    (egg,) = done.links[1].hulls
+    corners = {tuple(corner) for corner in given.vertices.astype("<f4").tolist()}
+    assert {tuple(corner) for corner in egg.vertices.astype("<f4").tolist()} == corners
+    for options in ({"detail": "simple"}, {"max_vertices": 64}):
+        other = rlacd.rewrite_robot(robot, tmp_path / "other.urdf", threads=1, samples=0, **options)
+        assert len(other.links[1].hulls[0].vertices) < len(corners)
+
+
 def test_joints_of_mjcf_are_sampled_in_their_limits_or_told(arm: Path) -> None:
     motion = mjcf_motion(arm, 100, seed=3)
     assert [joint.name for joint in motion.sampled] == ["j"]
@@ -286,6 +347,19 @@ def test_joints_of_mjcf_are_sampled_in_their_limits_or_told(arm: Path) -> None:
     driven = 0.1 + 1.5 * motion.positions[:, 0]
     assert np.cos(turns - driven) == pytest.approx(1), "k follows j by the equality"
     assert motion.poses[0, a] == pytest.approx(np.eye(4))
+
+
+def test_joints_without_limits_are_told_in_one_sentence_and_a_floating_base_in_none(arm: Path) -> None:
+    geom = '<geom type="mesh" mesh="box"/>'
+    wheels = "".join(f'<body pos="{x} 0 0"><joint name="w{x}" axis="0 1 0"/>{geom}</body>' for x in range(2, 6))
+    asset = '<asset><mesh name="box" file="box.obj"/></asset>'
+    base = f'<body name="base"><freejoint/>{geom}{wheels}</body>'
+    for more in ("", f'<body name="ball" pos="0 0 9"><freejoint/>{geom}</body>'):
+        arm.write_text(f"<mujoco>{asset}<worldbody>{base}{more}</worldbody></mujoco>")
+        motion = mjcf_motion(arm, 10)
+        turns = "the joint w2 has no limits, so a whole turn was looked at (as for 3 more)"
+        apart = "the joint number 0 is free or a ball, so it was looked at only at rest (as for 1 more)"
+        assert {*motion.warnings} == {turns, apart} if more else {turns}
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])

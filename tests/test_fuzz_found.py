@@ -9,8 +9,8 @@ import pytest
 import trimesh
 
 import rlacd
+from fuzz.choices import draw_options
 from fuzz.recipes import make_shape
-from fuzz.rows import draw_options
 from fuzz.trials import Laboratory, Trial
 from rlacd import _native
 from rlacd.io.read.load import load_mesh

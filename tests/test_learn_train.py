@@ -35,8 +35,6 @@ from rlacd.solid.component import Component
 from tests.learning import small_solids, write_meshes
 from tests.pool.obedient import pool_processes
 
-CHECKPOINTS = Path(__file__).parent.parent / "research" / "checkpoints"
-
 TINY: dict[str, Any] = {
     "env_steps": 120,
     "learning_starts": 30,
@@ -169,24 +167,6 @@ def test_a_run_resumes_before_it_has_learned_anything(meshes: Path, tmp_path: Pa
     run(meshes, tmp_path / "halves", **{**returns, "env_steps": 20})
     run(meshes, tmp_path / "halves", resume=True, **returns)
     assert weights(tmp_path / "whole") == weights(tmp_path / "halves")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kept", sorted(CHECKPOINTS.glob("seed_*")), ids=lambda kept: kept.name)
-def test_the_checkpoints_of_the_repository_can_be_resumed(meshes: Path, tmp_path: Path, kept: Path) -> None:
-    pytest.importorskip("torch", reason="needs the extra train")
-    from rlacd.learn.train import train
-
-    for name in ("checkpoint.npz", "curves.jsonl"):
-        shutil.copy(kept / name, tmp_path)
-    listed = {"training": [path.name for path in meshes.glob("[act]*.ply")], "validation": []}
-    (tmp_path / "meshes.json").write_text(json.dumps(listed | {"unreadable": 0, "too_large": 0}))
-    done, said = curves(kept)[-1]["env_steps"], list[str]()
-    options = TrainOptions.preset("returns", seed=int(kept.name[5:]), env_steps=int(done) + 60, log_every=20)
-    train(meshes, tmp_path, options, resume=True, say=said.append)
-    assert any(line.startswith("resuming at step") for line in said)
-    assert curves(tmp_path)[-1]["env_steps"] > done
-    assert 0 < curves(tmp_path)[-1]["loss"] < 0.1
 
 
 @pytest.mark.nightly

@@ -103,9 +103,9 @@ def test_the_comparison_takes_networks_of_a_folder(tmp_path: Path) -> None:
 
 def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:
     card = (files("rlacd.policies") / "learned.md").read_text(encoding="utf-8")
-    row = re.search(r"\| concavity 5 %[^|]*\| raw \| ((\S+) \(\S+ to \S+\))", card)
+    row = re.search(r"\| concavity 5%[^|]*\| raw \| ((\S+) \(\S+ to \S+\))", card)
     assert row
-    fewer = f"{100 * (1 - float(row[2])):.0f} % fewer parts than the best greedy rule"
+    fewer = f"{100 * (1 - float(row[2])):.0f}% fewer parts than the best greedy rule"
     page = (ROOT / "docs" / "what_learning_is_worth.md").read_text(encoding="utf-8")
     assert f"`learned` | {row[1]}" in page
     for text in (page, (ROOT / "README.md").read_text(encoding="utf-8")):

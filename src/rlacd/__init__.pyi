@@ -143,7 +143,7 @@ def decompose(
         fits at the same place. A warning counts the passages not kept and says what is left; ``report.passages`` lists
         them. Default: passages may close.
     keep_open_abs : float | None
-        The radius of that ball as a length in the mesh's own unit. It still passes wherever one 1 % larger does.
+        The radius of that ball as a length in the mesh's own unit. It still passes wherever one 1% larger does.
     avoid : Sequence[MeshLike]
         Meshes in the same frame and unit that no hull enters. Parts are cut finer there, down to a hundredth of the
         threshold. Where the input itself crosses them, or limits on the hulls leave no way, a warning says so. Default:
@@ -172,7 +172,7 @@ def decompose(
     threads : int | None
         Threads to use; the result does not depend on it. Default: all cores.
     timeout : float | None
-        Stop after this time and keep the result so far. It is at most 1 s and 10 % late for inputs of up to a million
+        Stop after this time and keep the result so far. It is at most 1 s and 10% late for inputs of up to a million
         triangles. The result always covers the input, at worst with one hull for each body.
     quality : QualityName | None
         How long to search for fewer hulls: fast does not search, balanced takes two to three times as long, best
@@ -233,6 +233,7 @@ def rewrite_robot(
     progress: ProgressCallback | None = None,
     per: Per | None = "link",
     links: Mapping[str, float | str] | None = None,
+    from_visual: bool | None = False,
     samples: int | None = 500,
     exclude: str | Sequence[PairKind] | None = (),
     srdf: str | os.PathLike[str] | None = None,
@@ -293,6 +294,9 @@ def rewrite_robot(
     links : Mapping[str, float | str] | None
         Another distance for the links whose whole name matches a regular expression; the last that matches counts.
         ``{"finger.*": "1mm"}``, or a number in the robot's own unit, as `threshold_abs`.
+    from_visual : bool
+        Links without collision geometry get it from what they show: hulls of the meshes, and the same primitives. What
+        is shown stays. Of an MJCF model, these are bodies none of whose geoms collides. Default: false.
     samples : int
         Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
         extra rlacd[clear]. Where hulls of such links would touch, they are cut finer, or a warning names both. USD
@@ -304,7 +308,7 @@ def rewrite_robot(
     srdf : str | os.PathLike[str] | None
         Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.
     **options
-        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
+        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5% of
         the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
         ``relative_to="mesh"`` to each solid, whose criterion and threshold are then those of `rlacd.decompose`. Lengths
         such as `threshold_abs` are in the robot's unit, after the scale of a mesh. A `timeout` applies to each solid.

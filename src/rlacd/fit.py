@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from rlacd.options.names import UNITS
 
 RESOLVED = 1e-3
-"""Distances in the frame above this (0.05 % of the longest side) are measured to 1 %; others are upper bounds."""
+"""Distances in the frame above this (0.05% of the longest side) are measured to 1%; others are upper bounds."""
 
 COVERED = 5e-5
 """Hulls that miss no more than this of an input cover it."""

@@ -34,7 +34,7 @@ HULLS_A_PART = 3
 
 STILL_MANY = 1.5
 """Parts are not united if a coarser goal leaves more than so many times the hulls asked for: of 27 real meshes held to
-8 hulls none takes more than 2.9 times as long as without the limit, not 9 times; they fit 2 % worse."""
+8 hulls none takes more than 2.9 times as long as without the limit, not 9 times; they fit 2% worse."""
 
 NEARLY_EQUAL = 1.02
 """Errors within this factor are equal: they are measured to a fiftieth of the threshold."""

@@ -81,7 +81,7 @@ measurement, where the longest side is 2."""
 
 @dataclass(frozen=True)
 class Hausdorff:
-    """Distances between the surfaces of hulls and input, to 1 %; upper bounds up to 0.001; null without time."""
+    """Distances between the surfaces of hulls and input, to 1%; upper bounds up to 0.001; null without time."""
 
     added: float | None = None
     """The greatest distance of the hulls' surface from the input's."""
@@ -237,7 +237,7 @@ class Report:
     hausdorff: Hausdorff = Hausdorff()
     """How far the hulls are from the input."""
     passages: tuple[Passage, ...] | None = None
-    """What the hulls narrow, most narrowed first; null without time to look. Those narrower than 0.8 % of the longest
+    """What the hulls narrow, most narrowed first; null without time to look. Those narrower than 0.8% of the longest
     side are left out. Over 2,000 triangles or 600 places, some may be missing: warnings then say "at least"."""
     nodes: tuple[NodeHulls, ...] | None = if_asked()
     """With the option `per_node`."""

@@ -25,6 +25,7 @@ from rlacd.options.fields import about, check_callback
 from rlacd.options.lengths import read_lengths
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.distance import hull_distances
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.manifold import to_manifold
 
 FACTORS = (1, 1.25, 1.5, 2, 2.5, 4, 6, 10, 15, 25)
@@ -132,16 +133,27 @@ def tradeoff(
         usual = about(Options, name).kind.read(getattr(chosen, name))
         chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options, name: FINEST * usual})
     check_callback("progress", progress, "a `rlacd.Progress`")
-    rows: list[TradeoffRow] = []
     with Run(chosen.threads, chosen.timeout, progress) as run:
         with run.stage("load"):
             source, chosen = in_metres(load_mesh(mesh, faces, file_type), chosen)
-            finest = getattr(chosen, name)
-        for factor, reached in zip(FACTORS, find_parts_under(source, chosen, FACTORS, run), strict=False):
-            unit = 1.0 if chosen.threshold_abs is None else reached.solid.frame.scale
-            rows.append(_row(finest * factor, reached, unit, run))
+        rows = rows_of(source, chosen, getattr(chosen, name), FACTORS, run)
         complete = run.stopped_by is None
-    return Tradeoff(Path(source.name).stem, name, rows, _pick(rows, max_hulls), complete, source.unit)
+    pick = picked([(row.threshold, row.hulls) for row in rows], max_hulls)
+    return Tradeoff(Path(source.name).stem, name, rows, pick, complete, source.unit)
+
+
+def rows_of(
+    source: InputMesh, options: Options, finest: float, factors: Sequence[float], run: Run
+) -> list[TradeoffRow]:
+    """What the threshold of options, of the value `finest`, leads to times each factor, the first of them 1.
+
+    Those behind a single hull are left out, and those that there is no time for.
+    """
+    rows = []
+    for factor, reached in zip(factors, find_parts_under(source, options, factors, run), strict=False):
+        unit = 1.0 if options.threshold_abs is None else reached.solid.frame.scale
+        rows.append(_row(finest * factor, reached, unit, run))
+    return rows
 
 
 def _row(threshold: float, reached: Reached, unit: float, run: Run) -> TradeoffRow:
@@ -155,17 +167,16 @@ def _row(threshold: float, reached: Reached, unit: float, run: Run) -> TradeoffR
     return TradeoffRow(threshold, len(hulls), sum(len(hull.faces) for hull in hulls), over / unit, added)
 
 
-def _pick(rows: Sequence[TradeoffRow], most: int | None) -> int | None:
-    """The finest with at most so many hulls, or the knee: the point farthest below the line between the ends.
+def picked(points: Sequence[tuple[float, int]], most: int | None) -> int | None:
+    """The finest threshold with at most so many hulls, or the knee: the point farthest below the line between the ends.
 
     The threshold counts by its logarithm; both axes are scaled to the same length (Satopää et al., "Finding a
     'Kneedle' in a Haystack", 2011).
     """
     if most is not None:
-        return next((i for i, row in enumerate(rows) if row.hulls <= most), None)
-    if len(rows) < 3 or rows[0].hulls == rows[-1].hulls:
-        return len(rows) - 1 if rows else None
-    x = np.log([row.threshold for row in rows])
-    y = np.array([row.hulls for row in rows], dtype=np.float64)
+        return next((i for i, (_, hulls) in enumerate(points) if hulls <= most), None)
+    if len(points) < 3 or points[0][1] == points[-1][1]:
+        return len(points) - 1 if points else None
+    x, y = np.log([threshold for threshold, _ in points]), np.array([hulls for _, hulls in points], dtype=np.float64)
     below = (y[0] - y) / (y[0] - y[-1]) - (x - x[0]) / (x[-1] - x[0])
     return int(below.argmax())

@@ -403,7 +403,7 @@ def test_ctrl_c_finishes_what_is_running_and_the_next_run_goes_on(trouble: dict[
     assets, out = tmp_path / "assets", tmp_path / "out"
     for number in range(6):
         write_ell(assets / f"slow_{number}.obj", 2.0 + number / 10)
-    process = start(assets, out, {**trouble, "TROUBLE_SLOW": "3"})
+    process = start(assets, out, {**trouble, "TROUBLE_SLOW": "1.5"})
     wait_for_rows(out, 1, process)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=120)

@@ -162,12 +162,12 @@ def cut_meshes(corpus: Path, count: int, seed: int) -> Iterator[Component]:
 @pytest.mark.promise("certified")
 def test_on_real_parts_yes_is_never_contradicted_by_dense_samples(corpus: Path) -> None:
     met = 0
-    for part in cut_meshes(corpus, 40, seed=1):
+    for part in cut_meshes(corpus, 15, seed=1):
         check(part)
         if Concavity(0.05).is_met(part):
             met += 1
             assert max(sampled(part)) <= 0.05 + 1e-9
-    assert met > 10
+    assert met > 4
 
 
 def test_hull_larger_than_the_part_counts_in_full() -> None:

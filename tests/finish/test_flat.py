@@ -58,7 +58,13 @@ def test_a_bowl_stands_on_its_small_foot() -> None:
 @pytest.mark.promise("flat")
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"quality": "fast", "max_vertices": 24}])
-@pytest.mark.parametrize("name", ["vhacd/ob_chess_table.ply", "coacd_examples/KitchenPot.ply", "vhacd/al.ply"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "vhacd/ob_chess_table.ply",
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("coacd_examples/KitchenPot.ply", "vhacd/al.ply")),
+    ],
+)
 def test_real_objects_stand_where_they_stood(corpus: Path, name: str, options: dict[str, object]) -> None:
     solid = repair(load_mesh(corpus / "test" / name), resolution=100, threads=1)
     result = rlacd.decompose(corpus / "test" / name, threads=1, **options)  # type: ignore[arg-type]

@@ -163,9 +163,16 @@ def test_missing_folders_are_made_with_the_file(tmp_path: Path, place: str) -> N
 # --- whole or not at all ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ending", FORMATS)
-@pytest.mark.parametrize("stage", ["fsync", "replace"])
-@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()], ids=repr)
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("ending", "stage", "error"),
+    [
+        *(("glb", "fsync", FULL), ("obj", "replace", FULL)),
+        *(("ply", "fsync", KeyboardInterrupt()), ("stl", "replace", KeyboardInterrupt())),
+    ],
+)
 @pytest.mark.promise("whole-files")
 def test_a_failing_disk_or_an_interrupt_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, stage: str, error: BaseException

@@ -16,6 +16,7 @@ from lxml import etree
 import rlacd
 import rlacd.cli.decompose
 from rlacd.cli.main import app
+from rlacd.cli.terminal import rewrite_summary
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.io.robots import decomposed
 from tests.io.urdf_files import EAR, collisions, urdf, without_collision_meshes, write_ear
@@ -129,7 +130,8 @@ def test_a_link_of_sheets_and_points_is_covered(tmp_path: Path) -> None:
 
 
 def test_lengths_are_shares_of_the_robot_at_rest(lever: Path) -> None:
-    size = np.ptp(np.concatenate([mesh.vertices for mesh in collision_meshes(lever)]), axis=0).max()
+    ball = np.array([[-1, -1, 4], [1, 1, 6]])
+    size = np.ptp(np.concatenate([ball, *(mesh.vertices for mesh in collision_meshes(lever))]), axis=0).max()
     assert size > 10, "the joint turns the hand away"
     for how, length in (({}, 0.015 * size), ({"threshold": 0.1}, 0.05 * size), ({"threshold_abs": 0.2}, 0.2)):
         done = rlacd.rewrite_robot(lever, lever.with_name("out.urdf"), links={"h.nd": 0.01}, threads=1, **how)  # type: ignore[arg-type]
@@ -313,7 +315,8 @@ def test_warnings_of_a_kind_are_one_that_names_the_worst(tmp_path: Path) -> None
     said = [warning for warning in done.warnings if "passage" in warning]
     assert len(said) == 1
     assert said[0].startswith("l1 and 2 others: 5 passages narrow by over half, 5 to nothing: near")
-    assert sum("Y_UP" in warning for warning in done.warnings) == 1
+    (turned,) = [warning for warning in done.warnings if "Y_UP" in warning]
+    assert turned.startswith("l0 (ring0.dae) and 2 others: "), "the link, and the file to correct"
     assert len(done.warnings) == 5, "about the threshold, about mass, and about the links, which stand in each other"
 
 
@@ -348,9 +351,163 @@ def test_a_mass_that_follows_from_hulls_is_told(tmp_path: Path) -> None:
 def test_info_shows_the_links_of_a_robot(ear: Path) -> None:
     run = CliRunner().invoke(app, ["info", str(ear)])
     assert run.exit_code == 0, run.output
-    assert re.search(r"2 with collision meshes\n +base +1 mesh +\d+ triangles\n +tip +2 meshes", run.stdout)
+    assert re.search(
+        r"2 that collide, 2 with meshes\n +base +1 mesh +\d+ triangles, 1 box\n +tip +2 meshes", run.stdout
+    )
     facts = json.loads(CliRunner().invoke(app, ["info", str(ear), "--json"]).stdout)
     assert [(link["name"], len(link["meshes"])) for link in facts["links"]] == [("base", 1), ("tip", 2)]
+
+
+def test_links_of_primitives_alone_count_and_are_told(tmp_path: Path) -> None:
+    """For the size, in tables and in the matrix: a mesh of 10 cm between a pole and a ball, 3 m apart."""
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "box.stl")
+    shapes = {"pole": '<cylinder radius="0.1" length="2"/>', "tool": '<mesh filename="box.stl"/>'}
+    shapes |= {"tip": '<sphere radius="0.5"/>', "world": '<box size="9 9 9"/>'}
+    along = '<origin xyz="0 0 0" rpy="0 1.5707963 0"/>'
+    links = [
+        f'<link name="{name}"><collision>{along}<geometry>{shape}</geometry></collision></link>'
+        for name, shape in shapes.items()
+    ]
+    joints = [
+        f"""<joint name="{child}_" type="revolute"><parent link="{parent}"/><child link="{child}"/>
+        <origin xyz="{x} 0 0"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+        for parent, child, x in (("world", "pole", 0), ("pole", "tool", 1.5), ("tool", "tip", 1.5))
+    ]
+    robot = tmp_path / "r.urdf"
+    robot.write_text(f"<robot name='r'>{''.join(links + joints)}</robot>")
+    matrix = tmp_path / "r.srdf"
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", srdf=matrix, samples=10, threads=1)
+    assert done.size == pytest.approx(1 + 3 + 0.5, rel=0.01), "the pole lies along x"
+    assert done.links[1].results[0].report.options["threshold_abs"] == pytest.approx(0.015 * done.size, rel=0.01)
+    assert [(link.name, len(link.hulls), link.primitives) for link in done.links] == [
+        ("pole", 0, 1),
+        ("tool", 1, 0),
+        ("tip", 0, 1),
+    ]
+    assert [link.name for link in done.replaced] == ["tool"]
+    assert re.search(
+        r"\n  pole +1 primitive\n  tool +1 mesh +1 hull +farthest .*\n  tip +1 primitive\n", rewrite_summary(done)
+    )
+    said = {tuple(pair.attrib.values()) for pair in etree.parse(str(matrix)).iterfind("disable_collisions")}
+    assert said == {("pole", "tool", "Adjacent"), ("tool", "tip", "Adjacent"), ("pole", "tip", "Never")}
+    facts = json.loads(CliRunner().invoke(app, ["info", str(robot), "--json"]).stdout)
+    assert [link["primitives"] for link in facts["links"]] == [["cylinder"], [], ["sphere"]]
+    with pytest.raises(OptionError, match="matches the regular expression 'tip': tool"):
+        rlacd.rewrite_robot(robot, tmp_path / "no.urdf", links={"tip": 0.01})
+    robot.write_text(robot.read_text().replace(shapes["tool"], '<box size="0.1 0.1 0.1"/>'))
+    bare = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", srdf=matrix, samples=10, threads=1)
+    assert {tuple(pair.attrib.values()) for pair in etree.parse(str(matrix)).iterfind("disable_collisions")} == said
+    assert bare.path.read_text() == robot.read_text()
+
+
+SHOWN = """<robot name="r">
+<link name="arm">
+  <visual name="v"><origin xyz="1 0 0" rpy="0 .5 0"/><geometry><mesh filename="bar.stl" scale="1 2 1"/></geometry>
+    <material name="m"><color rgba="1 0 0 1"/></material></visual>
+  <visual><geometry><mesh filename="bar.stl"/></geometry></visual>
+  <visual><geometry><sphere radius=".1"/></geometry></visual></link>
+<link name="pole"><visual><origin xyz="0 1 0"/><geometry><cylinder radius=".1" length="1"/></geometry></visual></link>
+<link name="cover"><collision><geometry><box size="1 1 1"/></geometry></collision>
+  <visual><geometry><mesh filename="bar.stl"/></geometry></visual></link>
+<joint name="j" type="revolute"><parent link="arm"/><child link="pole"/><origin xyz="0 0 5"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="k" type="revolute"><parent link="pole"/><child link="cover"/><origin xyz="0 0 5"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_links_without_collision_geometry_get_it_from_what_they_show(tmp_path: Path) -> None:
+    """Where asked; those that have some keep that, and what is shown stays byte for byte."""
+    trimesh.creation.box((1, 0.2, 0.2)).export(tmp_path / "bar.stl")
+    robot = tmp_path / "r.urdf"
+    robot.write_text(SHOWN)
+    asked: dict[str, Any] = {"srdf": tmp_path / "r.srdf", "samples": 20, "threads": 1}
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", from_visual=True, **asked)
+    after = done.path.read_text()
+    assert re.sub(r"\s*<collision>((?!<box).)*?</collision>", "", after) == SHOWN
+    assert [(len(link.hulls), link.primitives) for link in done.links] == [(2, 1), (0, 1), (0, 1)]
+    root = etree.fromstring(after)
+    arm, pole, _ = root.iterfind("link")
+    for link in (arm, pole):
+        shown = [(v.find("origin"), v.find("geometry")[0]) for v in link.iterfind("visual")]
+        primitives = [(o, g) for o, g in shown if g.tag != "mesh"]
+        own = [(c.find("origin"), c.find("geometry")[0]) for c in link.iterfind("collision")]
+        found = [(o, g) for o, g in own if g.tag != "mesh"]
+        for (origin, shape), (other, same) in zip(primitives, found, strict=True):
+            assert dict(shape.attrib) == dict(same.attrib)
+            assert (origin is None and other is None) or dict(origin.attrib) == dict(other.attrib)
+    bars = [trimesh.load_mesh(tmp_path / "bar.stl") for _ in range(2)]
+    turn = trimesh.transformations.euler_matrix(0, 0.5, 0)
+    bars[0].apply_transform(np.diag([1.0, 2.0, 1.0, 1.0])).apply_transform(turn).apply_translation((1, 0, 0))
+    assert inside(done.links[0].hulls, np.concatenate([bar.vertices for bar in bars]), 1e-6).all()
+    said = {tuple(pair.attrib.values()) for pair in etree.parse(str(asked["srdf"])).iterfind("disable_collisions")}
+    assert said == {("arm", "pole", "Adjacent"), ("pole", "cover", "Adjacent"), ("arm", "cover", "Never")}
+    plain = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", **asked)
+    assert plain.path.read_text() == SHOWN
+    assert any(warning.endswith("has no collision mesh, so this is a copy.") for warning in plain.warnings)
+    robot.write_text(re.sub("<collision.*?</collision>", "", SHOWN))
+    (said,) = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", threads=1).warnings
+    assert said.endswith("so this is a copy; --from-visual makes collision geometry of what it shows.")
+    robot.write_text(SHOWN)
+    run = CliRunner().invoke(app, ["decompose", str(robot), "--from-visual", "--threads", "1", "--samples", "5"])
+    assert run.exit_code == 0, run.output
+    assert (tmp_path / "r_hulls.urdf").read_text().count("<collision>") == after.count("<collision>")
+
+
+@pytest.fixture
+def rings(tmp_path: Path) -> Path:
+    """A ring, a bowl that is open at the top, and a box, which no joint connects."""
+    trimesh.creation.torus(0.4, 0.1, major_sections=64, minor_sections=24).export(tmp_path / "ring.stl")
+    bowl = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
+    trimesh.Trimesh(bowl.vertices, bowl.faces[bowl.triangles_center[:, 2] < 0.3]).export(tmp_path / "bowl.stl")
+    trimesh.creation.box().export(tmp_path / "box.stl")
+    collision = '<link name="{0}"><collision><geometry><mesh filename="{0}.stl"/></geometry></collision></link>'
+    links = "".join(map(collision.format, ("ring", "bowl", "box")))
+    (tmp_path / "rings.urdf").write_text(f'<robot name="r">{links}</robot>')
+    return tmp_path / "rings.urdf"
+
+
+def test_a_link_of_many_hulls_is_told_with_what_makes_it_fewer(rings: Path) -> None:
+    options: dict[str, Any] = {"threshold_abs": 0.004, "samples": 0, "threads": 1, "quality": "fast"}
+    done = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), **options)
+    counts = {link.name: len(link.hulls) for link in done.links}
+    told = [warning for warning in done.warnings if " at twice the tolerance " in warning]
+    assert [warning.split()[0] for warning in told] == [name for name, count in counts.items() if count > 20]
+    ((twice, four),) = re.findall(r"about (\d+) at twice .* and (\d+) at four times, --link 'ring=0.016'", told[0])
+    assert counts["ring"] > int(twice) > int(four)
+    again = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), links={"ring": 0.016}, **options)
+    assert len(again.links[0].hulls) == int(four)
+    assert told[0].startswith(f"ring is {counts['ring']} hulls; ")
+    assert told[0].endswith("'.")
+    ((filled,),) = (re.findall(r"with its open bodies filled (\d+), --openings solid\.", told[1]),)
+    solid = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), openings="solid", **options)
+    assert len(solid.links[1].hulls) == int(filled) < counts["bowl"]
+    own = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), relative_to="mesh", threads=1, samples=0)
+    assert not [warning for warning in own.warnings if "twice" in warning]
+
+
+def test_a_robots_tradeoff_has_the_hulls_of_each_link(rings: Path) -> None:
+    run = CliRunner().invoke(
+        app, ["tradeoff", str(rings), "--threads", "1", "-t", "8mm", "--json", "--max-hulls", "20"]
+    )
+    assert run.exit_code == 0, run.output
+    found = json.loads(run.stdout)
+    assert found["thresholds_abs"][:4] == pytest.approx([0.008, 0.01, 0.012, 0.016])
+    assert list(found["links"]) == ["ring", "bowl", "box"]
+    assert found["total"] == [sum(counts) for counts in zip(*found["links"].values(), strict=True)]
+    assert found["links"]["box"] == [1] * 10
+    assert found["total"][found["pick"]] <= 20 < found["total"][found["pick"] - 1]
+    options: dict[str, Any] = {"samples": 0, "threads": 1, "quality": "fast"}
+    done = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), threshold_abs=0.016, **options)
+    assert [len(link.hulls) for link in done.links] == [counts[3] for counts in found["links"].values()]
+    table = CliRunner().invoke(app, ["tradeoff", str(rings), "--threads", "1", "-t", "8mm"]).stdout.splitlines()
+    assert table[0].split()[:3] == ["threshold_abs", "8", "mm"]
+    assert table[1].split() == ["ring", *map(str, found["links"]["ring"])]
+    assert table[-1].split()[2:] == [*map(str, found["total"])]
+    for words, says in ((["--criterion", "volume"], "lengths"), (["--scale", "2"], "single mesh")):
+        refused = CliRunner().invoke(app, ["tradeoff", str(rings), *words])
+        assert refused.exit_code == 2
+        assert says in refused.stderr
 
 
 def test_a_log_tells_which_link_is_under_way(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -169,6 +169,87 @@ def tensors(model: Any) -> np.ndarray:
     return np.array([turn * inertia @ turn.T for turn, inertia in zip(turns, model.body_inertia, strict=True)])
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_primitives_are_where_mujoco_puts_them(tmp_path: Path, seed: int) -> None:
+    """Of random kinds, sizes and places, stated in every way: by classes, within frames, from one end to the other."""
+    pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    rng = np.random.default_rng(seed)
+    kinds = ["box", "sphere", "capsule", "cylinder", "ellipsoid"]
+
+    def numbers(count: int) -> str:
+        return " ".join(map(repr, rng.normal(size=count).round(3).tolist()))
+
+    def turned() -> str:
+        ways = {"quat": 4, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "euler": 3}
+        way = rng.choice([*ways, "none"])
+        return "" if way == "none" else f'{way}="{numbers(ways[way])}"'
+
+    def geom() -> str:
+        kind, size = rng.choice(kinds), " ".join(map(str, rng.uniform(0.1, 1, 3).round(3)))
+        how = rng.choice(["", 'class="c"', 'class="d"', 'contype="0"', 'contype="0" conaffinity="0"'])
+        if kind != "sphere" and rng.random() < 0.3:
+            return f'<geom type="{kind}" size="{size.split()[0]}" fromto="{numbers(6)}" class="e"/>'
+        own = f'<geom type="{kind}" size="{size}" pos="{numbers(3)}" {turned()} {how}/>'
+        return own if rng.random() < 0.5 else f'<frame pos="{numbers(3)}" {turned()}>{own}</frame>'
+
+    def body(depth: int) -> str:
+        inner = "".join(body(depth - 1) for _ in range(2)) if depth else ""
+        return f'<body pos="{numbers(3)}" {turned()}><joint/>{"".join(geom() for _ in range(3))}{inner}</body>'
+
+    given = """<default><geom friction="1"/><default class="c"><geom size=".3 .3 .3" zaxis="1 2 3"/></default>
+    <default class="d"><geom contype="0" conaffinity="0"/></default><default class="e"/></default>"""
+    (tmp_path / "r.xml").write_text(f"<mujoco>{given}<worldbody>{geom()}{body(3)}</worldbody></mujoco>")
+    robot = read_robot(tmp_path / "r.xml")
+    motion = robot.motion(0, 0)
+    assert list(motion.links) == [one.name for one in robot.bodies], "all that MuJoCo finds to collide"
+    for one, pose, own in zip(robot.bodies, motion.poses[0], motion.solids, strict=True):
+        assert pose == pytest.approx(one.pose, abs=1e-6)
+        both = [sorted(each, key=lambda p: (p.kind, *p.sizes.round(9))) for each in (one.primitives, own.primitives)]
+        for ours, theirs in zip(*both, strict=True):
+            assert ours.kind == theirs.kind
+            assert ours.sizes == pytest.approx(theirs.sizes)
+            assert np.abs(ours.place - theirs.place).max() < 1e-6
+
+
+BARE = """<mujoco><default><default class="v"><geom type="mesh" contype="0" conaffinity="0" group="2"/></default>
+</default><asset><mesh name="t" file="table.stl"/><mesh name="u" file="table.stl" scale="0.5 0.5 0.5"/></asset>
+<worldbody><geom class="v" mesh="t"/>
+<body name="a"><joint range="-1 1" limited="true"/><geom name="n" class="v" mesh="t"/>
+  <geom class="v" mesh="u" pos="0 0 1"/>
+  <frame pos="0 0 2"><geom name="ball" class="v" type="sphere" size=".1"/></frame>
+  <body name="b" pos="0 0 4"><joint range="-1 1" limited="true"/><geom type="sphere" size=".1"/>
+    <geom class="v" mesh="t"/></body>
+</body></worldbody></mujoco>"""
+
+
+def test_bodies_none_of_whose_geoms_collides_get_hulls_of_what_they_show(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
+    table().export(tmp_path / "table.stl")
+    (tmp_path / "in.xml").write_text(BARE)
+    done = rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "out.xml", from_visual=True, threads=1, samples=20)
+    assert [(link.name, link.primitives) for link in done.links] == [("a", 1), ("b", 1)]
+    assert [(pair.first, pair.second, pair.adjacent, pair.loose) for pair in done.pairs] == [("a", "b", True, False)]
+    before, after = mujoco_model(tmp_path / "in.xml"), mujoco_model(done.path)
+    assert after.body_mass == pytest.approx(before.body_mass, rel=1e-6)
+    collide = [(model.geom_contype | model.geom_conaffinity) != 0 for model in (before, after)]
+    count = len(done.links[0].hulls)
+    assert [flags.sum() for flags in collide] == [1, 1 + count + 1]
+    new = after.geom_bodyid[collide[1]]
+    assert (new == after.body("a").id).sum() == count + 1
+    names = [mujoco.mj_id2name(after, mujoco.mjtObj.mjOBJ_GEOM, g) for g in range(after.ngeom)]
+    assert {"n", "n_000", "ball", "ball_collision"} <= {*names}
+    shown = [(model.geom_group < 3).sum() for model in (before, after)]
+    assert shown[0] == shown[1]
+    corners = []
+    for model, chosen in ((before, before.geom_bodyid == before.body("a").id), (after, collide[1])):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        meshes = np.flatnonzero(chosen & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH))
+        corners.append([points_of_geom(model, data, geom) for geom in meshes])
+    hulls = [trimesh.convex.convex_hull(points) for points in corners[1]]
+    assert inside(hulls, np.concatenate(corners[0]), 1e-5).all()
+
+
 HAND = """<mujoco>
 <compiler angle="{angle}" eulerseq="xZy" autolimits="true"/>
 <default><default class="c"><geom type="mesh" group="3" quat="1 0 0.2 0"/></default></default>

@@ -127,7 +127,7 @@ def test_a_link_that_is_driven_into_another_turns_red(seen: Watched) -> None:
     page.keyboard.press("End")
     page.wait_for_selector("#contacts b")
     settle(page)
-    assert page.locator("#contacts span").first.inner_text() == "base and ram, as their meshes do"
+    assert page.locator("#contacts span").first.inner_text() == "base and ram, as in the input"
     red = pixels(page)
     assert (
         (red[..., 0] > red[..., 1:3].sum(axis=2) + 60).mean()
@@ -148,7 +148,7 @@ def test_the_server_tells_contacts_of_joint_positions_only(press: ViewServer) ->
     for state in press.session.changes():
         if state is not None and state.run is not None:
             break
-    assert ask(press, "POST", "/touching", {"values": [0, 1.2]}).json["contacts"][0] == [0, 2, "as their meshes do"]
+    assert ask(press, "POST", "/touching", {"values": [0, 1.2]}).json["contacts"][0] == [0, 2, "as in the input"]
     assert ask(press, "POST", "/touching", {"values": [0, 0.5]}).json == {"contacts": []}
     for bad in ({}, {"values": [0]}, {"values": [0, "1"]}, {"values": {"turn": 1}}):
         assert ask(press, "POST", "/touching", bad).status == 400
@@ -172,13 +172,32 @@ def test_the_report_of_a_robot_shows_the_worst_positions(robots: Path, browser: 
         assert places[0] == "At rest"
         assert any(place.startswith("base and ram: at ") for place in places)
         page.select_option("#place", label=next(place for place in places if place.startswith("base and ram")))
-        assert "base and ram, as their meshes do" in page.locator("#contacts").inner_text()
+        assert "base and ram, as in the input" in page.locator("#contacts").inner_text()
         page.locator("#joint-0").focus()
         page.keyboard.press("ArrowRight")
         assert "61 positions were looked at" in page.locator("#contacts").inner_text()
         assert watched.complaints == []
         assert watched.outside(report.as_uri()) == []
     assert '"links"' in to_json(done.as_dict())
+
+
+def test_primitives_are_drawn_beside_the_hulls(robots: Path) -> None:
+    """Those of a link with meshes, and a link that has nothing else; with their links they move and turn red."""
+    ball = '<collision><origin xyz="0 0 {}"/><geometry><sphere radius="0.3"/></geometry></collision>'
+    text = URDF.replace('<link name="ram"><coll', f'<link name="ram">{ball.format(0.5)}<coll')
+    path = robots / "fingers.urdf"
+    path.write_text(text.replace('<link name="eye"/>', f'<link name="eye">{ball.format(-2)}</link>'))
+    robot = decompose_viewed(path, **USUAL, quality="fast", threads=1)
+    assert isinstance(robot, RobotResult)
+    shown = scene(robot)
+    assert [shown["robot"]["links"][each["link"]]["name"] for each in shown["kept"]] == ["ram", "eye"]
+    assert len(shown["input"]) == len(robot.links) == 5
+    motion = urdf_motion(path, 0, links=robot.links)
+    for name, height, own in zip(robot.links, (0, 0, 0.5, 0, -2), robot.kept, strict=True):
+        middle = trimesh.transform_points([[0, 0, height]], motion.poses[0, robot.links.index(name)])[0]
+        for mesh in own:
+            away = np.linalg.norm(mesh.vertices - middle, axis=1)
+            assert 0.3 - 1e-9 <= away.min() <= away.max() < 0.32
 
 
 def test_a_robot_without_collision_meshes_is_refused(robots: Path) -> None:

@@ -1,12 +1,13 @@
 """Bodies that move against each other: which of their hulls touch where the bodies themselves do not."""
 
-from rlacd.clear.bodies import Body, CrowdedError, Surface, may_touch
+from rlacd.clear.bodies import PRIMITIVES, Body, CrowdedError, Primitive, Surface, may_touch
 from rlacd.clear.mend import Cleared, kept_clear
 from rlacd.clear.motion import Joint, Motion, Solids, at_rest, mjcf_motion, urdf_motion
 from rlacd.clear.pairs import LinkPair, link_pairs, warnings_of
 from rlacd.clear.touching import Offence, Touching, check
 
 __all__ = [
+    "PRIMITIVES",
     "Body",
     "Cleared",
     "CrowdedError",
@@ -14,6 +15,7 @@ __all__ = [
     "LinkPair",
     "Motion",
     "Offence",
+    "Primitive",
     "Solids",
     "Surface",
     "Touching",

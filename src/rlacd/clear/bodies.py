@@ -114,8 +114,19 @@ class Primitive(Surface):
         super().__init__(hull.vertices, hull.faces)
         self.place = place
 
+    @classmethod
+    def read(cls, kind: str, sizes: Sequence[float], place: FloatArray) -> Primitive | None:
+        """One that a file states; None for another kind, and where a size is missing or is not above 0."""
+        own = [*sizes[: PRIMITIVES.get(kind, 0)]]
+        return cls(kind, own, place) if len(own) == PRIMITIVES.get(kind) and min(own) > 0 else None
+
     def __reduce__(self) -> Any:
         return Primitive, (self.kind, self.sizes, self.place)
+
+    @property
+    def outside(self) -> trimesh.Trimesh:
+        """Its triangles."""
+        return trimesh.Trimesh(self.vertices, self.faces, process=False)
 
     @cached_property
     def as_convex(self) -> Any:

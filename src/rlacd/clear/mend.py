@@ -1,5 +1,7 @@
 """Bodies whose hulls touch where they themselves do not are decomposed again, each clear of the other.
 
+First they get the exact hulls of their parts, which simpler ones hold: at the same tolerance, many then are clear.
+
 The places at which hulls touch are the counterexamples of one round; new ones, found with the new hulls, those of the
 next. Of two bodies, first the one whose hulls reach into the other stays out of the other's hulls; if both do, first
 one stays out of the other's surface and leaves half the gap, then the other out of its hulls.
@@ -10,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +40,9 @@ tolerance between them take seven times as many, which costs more in every step 
 
 Redo = Callable[[int, Sequence[Obstacle], int], Sequence[Surface] | None]
 """Decomposes the body of this number again, clear of obstacles in its frame; None if that takes more hulls."""
+
+Exact = Callable[[int], Sequence[Surface] | None]
+"""The body of this number as the exact hulls of its parts; None if its hulls are that already."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +86,7 @@ class _Wishes:
         return is_new
 
 
-def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
+def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact = lambda _: None) -> Cleared:
     """Decompose bodies again until no hulls touch mostly where the bodies do not, or that does not help.
 
     Raises
@@ -91,6 +97,13 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
     bodies = list(bodies)
     touching = check(bodies, motion)
     first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
+    finer = {
+        i: hulls
+        for i in sorted({*chain(*(pair for pair, found in touching.items() if found.offences))})
+        if bodies[i].hulls and (hulls := exact(i)) is not None
+    }
+    bodies = [body.with_hulls(finer[i]) if i in finer else body for i, body in enumerate(bodies)]
+    touching = _renewed(bodies, motion, touching, {*finer})
     most = [max(MOST_GROWTH * len(body.hulls), len(body.hulls) + SPARE) for body in bodies]
     for _ in range(MOST_ROUNDS):
         wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
@@ -107,12 +120,18 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo) -> Cleared:
                 continue
             bodies[body] = bodies[body].with_hulls(hulls)
             wishes.renewed[body] += 1
-        again -= wishes.given_up
-        near = {(min(i, j), max(i, j)) for i in again for j in range(len(bodies)) if j != i}
-        renewed = check(bodies, motion, near)
-        touching = {pair: found for pair, found in touching.items() if not again & {*pair}} | renewed
+        touching = _renewed(bodies, motion, touching, again - wishes.given_up)
     mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended), frozenset(wishes.given_up))
+
+
+def _renewed(
+    bodies: Sequence[Body], motion: Motion, touching: dict[tuple[int, int], Touching], changed: set[int]
+) -> dict[tuple[int, int], Touching]:
+    """What bodies do, of which some have other hulls."""
+    near = {(min(i, j), max(i, j)) for i in changed for j in range(len(bodies)) if j != i}
+    same = {pair: found for pair, found in touching.items() if changed.isdisjoint(pair)}
+    return same | (check(bodies, motion, near) if changed else {})
 
 
 def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes: _Wishes) -> set[int]:

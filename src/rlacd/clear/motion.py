@@ -34,6 +34,9 @@ _FOR = "checking that links stay clear of each other"
 Limits = tuple[float, float]
 """Of a joint, in radians or the unit of length."""
 
+_Said = dict[tuple[str, str], list[str]]
+"""The names of joints, by what is unusual of them and what that leads to."""
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -72,10 +75,10 @@ _Shape = tuple[str, Sequence[float], FloatArray]
 def _solids(shapes: Iterable[_Shape]) -> Solids:
     primitives, others = list[Primitive](), list[str]()
     for kind, sizes, place in shapes:
-        if kind in PRIMITIVES and min(sizes[: PRIMITIVES[kind]]) > 0:
-            primitives.append(Primitive(kind, sizes, place))
-        else:
+        if (own := Primitive.read(kind, sizes, place)) is None:
             others.append(kind)
+        else:
+            primitives.append(own)
     meshes = others.count("mesh")
     return Solids(primitives, meshes, len(others) - meshes)
 
@@ -192,7 +195,7 @@ def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] |
         tuple(joints),
         positions,
         _adjacent(file, [link for link in file.parents if link not in held], chosen),
-        tuple(file.said),
+        _told(file.said),
         carrier=_last(file.parents, held, chosen),
         carried=_last(file.parents, last, chosen),
         place=partial(_placed, file, chosen),
@@ -224,16 +227,25 @@ def _led(joints: Mapping[int, _Read], first: Collection[int]) -> list[int]:
     return led
 
 
-def _limits(kind: str, name: str, given: Limits | None, said: list[str]) -> Limits | None:
+def _limits(kind: str, name: str, given: Limits | None, said: _Said) -> Limits | None:
     """Between what a joint is sampled; None if it stays at rest, which `said` tells."""
     if given is not None and given[0] < given[1] and all(map(math.isfinite, given)):
         return given
     if kind == "turns":
         if given is None or given[0] >= given[1]:
-            said.append(f"the joint {name} has no limits, so a whole turn was looked at")
+            said.setdefault(("has no limits", "a whole turn was looked at"), []).append(name)
         return -math.pi, math.pi
-    said.append(f"the joint {name} {kind}, so it was looked at only at rest")
+    said.setdefault((kind, "it was looked at only at rest"), []).append(name)
     return None
+
+
+def _told(said: _Said) -> tuple[str, ...]:
+    """A sentence for all joints of a kind."""
+    sentences = []
+    for (kind, what), names in said.items():
+        others = f" (as for {len(names) - 1} more)" if len(names) > 1 else ""
+        sentences.append(f"the joint {names[0]} {kind}, so {what}{others}")
+    return tuple(sentences)
 
 
 def _last(parents: Mapping[int, int], what: Mapping[int, int], links: Sequence[int | None]) -> tuple[int, ...]:
@@ -253,7 +265,8 @@ def _adjacent(file: _Urdf | _Mjcf, carried: Sequence[int], chosen: Sequence[int]
 
     edges = [(link, file.parents[link]) for link in carried if file.parents[link] != file.world]
     graph, new = networkx.Graph(edges), {link: place for place, link in enumerate(chosen)}
-    between = networkx.connected_components(graph.subgraph([link for link in graph if link not in file.solids]))
+    empty = [link for link in graph if link not in file.solids and link not in new]
+    between = networkx.connected_components(graph.subgraph(empty))
     joined = [*map(set, graph.edges), *({near for link in part for near in graph[link]} for part in between)]
     places = (sorted(new[link] for link in links if link in new) for links in joined)
     return frozenset(pair for near in places for pair in combinations(near, 2))
@@ -267,7 +280,7 @@ class _Urdf:
         with _quiet("yourdfpy"):
             self._robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_collision_scene_graph=False)
         self._joints = self._robot.robot.joints
-        self.links, self.said = [link.name for link in self._robot.robot.links], list[str]()
+        self.links, self.said = [link.name for link in self._robot.robot.links], _Said()
         self.parents = {self.links.index(joint.child): self.links.index(joint.parent) for joint in self._joints}
         actuated = {joint.name for joint in self._robot.actuated_joints}
         names = [joint.name for joint in self._joints]
@@ -326,7 +339,7 @@ class _Mjcf:
         mujoco = import_extra("mujoco", _FOR, "clear")
         self._model = model = mujoco.MjModel.from_xml_path(str(path))
         self._data, self._walk = mujoco.MjData(model), mujoco.mj_kinematics
-        self.links, self.said = [model.body(i).name or f"body_{i}" for i in range(model.nbody)], list[str]()
+        self.links, self.said = [model.body(i).name or f"body_{i}" for i in range(model.nbody)], _Said()
         self.parents = {i: int(parent) for i, parent in enumerate(model.body_parentid) if i}
         shapes = _mjcf_shapes(mujoco.mjtGeom, model)
         self.world, self.solids = 0, {body: _solids(own) for body, own in shapes.items()}
@@ -350,6 +363,9 @@ class _Mjcf:
             leader, curve = self._driven[j]
             return read._replace(leader=leader, curve=tuple(curve[1:]))
         given = tuple(model.jnt_range[j].tolist()) if model.jnt_limited[j] and slides is not None else None
+        roots = {int(model.body_rootid[body]) for body in self.solids if body}
+        if slides is None and roots == {read.link}:
+            return read  # all that collides hangs on it, so where it is makes no difference
         return read._replace(limits=_limits(kind, name, given, self.said))
 
     def place(self, positions: FloatArray) -> FloatArray:

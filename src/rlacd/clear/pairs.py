@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +10,9 @@ from rlacd.clear.mend import Cleared
 from rlacd.clear.motion import Motion
 
 TOO_MANY = ": to be clear of each other takes too many hulls"
+
+MOST_SAID = 5
+"""Pairs that touch though the links do not, each with a sentence of its own; the others share one."""
 
 Contact = Literal["adjacent", "always", "sometimes", "never"]
 
@@ -65,30 +68,42 @@ def link_pairs(cleared: Cleared, motion: Motion) -> list[LinkPair]:
 
 
 def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]) -> list[str]:
-    """What to say of links that touch; `length` says one in words."""
-    names = {pair: f"{cleared.bodies[pair[0]].name} and {cleared.bodies[pair[1]].name}" for pair in cleared.touching}
-    sentences, earlier, always = [], list[tuple[float, str]](), list[str]()
-    for pair, touching in cleared.touching.items():
-        deepest = touching.offences[0] if touching.offences else None
-        if touching.is_wrong and deepest is not None:
-            places = "" if len(touching.offences) == 1 else f", the deepest of {len(touching.offences)} places"
-            sentences.append(
-                f"Hulls of {names[pair]} touch though the links do not, up to {length(deepest.depth)} deep "
-                f"{motion.words(deepest.sample)}{places}{'' if cleared.given_up.isdisjoint(pair) else TOO_MANY}."
-            )
-        elif deepest is not None:
-            earlier.append((deepest.depth, names[pair]))
-        if touching.meshes.all() and pair not in motion.adjacent:
-            always.append(names[pair])
-    if earlier:
-        depth, worst = max(earlier)
-        more = "" if len(earlier) == 1 else f" ({len(earlier)} such pairs)"
+    """What to say of links that touch: all are named; `length` says one in words."""
+    names, sentences = [body.name for body in cleared.bodies], list[str]()
+    new = {pair: found for pair, found in cleared.touching.items() if found.offences}
+    wrong = sorted((pair for pair in new if new[pair].is_wrong), key=lambda pair: (-new[pair].depth, pair))
+    for pair in wrong[:MOST_SAID]:
+        deepest, places = new[pair].offences[0], len(new[pair].offences)
+        more = "" if places == 1 else f", the deepest of {places} places"
         sentences.append(
-            f"Hulls of {worst} touch at some places where the links do not, up to {length(depth)} deep; since the "
-            f"links collide at least as often themselves, their hulls were not cut finer{more}."
+            f"Hulls of {names[pair[0]]} and {names[pair[1]]} touch though the links do not, up to "
+            f"{length(deepest.depth)} deep {motion.words(deepest.sample)}{more}"
+            f"{'' if cleared.given_up.isdisjoint(pair) else TOO_MANY}."
         )
+    earlier = sorted(new.keys() - {*wrong})
+    for pairs, which, why in (
+        (wrong[MOST_SAID:], "Hulls of other links touch too though the links do not", ""),
+        (
+            earlier,
+            "Hulls of links that often collide themselves touch a little earlier",
+            ", as they were not cut finer",
+        ),
+    ):
+        if pairs:
+            depth = length(max(new[pair].depth for pair in pairs))
+            sentences.append(f"{which}, up to {depth} deep{why}: {_listed(pairs, names)}.")
+    always = [pair for pair, found in cleared.touching.items() if found.meshes.all() and pair not in motion.adjacent]
     if always:
         more = "" if len(always) == 1 else f", and {len(always) - 1} more pairs,"
         moves = any(len(touching.meshes) > 1 for touching in cleared.touching.values())
-        sentences.append(f"{always[0]}{more} touch in the input itself{' wherever the joints are' if moves else ''}.")
+        both = f"{names[always[0][0]]} and {names[always[0][1]]}"
+        sentences.append(f"{both}{more} touch in the input itself{' wherever the joints are' if moves else ''}.")
     return sentences
+
+
+def _listed(pairs: Sequence[tuple[int, int]], names: Sequence[str]) -> str:
+    """All pairs by their names, each first link once."""
+    others: dict[int, list[str]] = {}
+    for first, second in sorted(pairs):
+        others.setdefault(first, []).append(names[second])
+    return "; ".join(f"{names[first]} with {', '.join(own)}" for first, own in others.items())

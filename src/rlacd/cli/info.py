@@ -21,7 +21,7 @@ from rlacd.plain_json import as_plain, printable, to_json
 def _info(mesh: Path, as_json: bool, package_dirs: Sequence[str] | None) -> None:
     """Show what a file contains and how it would be repaired.
 
-    Of a robot, show its links with collision meshes.
+    Of a robot, show its links that collide.
 
     \b
     Examples:
@@ -52,10 +52,11 @@ COMMAND = Command(
 
 
 def describe_robot(path: Path, package_dirs: Sequence[str] = ()) -> dict[str, Any]:
-    """Read a robot and describe its links with collision meshes as plain values.
+    """Read a robot and describe its links that collide as plain values.
 
     Returns ``file``, ``metres`` (its unit), ``size_abs`` (the longest side of the box around all of them, at rest),
-    ``links`` (a dict each: ``name``, ``meshes`` by their files, ``triangles``), ``warnings``; raises MeshError.
+    ``links`` (a dict each: ``name``, ``meshes`` by their files, ``triangles``, ``primitives``), ``warnings``; raises
+    MeshError.
     """
     from rlacd.io.robots.read import read_robot
 
@@ -64,7 +65,8 @@ def describe_robot(path: Path, package_dirs: Sequence[str] = ()) -> dict[str, An
     for body in robot.bodies:
         meshes = [mesh.file for collider in body.colliders for mesh in collider.meshes]
         files, triangles = [str(mesh.path) for mesh in meshes], sum(len(mesh.faces) for mesh in meshes)
-        links.append({"name": body.name, "meshes": files, "triangles": triangles})
+        primitives = [each.kind for each in body.primitives]
+        links.append({"name": body.name, "meshes": files, "triangles": triangles, "primitives": primitives})
     named = {"file": os.fspath(path), "metres": robot.metres, "size_abs": robot.size}
     return {**named, "links": links, "warnings": [*robot.warnings]}
 
@@ -74,10 +76,13 @@ def robot_text(facts: dict[str, Any]) -> str:
     links = facts["links"]
     width = max((len(link["name"]) for link in links), default=0)
     lines = [facts["file"], f"  size     {facts['size_abs'] * facts['metres']:.6g} m along the longest side, at rest"]
-    lines.append(f"  links    {len(links)} with collision meshes")
+    lines.append(f"  links    {len(links)} that collide, {sum(bool(link['meshes']) for link in links)} with meshes")
     for link in links:
-        held = counted(len(link["meshes"]), "mesh", "meshes")
-        lines.append(f"    {link['name']:{width}}  {held:>9}  {link['triangles']} triangles")
+        held = f"{counted(len(link['meshes']), 'mesh', 'meshes'):>9}  {link['triangles']} triangles"
+        kinds = Counter(link["primitives"])
+        told = [held] * bool(link["meshes"])
+        told += [counted(kinds[kind], kind, "boxes" if kind == "box" else f"{kind}s") for kind in kinds]
+        lines.append(f"    {link['name']:{width}}  {', '.join(told)}")
     lines += [f"  warning: {warning}" for warning in facts["warnings"]]
     return "\n".join(lines) + "\n"
 

@@ -124,18 +124,20 @@ def summary(result: Decomposition, written: str) -> str:
 
 
 def rewrite_summary(done: RewrittenRobot) -> str:
-    """Summarise the result for a robot: a line for each link with collision meshes, and totals."""
-    if not done.links:
+    """Summarise the result for a robot: a line for each link that collides, and totals."""
+    if not done.replaced:
         return "\n".join([f"{done.path}: written", *(f"  warning: {warning}" for warning in done.warnings)])
     meshes = sum(len(link.meshes) for link in done.links)
     hulls = sum(len(link.files) for link in done.links)
-    made = f"{counted(len(done.links), 'link', 'links')}, {counted(hulls, 'hull', 'hulls')} in {done.folder}"
+    made = f"{counted(len(done.replaced), 'link', 'links')}, {counted(hulls, 'hull', 'hulls')} in {done.folder}"
     lines = [f"{done.path}: {made}, {done.seconds:.2f} s"]
     width = max(len(link.name) for link in done.links)
     for link in done.links:
         sizes = f"{counted(len(link.meshes), 'mesh', 'meshes'):>9}  {counted(len(link.files), 'hull', 'hulls'):>8}"
-        lines.append(f"  {link.name:{width}} {sizes}  {_farthest(link.added, done.unit)}")
-    each = f"{hulls / len(done.links):.1f} hulls a link for {counted(meshes, 'mesh', 'meshes')}"
+        told = [_farthest(link.added, done.unit)] * bool(link.meshes)
+        told += [counted(link.primitives, "primitive", "primitives")] * bool(link.primitives)
+        lines.append(f"  {link.name:{width}} {sizes if link.meshes else 19 * ' '}  {', '.join(told)}")
+    each = f"{hulls / len(done.replaced):.1f} hulls a link for {counted(meshes, 'mesh', 'meshes')}"
     lines.append(f"  {each}; {_farthest(done.added, done.unit)}")
     if done.samples:
         kept = sum(pair.kept_clear for pair in done.pairs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,15 @@ TAKEN = (
 )
 
 
-def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None, **how: Any) -> None:
-    """Show how many hulls each of ten thresholds leads to.
+def _tradeoff(
+    mesh: Path,
+    picture: str | None,
+    as_json: bool,
+    quiet: bool | None,
+    package_dirs: Sequence[str] | None,
+    **how: Any,
+) -> None:
+    """Show how many hulls each of ten thresholds leads to; of a robot, link by link.
 
     \b
     Examples:
@@ -32,14 +40,16 @@ def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None
       rlacd tradeoff chair.glb --picture curve.png
       rlacd tradeoff chair.glb --max-hulls 16
       rlacd tradeoff bracket.step -t 0.2mm
+      rlacd tradeoff robot.urdf
 
-    --threshold is the finest to try, 0.02 by default; the coarsest is 25 times that. A star marks the knee, beyond
-    which a finer threshold costs ever more hulls, or the finest with at most --max-hulls. The hulls are those of
-    --quality fast: a search finds fewer.
+    --threshold is the finest to try, 0.02 by default, of a robot 0.6% of its longest side; the coarsest is 25 times
+    that. A star marks the knee, beyond which a finer threshold costs ever more hulls, or the finest with at most
+    --max-hulls. The hulls are those of --quality fast: a search finds fewer.
     """
     refuse_stdin(mesh)
-    if mesh.suffix.lower() in ROBOTS:
-        raise OptionError(f"{mesh} is a robot; give one of the meshes that it refers to.")
+    is_robot = mesh.suffix.lower() in ROBOTS
+    if package_dirs and not is_robot:
+        raise OptionError("--package-dir is for robots, a .urdf or .xml file as input.")
     import_trimesh(mesh)
     if picture is not None:
         from rlacd.viewer.picture import check_picture
@@ -47,14 +57,21 @@ def _tradeoff(mesh: Path, picture: str | None, as_json: bool, quiet: bool | None
         check_picture(picture)
     options = decompose_options(how)
     from rlacd.cli.terminal import watching, writing
-    from rlacd.thresholds import tradeoff
+    from rlacd.io.robots.coarser import RobotTradeoff, tradeoff_of
+    from rlacd.io.robots.read import read_robot
+    from rlacd.thresholds import Tradeoff, tradeoff
 
+    found: Tradeoff | RobotTradeoff
     with watching(quiet=bool(quiet)) as watch:
-        found = tradeoff(mesh, **options, progress=watch)
+        if is_robot:
+            found = tradeoff_of(read_robot(mesh, package_dirs or ()), {**options, "progress": watch})
+        else:
+            found = tradeoff(mesh, **options, progress=watch)
     give(to_json(found.as_dict()) if as_json else f"{found}\n")
-    if found.pick is None and found.rows:
+    points = found.total if isinstance(found, RobotTradeoff) else found.rows
+    if found.pick is None and points:
         say("no threshold tried leads to so few hulls; rlacd decompose --max-hulls finds the tightest.")
-    if picture is not None and found.rows:
+    if picture is not None and points:
         with writing("picture", picture, quiet=bool(quiet)):
             found.save_picture(picture)
     if not found.complete:
@@ -65,9 +82,9 @@ COMMAND = Command(
     "tradeoff",
     _tradeoff,
     [
-        Argument("mesh", "IN", "The mesh, as for decompose; not a robot."),
+        Argument("mesh", "IN", "The mesh or robot, as for decompose."),
         Option("as_json", "--json", is_flag=True, default=False, help="Print JSON instead of a table."),
-        *options_of(OutputOptions, only=("picture", "quiet")),
+        *options_of(OutputOptions, only=("picture", "quiet", "package_dirs")),
         *options_of(Options, only=TAKEN),
     ],
     first=("as_json", "picture", "quiet", *TAKEN[:3], "preset", "timeout"),

@@ -156,7 +156,7 @@ class Distance(Criterion):
     def is_met(self, part: Part) -> bool:
         """Whether the part's error is certainly at most the threshold.
 
-        False if it is larger, or if it is within 0.1 % of the threshold and branch and bound cannot decide.
+        False if it is larger, or if it is within 0.1% of the threshold and branch and bound cannot decide.
         """
         return part.whole.against.meets(part.hull.body, self.threshold) and self._is_full(part)
 

@@ -29,7 +29,7 @@ from rlacd.solid.solid import Solid
 
 SPACING = 0.125
 """Distance between balls, and between the points from which they start, as a share of their radius: an edge that comes
-between two reaches 1 % of the radius deeper than into either."""
+between two reaches 1% of the radius deeper than into either."""
 
 FEWEST_STARTS, MOST_STARTS = 5000, 50_000
 """Fewest and most points from which balls start."""
@@ -69,7 +69,7 @@ CRITERIA: dict[str, type[Criterion]] = {
 
 
 CLEARLY = 0.99
-"""Share of the allowed distance that limits may use, since criteria are decided to 0.1 % of it."""
+"""Share of the allowed distance that limits may use, since criteria are decided to 0.1% of it."""
 
 
 def limited_part(

@@ -137,10 +137,10 @@ class Navigable(Criterion):
         Notes
         -----
         Distances are exact. Passages are found on a grid with cells half a radius wide; if the grid leaves the answer
-        open, the passage itself is followed. No passage narrower than 99 % of the ball counts, and one as wide as the
+        open, the passage itself is followed. No passage narrower than 99% of the ball counts, and one as wide as the
         ball is found unless it is too contorted to be followed in steps of half a radius.
 
-        Measured well inside the hull of the solid, 99 % of the space's boundary is within 0.6 ball radii of a centre,
+        Measured well inside the hull of the solid, 99% of the space's boundary is within 0.6 ball radii of a centre,
         and all of it within 0.75: hulls can reach a fifth of the radius past the boundary undetected, rarely a third.
         """
         scale = solid.frame.scale

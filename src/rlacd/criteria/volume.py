@@ -37,7 +37,7 @@ REACH = 0.2
 
 FILLED_BY_OTHERS = 2.0
 """Unions across others that add more than so many times the tolerance to their own pieces are not tried. With 1, 12
-meshes take 1.4 % more hulls by default; without a limit 3 % fewer, in 1.3 times the time."""
+meshes take 1.4% more hulls by default; without a limit 3% fewer, in 1.3 times the time."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class AddedVolume(Criterion):
     Attributes
     ----------
     tolerance
-        The share: 0.01 is 1 %.
+        The share: 0.01 is 1%.
     whole
         Volume of the solid if shares are of that; None if each is of the part's own.
     least
@@ -108,7 +108,7 @@ class AddedVolume(Criterion):
 
     @property
     def of_facets(self) -> Distance:
-        """A distance: the hull of a ball with 64 vertices adds 4 % of volume, however small its pieces are cut."""
+        """A distance: the hull of a ball with 64 vertices adds 4% of volume, however small its pieces are cut."""
         return Distance(FACETS_REACH)
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:

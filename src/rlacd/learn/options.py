@@ -23,7 +23,7 @@ class TrainOptions:
 
     # The decision process (3.1)
     threshold: float = option(0.04, least=0.001, most=1)
-    """Concavity at which a component is finished (paper, 4.1: 4 %)."""
+    """Concavity at which a component is finished (paper, 4.1: 4%)."""
     volume_reward: float = option(1000.0, least=0)
     """Weight of the reward for hull volume saved, lambda 1 (4.1)."""
     finish_reward: float = option(1000.0, least=0)

@@ -28,11 +28,11 @@ six planted solids in 0.40 to 0.67 of them, on 30 of `test/` in at most 0.43 but
 
 DEPTH = 0.4
 """How deep the solid's surface may come into a grown hull, as a share of the criterion's outward deviation: at 0.1, the
-planted solids of research/search.md take 3 % more parts."""
+planted solids of research/search.md take 3% more parts."""
 
 LEAST = 0.5
 """A hull is taken only if it grew by at least this share of the volume of its piece: merging does the rest better. With
-0, the planted solids take 4 % more parts."""
+0, the planted solids take 4% more parts."""
 
 WORTH = 0.85
 """Keep grown parts only if they number at most this share of the merged ones: later stages save more of parts that were
@@ -40,7 +40,7 @@ cut less. Of the 56 merged parts of a pot's proxy, 41 are left on the solid; of 
 
 
 SLIVER_LOSS = 2 * HALF_THICKNESS
-"""A sliver is dropped if none of its points is farther than this from the other hulls (0.1 % of the longest side)."""
+"""A sliver is dropped if none of its points is farther than this from the other hulls (0.1% of the longest side)."""
 
 
 def grow_cover(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]:

@@ -234,7 +234,7 @@ class Options:
     keep_open_abs: float | None = option(None, LIMITS, LENGTH)
     """The radius of that ball as a length in the mesh's own unit.
 
-    It still passes wherever one 1 % larger does.
+    It still passes wherever one 1% larger does.
     """
     avoid: Sequence[MeshLike] = option((), LIMITS, _AVOIDED, metavar="FILE", usual="nothing", repeated=True)
     """Meshes in the same frame and unit that no hull enters. Parts are cut finer there, down to a hundredth of the
@@ -274,7 +274,7 @@ class Options:
     timeout: float | None = option(None, RUN, _SECONDS, metavar="SECONDS")
     """Stop after this time and keep the result so far.
 
-    It is at most 1 s and 10 % late for inputs of up to a million triangles. The result always covers the input, at
+    It is at most 1 s and 10% late for inputs of up to a million triangles. The result always covers the input, at
     worst with one hull for each body.
     """
     quality: QualityName | None = option(None, METHOD, one_of=QualityName, usual="balanced; fast with --no-merge")

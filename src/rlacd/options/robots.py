@@ -64,6 +64,11 @@ class RobotOptions:
 
     ``{"finger.*": "1mm"}``, or a number in the robot's own unit, as `threshold_abs`.
     """
+    from_visual: bool = option(False)
+    """Links without collision geometry get it from what they show: hulls of the meshes, and the same primitives.
+
+    What is shown stays. Of an MJCF model, these are bodies none of whose geoms collides.
+    """
     samples: int = option(500, least=0, most=100_000)
     """Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
     extra rlacd[clear].

@@ -171,7 +171,7 @@ def paper_planes(component: Component) -> Candidates:
 
 
 def valid_planes(component: Component, candidates: Candidates) -> BoolArray:
-    """Whether each of the candidates [K * M] leaves no side thinner than 2 % of the component's extent.
+    """Whether each of the candidates [K * M] leaves no side thinner than 2% of the component's extent.
 
     The component is connected, so every plane within its extent meets it, and the thickness of a side is the plane's
     distance from that end: no sweep is needed. This is slightly stricter than `Sweep.valid`, which compares a side with

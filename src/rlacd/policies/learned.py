@@ -37,7 +37,7 @@ parts of the least hull sum, in 1.6 and 1.3 times the time."""
 
 TYPICAL_LENGTH = 0.06
 """Length of a criterion without one. With `SIMPLE` 8, lengths of 0.05, 0.07 and 0.09 leave 0.92, 0.90 and 0.93 of the
-raw parts on 58 meshes of `train/` in navigable space (2.5 %, 5 %), in 2.0, 1.6 and 1.2 times the time."""
+raw parts on 58 meshes of `train/` in navigable space (2.5%, 5%), in 2.0, 1.6 and 1.2 times the time."""
 
 
 class Learned:

@@ -71,8 +71,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: Int64Array, tolerance: f
     is_free = edges.face_count == 1
     halfedge = np.flatnonzero(is_free[edges.of_halfedge])
     # Split one edge of a face per round, so that its pieces do not depend on each other.
-    _, first = np.unique(halfedge // 3, return_index=True)
-    face, corner = np.divmod(halfedge[first], 3)
+    face, corner = np.divmod(halfedge[np.unique(halfedge // 3, return_index=True)[1]], 3)
     a, b, c = (faces[face, (corner + i) % 3] for i in range(3))
     edge, vertex = _on_edges(vertices, np.stack([a, b, c], axis=1), np.unique(edges.vertices[is_free]), tolerance)
     if len(edge) == 0:

@@ -94,10 +94,9 @@ def shared_faces(
     """Return which faces ``[F]`` and ``[G]`` of two meshes have their corners in the same places, however wound."""
     places = np.concatenate([vertices, other_vertices])
     number = _native.first_in_place(places)
-    mine, others = number[faces], number[len(vertices) + other_faces]
-    is_other = ~first_of_doubled(np.concatenate([others, mine]), len(places))[len(others) :]
-    is_mine = ~first_of_doubled(np.concatenate([mine, others]), len(places))[len(mine) :]
-    return is_other, is_mine
+    both = np.concatenate([number[faces], number[len(vertices) + other_faces]])
+    is_alone = first_of_doubled(both, len(places)) & first_of_doubled(both[::-1], len(places))[::-1]
+    return ~is_alone[: len(faces)], ~is_alone[len(faces) :]
 
 
 BESIDE = HALF_THICKNESS / 5

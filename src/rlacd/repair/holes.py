@@ -13,8 +13,6 @@ sheet. Whether a hole may be closed is decided by the first of these questions t
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
 from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
@@ -48,7 +46,7 @@ _GOOD_PART = 0.3
 
 
 class _Caps:
-    """The holes of a soup, the caps that would close them, and points spread over the caps.
+    """The holes of a soup, and the caps that would close them.
 
     Attributes
     ----------
@@ -63,7 +61,7 @@ class _Caps:
     def __init__(self, state: State, rims: Rims) -> None:
         soup, bodies = state.soup, state.bodies
         self._state, self._soup, self._rims, self._bodies = state, soup, rims, bodies
-        self._gap, self._fill = state.wanted.gap, state.wanted.open_bodies == "solid"
+        self._gap = state.wanted.gap
         self._faces, self._hole_of, smooth = caps_of(soup, rims)
         first_body = np.array([soup.body[beside[0]] for beside in rims.beside])
         lengths = np.array([len(loop) for loop in rims.loops])
@@ -78,13 +76,13 @@ class _Caps:
 
     def _depths(self) -> FloatArray:
         """Return ``[3, H]``, see the attributes."""
-        gap, vertices = self._gap, self._soup.vertices
+        gap, vertices, wanted = self._gap, self._soup.vertices, self._state.wanted
         spacing = affordable(gap / 2, float(face_areas(vertices, self._faces).sum()))
         points, on = spread_points(vertices, self._faces, spacing)
         distance = self._state.surface.distance(points)
         is_reached = is_far = distance > gap
         # Where cavities are kept, balls start in them too, and every point counts as reached.
-        if is_far.any() and not self._fill and not self._state.wanted.keep_cavities:
+        if is_far.any() and wanted.open_bodies != "solid" and not wanted.keep_cavities:
             is_reached = is_far.copy()
             is_reached[is_far] = self._state.reach.covers(points[is_far])
         depths = np.zeros((3, len(self.body)))
@@ -92,22 +90,19 @@ class _Caps:
             np.maximum.at(depth, self._hole_of[on[some]], distance[some])
         return depths
 
-    @cached_property
-    def _volume(self) -> FloatArray:
-        """The volume ``[bodies]`` that each body would enclose with all its caps."""
-        soup, rims, own = self._soup, self._rims, self.body[self._hole_of]
-        sign = np.where(rims.inverted, -1, 1)
-        volume = np.bincount(self._body, sign * signed_tetrahedra(soup.vertices, soup.faces), self._bodies)
-        volume += np.bincount(own, signed_tetrahedra(soup.vertices, self._faces), self._bodies)
-        return np.asarray(np.abs(volume))
-
     def _classify(self, lengths: Int64Array) -> None:
         """Tell holes that missing faces left from mouths, and from ends of tubes, given the lengths of their loops."""
-        own, tiny, loops, smooth = self.body, np.finfo(float).tiny, self._rims.loops, self.is_smooth
+        soup, rims, own, smooth = self._soup, self._rims, self.body, self.is_smooth
+        signed, tiny = (
+            np.where(rims.inverted, -1, 1) * signed_tetrahedra(soup.vertices, soup.faces),
+            np.finfo(float).tiny,
+        )
+        of_caps = np.bincount(own[self._hole_of], signed_tetrahedra(soup.vertices, self._faces), self._bodies)
+        self._volume = np.abs(np.bincount(self._body, signed, self._bodies) + of_caps)  # that all caps would close in
         body_area = np.maximum(self._area[own], tiny)
-        cap_area = np.bincount(self._hole_of, face_areas(self._soup.vertices, self._faces), len(own))
+        cap_area = np.bincount(self._hole_of, face_areas(soup.vertices, self._faces), len(own))
         share, of_all = cap_area / body_area, np.bincount(own, cap_area, self._bodies)[own] / body_area
-        is_ring = np.array([len(loop) > _RING and _is_round(self._soup.vertices[loop]) for loop in loops])
+        is_ring = np.array([len(loop) > _RING and _is_round(soup.vertices[loop]) for loop in rims.loops])
         radius = np.sqrt(np.maximum(cap_area, tiny) / np.pi)
         is_tube = np.abs(self._volume[own] / body_area / radius - 0.5) <= _TUBE
         is_end = is_tube & (np.bincount(own)[own] == 1)
@@ -135,11 +130,6 @@ class _Caps:
         """Return ``[bodies]`` the bodies with a cap that leads farther away from the surface, ``[H]``, than it may."""
         may_lead = self._is_damage | (self._is_small & (depth <= HOLE))
         return marked(self.body[(depth > 0) & ~may_lead], self._bodies)
-
-    def may_be_closed(self) -> BoolArray:
-        """Return ``[bodies]`` the bodies all of whose holes may be closed."""
-        chosen = marked(self.body, self._bodies)
-        return chosen if self._fill else chosen & ~self.leading_away(self.reached)
 
     def added(self, chosen: BoolArray) -> Soup:
         """The soup with the caps of chosen bodies ``[bodies]``."""
@@ -187,7 +177,9 @@ def close_holes(state: State) -> None:
     if not rims.loops:
         return
     caps = _Caps(state, rims)
-    chosen = caps.may_be_closed()
+    chosen = marked(caps.body, state.bodies)
+    if state.wanted.open_bodies != "solid":
+        chosen &= ~caps.leading_away(caps.reached)
     closed = caps.added(chosen)
     useful = caps.useful(chosen, closed)
     state.note(np.flatnonzero(useful[caps.joined]), "capped")

@@ -39,14 +39,14 @@ from rlacd.solid.topology import NO_AREA, bodies_of, compacted, detach_slivers, 
 CELLS_ACROSS = 1.5
 """Least radius of a ball, in cells of its grid."""
 
-# Points at which a triangle is tested for lying inside a body, into which it may lead, or out of which: near its
-# corners, its edges, its middle.
+# Points at which a triangle is tested for lying inside a body, as it may begin inside and lead out: near its corners,
+# its edges, its middle.
 _PROBES = np.array([(18, 1, 1), (1, 18, 1), (1, 1, 18), (9, 9, 2), (9, 2, 9), (2, 9, 9), (7, 7, 6)]) / 20
 
 
 def _take_hull(state: State) -> None:
     """Take the convex hull of all points if there is nothing else."""
-    if state.volume != 0:
+    if state.solid.volume() != 0:
         return
     state.warnings.append("The surface could not be closed, so the convex hull of its points is used instead.")
     state.note(np.arange(state.bodies), "hull")
@@ -59,7 +59,7 @@ def _keep_lost(state: State) -> None:
 
     So does closing cracks, of needles.
     """
-    if state.volume == 0 or state.is_apart:
+    if state.solid.volume() == 0 or state.is_apart:
         return
     lost, own = measure(state), state.surface
     body, is_gone = state.body_of_input[lost], state.is_gone[lost]
@@ -135,7 +135,6 @@ def repair(
     points, corners = compacted(mesh.vertices, mesh.faces) if len(mesh.faces) else (mesh.vertices, mesh.faces)
     if len(points) == 0:
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
-    poll_stop()
     frame = Frame.of(points, mesh.unit)
     cells = max(resolution, math.ceil(2 * CELLS_ACROSS / gap)) if gap < DEFAULT_GAP else resolution
     wanted = Wanted(open_bodies, gap, cells, keep_cavities)

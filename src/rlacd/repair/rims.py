@@ -63,11 +63,11 @@ def rims_of(soup: Soup) -> Rims:
     follower = _followers(
         soup.vertices, np.asarray(np.stack(sums, axis=1)), corners, _fans(soup.faces, mate), begin, end
     )
-    # Most edges around a hole are free: a loop of edges that touch other bodies bounds none.
-    free = soup.edges.face_count[soup.edges.of_halfedge[rim]] == 1
-    loops = [loop for loop in _cycles(follower) if len(loop) > 2 and 2 * free[loop].sum() > len(loop)]
+    # Most edges around a hole are free, and not all of one face: a loop of edges that touch other bodies bounds none.
+    face, free = rim // 3, soup.edges.face_count[soup.edges.of_halfedge[rim]] == 1
+    loops = [loop for loop in _cycles(follower) if np.ptp(face[loop]) > 0 and 2 * free[loop].sum() > len(loop) > 2]
     normals = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), np.finfo(float).tiny)
-    return Rims([corners[begin[loop]] for loop in loops], [rim[loop] // 3 for loop in loops], normals, inverted)
+    return Rims([corners[begin[loop]] for loop in loops], [face[loop] for loop in loops], normals, inverted)
 
 
 def _following(halfedge: Int64Array) -> Int64Array:

@@ -87,9 +87,8 @@ class Soup:
 
     def share(self, faces: BoolArray, bodies: int = 0) -> FloatArray:
         """Return ``[bodies]`` the share of the area of each body that some faces ``[F]`` have."""
-        some = np.bincount(self.body, self.area * faces, bodies)
-        share: FloatArray = some / np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
-        return share
+        whole = np.maximum(np.bincount(self.body, self.area, bodies), NO_AREA)
+        return np.asarray(np.bincount(self.body, self.area * faces, bodies) / whole)
 
     def in_patches(self) -> Soup:
         """The same faces, split along folds and along every edge that more than two of them share.

@@ -150,15 +150,8 @@ class State:
         """Return ``[bodies]`` whether this is the step of a body."""
         return np.asarray(self.step == OUTCOMES.index(step))
 
-    @property
-    def volume(self) -> float:
-        """Volume of the solid."""
-        return float(self.solid.volume())
-
     def set_apart(self, faces: Int64Array) -> None:
         """Make bodies of their own of faces of the input, which become slabs."""
-        if len(faces) == 0:
-            return
         corners = self.surface.faces[faces].astype(np.int64)
         count, body = bodies_of(corners, Edges.of(corners, len(self.surface.vertices)))
         self.body_of_input[faces] = self.bodies + body
@@ -219,7 +212,7 @@ class State:
     def _warn_of_cavities(self) -> None:
         """Say which cavities were filled, unless that changes nothing but crevices between walls that nearly touch."""
         walls = self.cavity_walls
-        if walls is None or -_native.mesh_volume(*walls) < _CREVICES * self.volume:
+        if walls is None or -_native.mesh_volume(*walls) < _CREVICES * self.solid.volume():
             return
         volume, count = self.frame.told_in.cubic_words(-mass_of(*walls, self.frame).volume_abs), cavities_in(walls)
         said = "1 closed cavity was" if count == 1 else f"{count} closed cavities were"

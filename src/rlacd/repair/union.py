@@ -1,4 +1,4 @@
-"""Forms of solids, and their union: overlapping ones united, enclosed cavities filled."""
+"""Solids as manifolds, and their union: overlapping ones united, enclosed cavities filled."""
 
 from __future__ import annotations
 

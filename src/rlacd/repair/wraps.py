@@ -7,13 +7,7 @@ from manifold3d import Manifold
 
 from rlacd import _native
 from rlacd._native import poll_stop
-from rlacd.repair.distance import (
-    SurfaceQuery,
-    is_tangle,
-    points_covering,
-    spread_points,
-    tangled_bodies,
-)
+from rlacd.repair.distance import SurfaceQuery, is_tangle, points_covering, spread_points, tangled_bodies
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import hull_of_points, slab_of_faces, unite
@@ -48,10 +42,8 @@ def keep_apart(state: State, sheets: Soup) -> bool:
 
     Returns whether it was done: all has to be sheets, and they have to cross often.
     """
-    most = _PAIRS_A_FACE * len(sheets.faces)
-    if state.parts or len(sheets.faces) > _CROWD:
-        return False
-    if _native.crossings(sheets.vertices, sheets.faces.astype(np.int32), sheets.body, most)[0] <= most:
+    most, faces = _PAIRS_A_FACE * len(sheets.faces), sheets.faces.astype(np.int32)
+    if state.parts or len(faces) > _CROWD or _native.crossings(sheets.vertices, faces, sheets.body, most)[0] <= most:
         return False
     slabs = [hull_of_points(sheets.vertices[face]) for face in sheets.faces]
     state.parts = [Piece(Manifold.compose(slabs), int(sheets.body.min()), is_slab=True)]
@@ -82,13 +74,12 @@ def wrap_sheets(state: State, sheets: Soup) -> bool:
 
 def wrap_all(state: State) -> None:
     """Take what the ball cannot reach from outside all bodies to be solid."""
-    gap = state.wanted.gap
     state.solid, state.cavity_walls = _wrapped(state, state.soup), None
     state.note(state.soup.body, "wrapped")
     state.parts = [Piece(state.solid, 0)]
     state.warnings.append(
         "The surface crosses itself too often to be united exactly, so the solid is what a ball of radius "
-        f"{state.frame.unit.words(gap)} cannot reach from outside."
+        f"{state.frame.unit.words(state.wanted.gap)} cannot reach from outside."
     )
 
 
@@ -98,7 +89,7 @@ def rebuild_tangles(state: State) -> None:
     A few faces become a slab each. Where they are many, what the ball cannot reach from outside the body is solid.
     """
     soup = state.soup
-    if state.volume == 0 or np.bincount(soup.body).min() > DENSE or not is_tangle(state.query()):
+    if state.solid.volume() == 0 or np.bincount(soup.body).min() > DENSE or not is_tangle(state.query()):
         return
     tangled = tangled_bodies(state.query(), soup.vertices, soup.faces, soup.body)
     tangled = tangled[~state.has("slab")[tangled]].tolist()  # slabs are thin enough to be cut
@@ -128,7 +119,7 @@ def fill_voids(state: State) -> None:
     points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
     reach, void = state.reach, state.reach.voids_near(points)
     voids = np.setdiff1d(void, 0)
-    is_large = reach.volumes(voids) >= _SLIT_VOLUME * state.volume
+    is_large = reach.volumes(voids) >= _SLIT_VOLUME * state.solid.volume()
     cells = reach.voids_outside(voids[is_large | np.isin(voids, void[is_open[walls.body[on]]])], state.query())
     if len(cells) == 0:
         return
@@ -136,10 +127,10 @@ def fill_voids(state: State) -> None:
     filled = unite([state.solid, wrap])
     triangles = filled.num_tri() / state.solid.num_tri()
     bared = filled.surface_area() * triangles**_TRIANGLES
-    if filled.volume() <= state.volume or bared >= state.solid.surface_area():
+    if filled.volume() <= state.solid.volume() or bared >= state.solid.surface_area():
         return
-    wrapped = np.unique(walls.body[on[np.isin(void, reach.void.ravel()[cells])]])
-    wrapped = wrapped[is_open[wrapped]]
+    around = walls.body[on[np.isin(void, reach.void.ravel()[cells])]]
+    wrapped = around[is_open[around]]
     state.note(wrapped, "wrapped")
     state.solid = filled
     state.parts.append(Piece(wrap, int(wrapped.min(initial=state.bodies - 1))))
@@ -167,7 +158,7 @@ def fill_slits(state: State) -> None:
         return
     wrap = _wrap(state, state.reach.around_points(points), _WRAP_ERROR, query)
     filled = unite([state.solid, wrap])
-    is_little = abs(filled.volume() / state.volume - 1) < _SLIT_VOLUME
+    is_little = abs(filled.volume() / state.solid.volume() - 1) < _SLIT_VOLUME
     if is_little and filled.surface_area() < (1 - _BARED) * state.solid.surface_area():
         state.solid = filled
         state.parts.append(Piece(wrap, int(has_slits.argmax())))
@@ -176,7 +167,7 @@ def fill_slits(state: State) -> None:
 def _may_fill(state: State) -> bool:
     """Whether what nothing can reach may become solid."""
     fills = state.wanted.open_bodies != "thin" and not state.wanted.keep_cavities and not state.is_apart
-    return fills and state.volume != 0 and len(state.parts) <= MOST_UNITED  # more of them overlap each other
+    return fills and state.solid.volume() != 0 and len(state.parts) <= MOST_UNITED  # more of them overlap each other
 
 
 def _is_large(state: State, walls: Soup) -> bool:

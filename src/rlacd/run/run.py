@@ -58,7 +58,7 @@ FINISH, FINISH_SHARE = 0.4, 0.04
 LEAST_FINISH = FINISH / 4
 """After a stop, finishing may take `FINISH` seconds plus `FINISH_SHARE` of the timeout, and always at least
 `LEAST_FINISH` seconds; then optional work is skipped. After a cancellation it may take half as long: the command line
-then still has to write files. The promise is 1 s and 10 %: the rest is for what cannot be skipped."""
+then still has to write files. The promise is 1 s and 10%: the rest is for what cannot be skipped."""
 
 _T = TypeVar("_T")
 _R = TypeVar("_R")

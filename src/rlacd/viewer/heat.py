@@ -18,7 +18,7 @@ from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
 
 FINEST = 0.02
-"""Facets are not subdivided below this edge length: 1 % of the input's longest side."""
+"""Facets are not subdivided below this edge length: 1% of the input's longest side."""
 
 INNER = -1.0
 """Marks a vertex on an inner wall, in place of its distance."""

@@ -21,6 +21,7 @@ from rlacd.result import Result
 from rlacd.solid.primitive import Balls
 from rlacd.viewer.coloring import color_hulls
 from rlacd.viewer.render import Body, Spheres, render_apart
+from rlacd.viewer.robot import RobotResult
 
 INPUT_COLOR = np.array([0.46, 0.47, 0.50])  # linear reflectance
 BALL_COLOR = np.array([0.10, 0.30, 0.75])
@@ -172,11 +173,13 @@ def disjoint(balls: Balls) -> Balls:
 
 
 def _hull_bodies(decomposition: Result, up: str, *, pull: float) -> list[Body]:
-    """The hulls, each further from the centre by the share `pull`."""
-    corners = np.concatenate([hull.bounds for hull in decomposition])
+    """The hulls, and a robot's primitives, each further from the centre by the share `pull`."""
+    kept = [one for own in decomposition.kept for one in own] if isinstance(decomposition, RobotResult) else []
+    drawn = [*decomposition, *kept]
+    corners = np.concatenate([each.bounds for each in drawn])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    colors = linear_from_srgb(color_hulls(decomposition.hulls)[0])
-    moved = [hull.triangles + pull * (hull.bounds.mean(axis=0) - middle) for hull in decomposition]
+    colors = [*linear_from_srgb(color_hulls(decomposition.hulls)[0]), *len(kept) * [INPUT_COLOR]]
+    moved = [each.triangles + pull * (each.bounds.mean(axis=0) - middle) for each in drawn]
     return [_body(triangles, color, up) for triangles, color in zip(moved, colors, strict=True)]
 
 

@@ -36,9 +36,11 @@ class RobotResult(Result):
 
     links: Sequence[str] = ()
     meshes: Sequence[trimesh.Trimesh] = ()
-    """Theirs, at rest."""
+    """What collides of each, at rest."""
     link_of: Sequence[int] = ()
     """The link of each hull."""
+    kept: Sequence[Sequence[trimesh.Trimesh]] = ()
+    """The primitives of each link, which stay, at rest."""
     joints: Sequence[Joint] = ()
     """First those that can be set, `free` of them."""
     free: int = 0

@@ -38,7 +38,8 @@ def scene(decomposition: Result, up: str = "z") -> dict[str, Any]:
         list of ``{vertices, faces}``: of each link of a robot, else one, or none for a cloud of points; ``parts``, a
         list of ``{vertices, faces, color, rank, error, volume, primitive, link}`` with ``rank`` the index of the hue,
         ``error`` the criterion's measurement (or None), ``volume`` in the normalised frame, ``primitive`` its kind (or
-        None) and ``link`` the number of a robot's link (or None); ``balls``, ``{centres, radii, shown, of}`` or None,
+        None) and ``link`` the number of a robot's link (or None); ``kept``, a list of ``{vertices, faces, link}`` of a
+        robot's primitives, which stay beside the hulls; ``balls``, ``{centres, radii, shown, of}`` or None,
         with the numbers of balls shown and in all; ``robot``, how it moves, or None.
     """
     frame = frame_of(decomposition)
@@ -61,6 +62,11 @@ def scene(decomposition: Result, up: str = "z") -> dict[str, Any]:
         "input": bare["input"] if robot is None else [_mesh(frame.to_frame(m.vertices), m.faces) for m in robot.meshes],
         "robot": None if robot is None else robot_scene(robot, frame),
         "report": report,
+        "kept": [
+            {**_mesh(frame.to_frame(mesh.vertices), mesh.faces), "link": link}
+            for link, own in enumerate([] if robot is None else robot.kept)
+            for mesh in own
+        ],
         "parts": [
             {
                 **_mesh(frame.to_frame(hull.vertices), hull.faces),
@@ -91,6 +97,7 @@ def input_scene(
         "report": None,
         "input": [_mesh(frame.to_frame(points), corners)] if len(corners) else [],
         "robot": None,
+        "kept": [],
         "parts": [],
         "balls": None,
     }

@@ -29,7 +29,7 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
-from rlacd.options import LENGTHS, Options
+from rlacd.options import LENGTHS, DetailName, Options
 from rlacd.options.fields import shown
 from rlacd.options.lengths import LONGEST_SIDE, in_unit, read_lengths, unit_of
 from rlacd.options.robots import RobotOptions
@@ -43,11 +43,11 @@ SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
 
+FULL: DetailName = "full"
+"""Hulls with all their corners: simpler ones hold them, and a little more."""
+
 LINK = "link "
 """What the stage of a report of progress begins with that names a link, before the reports of its meshes."""
-
-MOST_SAID = 5
-"""Pairs that touch, each with a warning of its own."""
 
 
 @dataclass(frozen=True)
@@ -117,12 +117,17 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     tell = _teller(len(bodies), options.get("progress"))
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
-    for number, (body, own) in enumerate(zip(bodies, each, strict=True)):
+
+    def decompose_body(number: int) -> None:
+        body, own = bodies[number], each[number]
         tell(LINK + body.name, number)
         for collider in body.colliders:
-            if (key := (collider.key, own.get("threshold_abs"))) not in done:
+            if (key := (collider.key, own.get("threshold_abs"), own.get("detail"))) not in done:
                 done[key] = decomposed(body, collider, own, robot.unit)
             results[collider] = done[key]
+
+    for number in range(len(bodies)):
+        decompose_body(number)
     if robot.is_alone:
         return Checked(results)
     if not all(result.report.complete for result in results.values()):
@@ -137,18 +142,24 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         results.update(again)
         return hulls
 
+    def exact(number: int) -> list[Surface] | None:
+        if "detail" in each[number] or all(collider.is_convex for collider in bodies[number].colliders):
+            return None
+        each[number] |= {"detail": FULL}
+        decompose_body(number)
+        return _moving(bodies[number], results).hulls
+
     tell("clear", 0)
     try:
         motion, said = _motion(robot, asked.samples, options.get("seed") or 0)
-        cleared = kept_clear([*_links(bodies, results, motion)], motion, redo)
+        cleared = kept_clear([*_links(bodies, results, motion)], motion, redo, exact)
     except (MissingExtraError, CrowdedError) as error:
         if asked.exclude or asked.srdf:
             raise
         return Checked(results, [f"Links were not checked against each other: {error}"])
     found = warnings_of(cleared, motion, robot.unit.words)
-    more = [f"{len(found) - MOST_SAID} more pairs of links touch: see the report."] if len(found) > MOST_SAID else []
     ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in motion.warnings]
-    return Checked(results, [*said, *ranges, *found[:MOST_SAID], *more], motion, cleared)
+    return Checked(results, [*said, *ranges, *found], motion, cleared)
 
 
 def _teller(total: int, progress: ProgressCallback | None) -> Callable[[str, int], None]:
@@ -177,12 +188,12 @@ def _motion(robot: Robot, samples: int, seed: int) -> tuple[Motion, list[str]]:
 
 def options_of_bodies(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> list[dict[str, Any]]:
     """The options of each body; raises as `decomposed_robot`."""
-    names = [body.name for body in robot.bodies]
+    names, replaced = ([body.name for body in bodies] for bodies in (robot.bodies, robot.replaced))
     lengths: dict[str, Any] = {}
     for pattern, length in (asked.links or {}).items():
-        matched = [name for name in names if re.fullmatch(pattern, name)]
+        matched = [name for name in replaced if re.fullmatch(pattern, name)]
         if not matched:
-            known = ", ".join(names)
+            known = ", ".join(replaced)
             raise OptionError(f"no link with a collision mesh matches the regular expression {pattern!r}: {known}.")
         lengths |= dict.fromkeys(matched, length)
     whole = _relative_to_robot(options, robot)
@@ -206,7 +217,7 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
     """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
     try:
-        return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, **_fitting(mesh, options, body))
+        return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, **fitting(mesh, options, body, collider))
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
@@ -215,21 +226,26 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
         raise type(error)(f"{path}: {error}") from error
 
 
-def _fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> dict[str, Any]:
-    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's."""
-    fitting = dict(options)
+def fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body, collider: Collider) -> dict[str, Any]:
+    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's.
+
+    What is convex keeps its corners.
+    """
+    fitted = dict(options)
     scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
+    if collider.is_convex:
+        fitted.setdefault("detail", FULL)
     for name, (least, most) in LENGTHS.items():
-        if isinstance(length := fitting.get(f"{name}_abs"), (int, float)):
+        if isinstance(length := fitted.get(f"{name}_abs"), (int, float)):
             length = max(length, least / scale * (1 + ROUNDING)) if body.is_world else length
-            fitting[f"{name}_abs"] = min(length, most / scale * (1 - ROUNDING))
-    return fitting
+            fitted[f"{name}_abs"] = min(length, most / scale * (1 - ROUNDING))
+    return fitted
 
 
 def _links(bodies: Sequence[Body], results: Results, motion: Motion) -> Iterator[Moving]:
-    """Those with meshes, and then those that have primitives only."""
+    """Those of the file, and then those whose primitives the motion alone knows."""
     nothing = Surface(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32))
-    solids = motion.solids or [Solids()] * len(bodies)
+    solids = motion.solids or [Solids(body.primitives) for body in bodies]
     for i, (name, own) in enumerate(zip(motion.links, solids, strict=True)):
         moving = _moving(bodies[i], results) if i < len(bodies) else Moving(name, nothing)
         replaced = sum(len(collider.meshes) for collider in bodies[i].colliders) if i < len(bodies) else 0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rlacd.clear import LinkPair
+from rlacd.clear import LinkPair, Motion, Solids
 from rlacd.errors import MeshFileError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import read_named
@@ -31,7 +31,7 @@ class Files:
     """The files that a description refers to, each read once."""
 
     references: References
-    said: list[tuple[str, str, float]] = field(default_factory=list)  # a file's name, a sentence about it, how bad
+    said: list[tuple[Path, str]] = field(default_factory=list)  # a file, and a sentence about it
     _known: dict[Path, MeshFile] = field(default_factory=dict)
 
     def mesh(self, reference: str, folder: Path) -> MeshFile:
@@ -42,12 +42,12 @@ class Files:
         path = self.references.find(reference, folder)
         if path not in self._known:
             mesh, unit = load_mesh(path), 1.0
-            self.said += [(path.name, warning, 0.0) for warning in mesh.warnings]
+            self.said += [(path, warning) for warning in mesh.warnings]
             if path.suffix.lower() == ".dae":
                 unit = mesh.metres or 1.0
                 if mesh.up != "z":
                     turned = f"{mesh.up.upper()}_UP is declared, and some programs rotate such a file when they read it"
-                    self.said.append((path.name, f"{turned}; hulls keep its coordinates.", 0.0))
+                    self.said.append((path, f"{turned}; hulls keep its coordinates."))
             self._known[path] = MeshFile(path, mesh.vertices * unit, mesh.faces)
         return self._known[path]
 
@@ -59,6 +59,8 @@ class Document(Robot):
     root: Element
     references: References
     others: list[str]  # files that it names relative to its folder: they break if the result goes elsewhere
+    seen: Sequence[Element] = field(default=(), kw_only=True)  # primitives that are shown, and are to collide too
+    bare: frozenset[str] = field(default=frozenset(), kw_only=True)  # bodies that collide as what they show
 
     kind = ""
 
@@ -77,6 +79,18 @@ class Document(Robot):
 
         `copies` of meshes that the consumer cannot read are named by their paths; what is to be said is added.
         """
+
+    def with_seen(self, motion: Motion) -> Motion:
+        """A motion that was read without what bodies are to collide as, with it."""
+        if not self.bare:
+            return motion
+        own = [
+            Solids(body.primitives, sum(len(collider.meshes) for collider in body.colliders))
+            if body.name in self.bare
+            else solids
+            for body, solids in zip(self.bodies, motion.solids, strict=False)
+        ]
+        return replace(motion, solids=(*own, *motion.solids[len(own) :]))
 
     def copied(self, stem: str) -> dict[MeshFile, str]:
         """Names for copies of the meshes that consumers cannot read."""

@@ -24,14 +24,15 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 
-from rlacd.clear import LinkPair, Motion, mjcf_motion
+from rlacd.clear import PRIMITIVES, LinkPair, Motion, Primitive, mjcf_motion
 from rlacd.io.robots.document import Document, Files, HullFiles, opened, unused_stem
 from rlacd.io.robots.matrix import excludes
-from rlacd.io.robots.mjcf_model import FILES, TURNED, Compiler, Defaults, mujoco_reads, read_model
-from rlacd.io.robots.poses import Angles, read_scale
+from rlacd.io.robots.mjcf_model import FILES, TURNED, Compiler, Defaults, geom_numbers, mujoco_reads, read_model
+from rlacd.io.robots.poses import Angles, numbers, read_scale
 from rlacd.io.robots.robot import Body, Collider, MeshFile, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
 from rlacd.options.robots import RobotOptions
+from rlacd.solid.arrays import FloatArray
 from rlacd.solid.poses import inverse
 
 SHOWN, HIDDEN = ("0", "1", "2"), "3"
@@ -58,6 +59,7 @@ class _Geom:
     mesh: str
     is_seen: bool  # whether it is the only one to show its mesh
     is_weighed: bool  # whether the mass of its body follows from it
+    is_visual: bool = False  # whether it only shows what its body is to collide as
 
     @property
     def is_kept(self) -> bool:
@@ -66,13 +68,13 @@ class _Geom:
 
     @property
     def name(self) -> str | None:
-        """Its name, by which other elements and programs refer to it."""
-        return self.element.attributes.get("name")
+        """Its name, by which other elements and programs refer to it; of one that only shows, none that hulls take."""
+        return None if self.is_visual else self.element.attributes.get("name")
 
     @property
     def body(self) -> Element:
         """The body that it belongs to."""
-        return next(element for element in self.element.up() if element.tag in ("body", "worldbody"))
+        return _owner(self.element)
 
     @property
     def kind(self) -> Hashable | None:
@@ -80,6 +82,8 @@ class _Geom:
         if self.name is not None or self.body.tag == "worldbody":
             return None
         copied = next(element for element in self.element.up() if element.tag in ("replicate", "body"))
+        if self.is_visual:
+            return id(copied)
         said = sorted((name, value) for name, value in self.attributes.items() if name not in (*OWN, *PLACED))
         return id(copied), self.is_seen, *said
 
@@ -106,7 +110,7 @@ class Mjcf(Document):
 
     def motion(self, samples: int, seed: int) -> Motion:
         """See `Robot`."""
-        return mjcf_motion(self.source, samples, seed, [body.name for body in self.bodies])
+        return self.with_seen(mjcf_motion(self.source, samples, seed, [body.name for body in self.bodies]))
 
     def copied(self, stem: str) -> dict[MeshFile, str]:
         """See `Document`."""
@@ -145,11 +149,14 @@ class Mjcf(Document):
             edits += [mesh.asset.replaced(mesh.asset.with_attributes(values))] if values else []
         for collider, together in self.found.items():
             edits += _geom_edits(together, names[collider], taken, of_geom)
+        for geom in self.seen:
+            copy = geom.with_attributes(_colliding_too(geom, "collision", taken))
+            edits.append(Edit(geom.file, geom.end, geom.end, geom.indent + copy))
         edits += _pair_edits(self.root, of_geom, {str(pair.attributes.get("name")) for pair in _pairs(self.root)})
         return edits + _relocations(self.compiler, edits, {mesh.asset for mesh in self.meshes_of.values()})
 
 
-def read_mjcf(source: Path, files: Files, *, apart: bool) -> Mjcf:
+def read_mjcf(source: Path, files: Files, *, apart: bool, from_visual: bool) -> Mjcf:
     """Find the collision meshes of an MJCF model, as `rlacd.io.robots.urdf.read_urdf` does."""
     root = opened(source, "mujoco")
     compiler = read_model(root, files.references)
@@ -158,7 +165,8 @@ def read_mjcf(source: Path, files: Files, *, apart: bool) -> Mjcf:
     warnings: list[str] = []
     paired = {pair.attributes.get(end) for pair in _pairs(root) for end in ("geom1", "geom2")}
     bodies_of = [each for each in root.walk() if each.tag in BODIES]
-    geoms = [geom for body in bodies_of for geom in _colliding(body, defaults, compiler, paired)]
+    bare = _bare(bodies_of, defaults, paired) if from_visual else frozenset()
+    geoms = [geom for body in bodies_of for geom in _colliding(body, defaults, compiler, paired, bare)]
     meshes: dict[str, _Mesh] = {}
     for name in dict.fromkeys(geom.mesh for geom in geoms):
         full = defaults.full(assets[name]) if name in assets else {}
@@ -172,31 +180,73 @@ def read_mjcf(source: Path, files: Files, *, apart: bool) -> Mjcf:
     rewritten = {mesh.asset for mesh in meshes.values()}
     names = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
     relative = [name for name in names if name and not Path(name).is_absolute()]
-    bodies, found = _bodies(geoms, meshes, compiler, apart=apart)
-    return Mjcf(
-        source, bodies, warnings, 1.0, "z", root, files.references, relative, compiler, [*assets], meshes, found
-    )
+    primitives = [own for body in bodies_of for own in _primitives(body, defaults, compiler, paired, bare)]
+    bodies, found = _bodies(geoms, primitives, meshes, compiler, apart=apart)
+    shown = [geom for geom, owner, _ in primitives if owner in bare]
+    seen_as = frozenset(_body_name(body, root) for body in bare)
+    of_file = (root, files.references, relative, compiler, [*assets], meshes, found)
+    return Mjcf(source, bodies, warnings, 1.0, "z", *of_file, seen=shown, bare=seen_as)
 
 
 def _bodies(
-    geoms: Sequence[_Geom], meshes: Mapping[str, _Mesh], compiler: Compiler, *, apart: bool
+    geoms: Sequence[_Geom],
+    primitives: Sequence[tuple[Element, Element, Primitive]],
+    meshes: Mapping[str, _Mesh],
+    compiler: Compiler,
+    *,
+    apart: bool,
 ) -> tuple[list[Body], dict[Collider, list[_Geom]]]:
     """Sort geoms by their bodies, and by what may become one solid."""
     of_body: dict[Element, list[_Geom]] = {}
     for geom in geoms:
         of_body.setdefault(geom.body, []).append(geom)
-    order = [element for element in compiler.root.walk() if element.tag == "body"]
+    others: dict[Element, list[Primitive]] = {}
+    for _, element, one in primitives:
+        others.setdefault(element, []).append(one)
     bodies: list[Body] = []
     found: dict[Collider, list[_Geom]] = {}
-    for element, own in of_body.items():
-        name = "world" if element.tag == "worldbody" else element.attributes.get("name")
-        name = f"body_{order.index(element) + 1}" if name is None else name
+    chosen = [each for each in compiler.root.walk() if each in of_body or (each in others and _is_single(each))]
+    for element in chosen:
+        own = of_body.get(element, [])
+        name = _body_name(element, compiler.root)
         placed = [replace(meshes[g.mesh].placed, to_body=compiler.to_body(g.element, g.attributes)) for g in own]
         uses = [(None if apart else geom.kind, at, geom) for geom, at in zip(own, placed, strict=True)]
         joined = colliders(name, uses)
-        bodies.append(Body(name, compiler.pose(element.up()), [*joined], element.tag == "worldbody"))
+        is_world = element.tag == "worldbody"
+        bodies.append(Body(name, compiler.pose(element.up()), [*joined], is_world, others.get(element, ())))
         found |= joined
     return bodies, found
+
+
+def _body_name(body: Element, root: Element) -> str:
+    """Its name, or a name by its number."""
+    if body.tag == "worldbody":
+        return "world"
+    order = (element for element in root.walk() if element.tag == "body")
+    own = body.attributes.get("name")
+    return f"body_{[*order].index(body) + 1}" if own is None else own
+
+
+def _bare(bodies_of: Sequence[Element], defaults: Defaults, paired: Collection[str | None]) -> frozenset[Element]:
+    """Bodies none of whose geoms collides."""
+    each = [(_owner(body), full) for body in bodies_of for _, full in _geoms(body, defaults)]
+    solid = {owner for owner, full in each if _collides(full, paired)}
+    return frozenset(owner for owner, _ in each if owner.tag == "body" and owner not in solid)
+
+
+def _owner(element: Element) -> Element:
+    return next(each for each in element.up() if each.tag in ("body", "worldbody"))
+
+
+def _geoms(body: Element, defaults: Defaults) -> list[tuple[Element, dict[str, str]]]:
+    """The geoms of a body or of a frame in it, with their attributes, completed by those of their classes."""
+    childclass = next((e.attributes["childclass"] for e in body.up() if "childclass" in e.attributes), None)
+    return [(geom, defaults.full(geom, childclass)) for geom in body.named("geom")]
+
+
+def _is_single(body: Element) -> bool:
+    """Whether it is a body, and one only: copies of a ``<replicate>`` have names that only MuJoCo knows."""
+    return body.tag == "body" and all(element.tag != "replicate" for element in body.up())
 
 
 def _hull_assets(
@@ -255,12 +305,12 @@ def _geom_edits(
     """
     edits = []
     for geom in geoms:
-        pieces = [_kept(geom, taken)] if geom.is_kept else []
+        pieces = [geom.element.with_attributes({})] if geom.is_visual else [_kept(geom, taken)] * geom.is_kept
         if geom.name is not None:
             of_geom[geom.name] = [
                 _unused(f"{geom.name}_{i:03d}", taken) if i else geom.name for i in range(len(meshes))
             ]
-        pieces += _hull_geoms(geom, meshes, of_geom) if geom is geoms[0] else []
+        pieces += _hull_geoms(geom, meshes, of_geom, taken) if geom is geoms[0] else []
         element = geom.element
         edits.append(element.replaced(element.indent.join(pieces)) if pieces else element.removed())
     return edits
@@ -296,13 +346,17 @@ def _pair_edits(root: Element, of_geom: Mapping[str, Sequence[str]], taken: set[
     return edits
 
 
-def _hull_geoms(geom: _Geom, meshes: Sequence[str], of_geom: Mapping[str, Sequence[str]]) -> Iterator[bytes]:
+def _hull_geoms(
+    geom: _Geom, meshes: Sequence[str], of_geom: Mapping[str, Sequence[str]], taken: set[str]
+) -> Iterator[bytes]:
     for index, mesh in enumerate(meshes):
         values = {"mesh": mesh, "mass": "0"}
         if geom.name is not None:
             values["name"] = of_geom[geom.name][index]
         if geom.is_seen:
             values["group"] = HIDDEN
+        if geom.is_visual:
+            values |= _colliding_too(geom.element, f"{index:03d}", taken)
         if "fluidshape" in geom.attributes and geom.is_kept:
             values["fluidshape"] = "none"
         yield geom.element.with_attributes(values)
@@ -331,16 +385,53 @@ def _unused(name: str, taken: set[str]) -> str:
 
 
 def _colliding(
-    body: Element, defaults: Defaults, compiler: Compiler, paired: Collection[str | None]
+    body: Element,
+    defaults: Defaults,
+    compiler: Compiler,
+    paired: Collection[str | None],
+    bare: Collection[Element],
 ) -> Iterator[_Geom]:
-    """Yield the geoms of one body that collide as meshes."""
-    childclass = next((e.attributes["childclass"] for e in body.up() if "childclass" in e.attributes), None)
-    geoms = [(geom, defaults.full(geom, childclass)) for geom in body.named("geom")]
+    """Yield the geoms of one body that collide as meshes, or are to."""
+    geoms, is_bare = _geoms(body, defaults), _owner(body) in bare
     seen = {full.get("mesh") for _, full in geoms if not _collides(full, paired)}
     for geom, full in geoms:
-        if full.get("type") == "mesh" and "mesh" in full and _collides(full, paired):
+        if full.get("type") == "mesh" and "mesh" in full and (is_bare or _collides(full, paired)):
             is_seen = full.get("group", "0").strip() in SHOWN and full["mesh"] not in seen
-            yield _Geom(geom, full, full["mesh"], is_seen, compiler.is_weighed(geom, full))
+            yield _Geom(geom, full, full["mesh"], is_seen, compiler.is_weighed(geom, full), is_bare)
+
+
+def _colliding_too(geom: Element, suffix: str, taken: set[str]) -> dict[str, str]:
+    """What a copy of a geom that only shows says, to collide and not to show; a name gets a suffix."""
+    named = {"name": _unused(f"{geom.attributes['name']}_{suffix}", taken)} if "name" in geom.attributes else {}
+    return {**named, "contype": "1", "conaffinity": "1", "group": HIDDEN, "mass": "0"}
+
+
+def _primitives(
+    body: Element,
+    defaults: Defaults,
+    compiler: Compiler,
+    paired: Collection[str | None],
+    bare: Collection[Element],
+) -> Iterator[tuple[Element, Element, Primitive]]:
+    """Yield the geoms of one body that collide as primitives, or are to, and the body; not those fitted to meshes."""
+    is_bare = _owner(body) in bare
+    for geom, full in _geoms(body, defaults):
+        kind = full.get("type", "sphere")
+        if kind not in PRIMITIVES or "mesh" in full or not (is_bare or _collides(full, paired)):
+            continue
+        where = f"geom {full.get('name', 'without a name')} of {geom.file.path}"
+        sizes = geom_numbers(geom, full, "size", "0")
+        if (ends := numbers(full, "fromto", 6, where)) is not None:
+            first, last = np.array(ends[:3]), np.array(ends[3:])
+            size, middle, along = sizes[:1], (first + last) / 2, first - last
+            sizes = size * (PRIMITIVES[kind] - 1) + [float(np.linalg.norm(along)) / 2]
+            full = {"pos": _words(middle), "zaxis": _words(along)} if sizes[-1] > 0 else {}
+        own = Primitive.read(kind, sizes, compiler.to_body(geom, full))
+        yield from [] if own is None else [(geom, _owner(geom), own)]
+
+
+def _words(vector: FloatArray) -> str:
+    return " ".join(map(repr, vector.tolist()))
 
 
 def _collides(attributes: Mapping[str, str], paired: Collection[str | None]) -> bool:
@@ -365,7 +456,7 @@ def _caveats(root: Element, geoms: list[_Geom]) -> Iterator[str]:
     for tag in ("model", "attach"):
         if any(element.tag == tag for element in root.walk()):
             yield f"What <{tag}> brings in is left unchanged: rewrite that file too."
-    names = {geom.element.attributes.get("name") for geom in geoms} - {None}
+    names = {geom.name for geom in geoms} - {None}
     for element in (each for each in root.walk() if each.tag != "pair"):
         for attribute, kind in NAMED_BY.items():
             name = element.attributes.get(attribute)

@@ -136,10 +136,10 @@ class Compiler:
             return False
         if when != "true" and any(body.named("inertial")):
             return False
-        first, last = (*_numbers(geom, self.settings, "inertiagrouprange", "0 5"), 5.0)[:2]
-        if not first <= _numbers(geom, full, "group", "0")[0] <= last:
+        first, last = (*geom_numbers(geom, self.settings, "inertiagrouprange", "0 5"), 5.0)[:2]
+        if not first <= geom_numbers(geom, full, "group", "0")[0] <= last:
             return False
-        return _numbers(geom, full, "mass" if "mass" in full else "density", "1000")[0] != 0
+        return geom_numbers(geom, full, "mass" if "mass" in full else "density", "1000")[0] != 0
 
 
 def read_model(root: Element, references: References) -> Compiler:
@@ -159,7 +159,7 @@ def read_model(root: Element, references: References) -> Compiler:
     return Compiler.of(root)
 
 
-def _numbers(geom: Element, attributes: Mapping[str, str], name: str, default: str) -> list[float]:
+def geom_numbers(geom: Element, attributes: Mapping[str, str], name: str, default: str) -> list[float]:
     """Read the numbers of an attribute, at least one."""
     text = attributes.get(name, default)
     try:

@@ -23,8 +23,12 @@ def is_robot(path: str | os.PathLike[str]) -> bool:
     return Path(path).suffix.lower() in KINDS
 
 
-def read_robot(source: Path, package_dirs: Sequence[str] = (), *, apart: bool = False) -> Robot:
+def read_robot(
+    source: Path, package_dirs: Sequence[str] = (), *, apart: bool = False, from_visual: bool = False
+) -> Robot:
     """Read a URDF, MJCF or USD file, to be decomposed by its meshes or, not `apart`, by its links.
+
+    With `from_visual`, links without collision geometry collide as what they show; not those of a stage.
 
     Raises
     ------
@@ -37,8 +41,10 @@ def read_robot(source: Path, package_dirs: Sequence[str] = (), *, apart: bool = 
     if ending in STAGES:
         return read_stage(source, apart=apart)
     files = Files(References(source, package_dirs))
-    robot = (read_urdf if ending == ".urdf" else read_mjcf)(source, files, apart=apart)
-    robot.warnings.extend(grouped(files.said))
+    robot = (read_urdf if ending == ".urdf" else read_mjcf)(source, files, apart=apart, from_visual=from_visual)
+    meshes = [(mesh.file.path, body.name) for body in robot.bodies for one in body.colliders for mesh in one.meshes]
+    links = {path: f"{name} ({path.name})" for path, name in reversed(meshes)}  # the first link of each
+    robot.warnings.extend(grouped([(links.get(path, path.name), said, 0.0) for path, said in files.said]))
     return robot
 
 

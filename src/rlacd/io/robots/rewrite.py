@@ -7,12 +7,13 @@ import os
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
-from rlacd.io.robots.decomposed import check_options, decomposed_robot, with_lengths
+from rlacd.io.robots.coarser import many_told
+from rlacd.io.robots.decomposed import check_options, decomposed_robot, options_of_bodies, with_lengths
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
 from rlacd.io.robots.rewritten import RewrittenRobot, rewritten
 from rlacd.io.robots.robot import Robot
@@ -53,7 +54,7 @@ def rewrite_robot(
     progress : callable, optional
         As for `rlacd.decompose`; the `stage` ``link NAME`` comes before those of each link, `done` of `total`.
     **options
-        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5 % of
+        Those of `rlacd.decompose`, for each solid. The criterion is ``distance`` by default, and the threshold 1.5% of
         the robot's longest side, with all joints at zero. `threshold` and `overlap` are relative to that, or with
         ``relative_to="mesh"`` to each solid, whose criterion and threshold are then those of `rlacd.decompose`. Lengths
         such as `threshold_abs` are in the robot's unit, after the scale of a mesh. A `timeout` applies to each solid.
@@ -104,7 +105,7 @@ def rewrite_quietly(
     check_places(source, place, asked, keep_input=keep_input)
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     began = time.perf_counter()
-    description = read_robot(source, packages, apart=asked.per == "mesh")
+    description = read_robot(source, packages, apart=asked.per == "mesh", from_visual=asked.from_visual)
     return rewrite(description, place, options, asked, keep_input=keep_input, began=began)
 
 
@@ -123,6 +124,9 @@ def rewrite(
     check_places(robot.source, place, asked, keep_input=keep_input)
     robot, options, asked = with_lengths(robot, options, asked)
     done = decomposed_robot(robot, options, asked)
+    if all(result.report.complete for result in done.results.values()):
+        many = many_told(robot, done.results, options_of_bodies(robot, options, asked))
+        done = replace(done, warnings=[*many, *done.warnings])
     pairs = done.pairs if done.samples or robot.is_alone else None
     written = robot.write(place, done.results, pairs, asked, whole=keep_input)
     return rewritten(robot, done, place, written, began)
@@ -151,6 +155,8 @@ def check_places(source: Path, place: Path, asked: RobotOptions, *, keep_input: 
         raise OptionError(f"{place} would overwrite the input; choose another name.")
     check_name(place)
     check_file(place)
+    if asked.from_visual and stages:
+        raise OptionError("from_visual (--from-visual) is for URDF and MJCF: in a stage, apply PhysicsCollisionAPI.")
     if not stages:
         check_folder(mesh_folder(place, KINDS[ending]))
     if asked.exclude and ending == ".urdf":

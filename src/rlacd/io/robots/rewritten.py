@@ -23,7 +23,7 @@ from rlacd.report import kind_of
 
 @dataclass(frozen=True, eq=False)
 class RewrittenLink:
-    """A link (URDF), body (MJCF) or rigid body (USD) whose collision meshes were replaced."""
+    """A link (URDF), body (MJCF) or rigid body (USD) that collides; hulls replaced its meshes."""
 
     name: str
     """As in the file; of a USD stage its path."""
@@ -35,17 +35,20 @@ class RewrittenLink:
     """The names of the hulls' files."""
     results: Sequence[Decomposition]
     """The decomposition of each of its solids, in the frame of the solid's first mesh."""
+    primitives: int = 0
+    """How many primitives it has beside, which stay; 0 in a USD stage, where they are not looked at."""
 
     @classmethod
     def of(cls, body: Body, results: Results, names: Mapping[Collider, Sequence[str]]) -> RewrittenLink:
         """What became of a body."""
         meshes = [mesh.file.path for collider in body.colliders for mesh in collider.meshes]
         files = [name for collider in body.colliders for name in names[collider]]
-        return cls(body.name, meshes, body.hulls(results), files, [results[collider] for collider in body.colliders])
+        own = [results[collider] for collider in body.colliders]
+        return cls(body.name, meshes, body.hulls(results), files, own, len(body.primitives))
 
     @property
     def added(self) -> float | None:
-        """How far its hulls reach beyond its meshes, in the robot's unit; None where there was no time to measure."""
+        """How far its hulls reach beyond its meshes, in the robot's unit; None without, or if not measured."""
         return _most([_reach(result) for result in self.results])
 
 
@@ -58,13 +61,13 @@ class RewrittenRobot:
     folder: Path
     """Where its hulls are, as OBJ files."""
     links: list[RewrittenLink]
-    """The links with collision meshes, which hulls replaced."""
+    """The links that collide, also those of primitives alone."""
     warnings: list[str]
     """What the user should know: one sentence each."""
     seconds: float
     """Wall time."""
     size: float
-    """The longest side of the box around all meshes that were replaced, with all joints at zero."""
+    """The longest side of the box around all that collides, with all joints at zero."""
     metres: float = 1.0
     """The robot's unit of length."""
     unit: Unit = ANY
@@ -83,7 +86,12 @@ class RewrittenRobot:
     @property
     def added(self) -> float | None:
         """How far hulls reach beyond the meshes, in the robot's unit; None where there was no time to measure."""
-        return _most([link.added for link in self.links])
+        return _most([link.added for link in self.replaced])
+
+    @property
+    def replaced(self) -> list[RewrittenLink]:
+        """The links with collision meshes, which hulls replaced."""
+        return [link for link in self.links if link.meshes]
 
     def save_report(self, path: str | os.PathLike[str]) -> Path:
         """Write what was measured, as `rlacd.Decomposition.save_report` does; on a page, joints can be moved.
@@ -98,7 +106,7 @@ class RewrittenRobot:
         return save_report(path, self.as_dict(), self._page)
 
     def _page(self) -> str:
-        if self._source is None or not self.links:
+        if self._source is None or not self.replaced:
             raise MeshError(f"{self.path} has no collision mesh, so there is nothing to show.")
         from rlacd.io.robots.viewed import shown
         from rlacd.viewer.report import report_page
@@ -121,6 +129,7 @@ class RewrittenRobot:
                     "name": link.name,
                     "meshes": [str(mesh) for mesh in link.meshes],
                     "hulls": len(link.files),
+                    "primitives": link.primitives,
                     "files": [*link.files],
                     "added_abs": link.added,
                     "solids": [result.report.as_dict() for result in link.results],
@@ -136,7 +145,8 @@ class RewrittenRobot:
 def rewritten(robot: Robot, done: Checked, place: Path, written: Written, began: float) -> RewrittenRobot:
     """What became of a robot that was written, since a time of `time.perf_counter`."""
     links = [RewrittenLink.of(body, done.results, written.names) for body in robot.bodies]
-    said = [] if links else [f"{robot.source} has no collision mesh, so this is a copy."]
+    how = "" if robot.bodies else "; --from-visual makes collision geometry of what it shows"
+    said = [] if robot.replaced else [f"{robot.source} has no collision mesh, so this is a copy{how}."]
     said += [*robot.warnings, *written.warnings, *warnings_of(robot, done.results), *done.warnings]
     seconds, of_links = time.perf_counter() - began, (done.pairs, done.samples)
     return RewrittenRobot(

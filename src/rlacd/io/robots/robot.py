@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import trimesh
 
-from rlacd.clear import LinkPair, Motion
+from rlacd.clear import LinkPair, Motion, Primitive
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError
 from rlacd.fit import Unit
@@ -29,6 +29,9 @@ from rlacd.solid.poses import inverse, moved, product
 from rlacd.solid.topology import used_points
 
 Found = TypeVar("Found")
+
+SAME_VOLUME = 1e-6
+"""Share of a volume up to which another is the same: single precision moves corners by less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +93,17 @@ class Collider:
         """All its meshes, in the frame of the first one's element."""
         return _joined(self.meshes, self._poses)
 
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether it fills its hull, to a millionth of the volume."""
+        mesh = self.mesh()
+        hull = Hull.of(np.asarray(mesh.vertices)) if len(mesh.faces) else None
+        if hull is None:
+            return False
+        corners = np.asarray(mesh.vertices)[mesh.faces] - np.asarray(mesh.vertices).mean(axis=0)
+        volume, whole = float(np.linalg.det(corners).sum()) / 6, float(hull.volume)
+        return abs(abs(volume) - whole) <= SAME_VOLUME * whole
+
     def in_file(self, hull: trimesh.Trimesh) -> trimesh.Trimesh:
         """A hull in the coordinates of the first mesh's file, which the description places as it does that mesh.
 
@@ -116,17 +130,22 @@ Results = Mapping[Collider, Decomposition]
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """What moves as one, by its name in the file."""
+    """What moves as one and collides, by its name in the file."""
 
     name: str
     pose: FloatArray  # [4, 4], with all joints at zero
     colliders: Sequence[Collider]  # their meshes are those that are replaced
     is_world: bool = False  # whether it belongs to no body, and never moves
+    primitives: Sequence[Primitive] = ()  # what else of it collides, in its frame; they stay
 
     def mesh(self) -> trimesh.Trimesh:
         """All meshes that are replaced, in the body's frame."""
         meshes = [mesh for collider in self.colliders for mesh in collider.meshes]
         return _joined(meshes, [mesh.to_body for mesh in meshes])
+
+    def shapes(self) -> trimesh.Trimesh:
+        """All that collides, in the body's frame: its meshes, and polyhedra around its primitives."""
+        return trimesh.util.concatenate([self.mesh(), *(each.outside for each in self.primitives)])
 
     def hulls(self, results: Results) -> list[trimesh.Trimesh]:
         """The hulls in their place, in the body's frame."""
@@ -146,7 +165,7 @@ class Robot(ABC):
     """A robot file that has been read."""
 
     source: Path
-    bodies: list[Body]  # those with meshes to decompose, in the order of the file
+    bodies: list[Body]  # those that collide, in the order of the file; of a stage, those with meshes
     warnings: list[str]  # what of it is left unchanged, and why
     metres: float  # its unit of length
     up: Axis
@@ -170,19 +189,24 @@ class Robot(ABC):
         """Whether at most one of its bodies collides."""
         return len(self.bodies) < 2
 
-    def meshes(self, poses: Sequence[FloatArray] | None = None) -> list[trimesh.Trimesh]:
-        """The meshes of its bodies where poses put them, by default at rest."""
+    @property
+    def replaced(self) -> list[Body]:
+        """Its bodies with meshes, which hulls replace."""
+        return [body for body in self.bodies if body.colliders]
+
+    def shapes(self, poses: Sequence[FloatArray] | None = None) -> list[trimesh.Trimesh]:
+        """What collides of its bodies where poses put them, by default at rest."""
         where = [body.pose for body in self.bodies] if poses is None else poses
-        return [turned(pose, body.mesh()) for body, pose in zip(self.bodies, where, strict=True)]
+        return [turned(pose, body.shapes()) for body, pose in zip(self.bodies, where, strict=True)]
 
     @cached_property
     def size(self) -> float:
-        """The longest side of the box around all meshes that are replaced, with all joints at zero; 0 without any.
+        """The longest side of the box around all that collides, with all joints at zero; 0 if nothing does.
 
-        The world's count only if there is nothing else: a robot may stand on a terrain of any size.
+        The world's counts only if there is nothing else: a robot may stand on a terrain of any size.
         """
-        each = zip(self.bodies, self.meshes(), strict=True)
-        moving = [mesh for body, mesh in each if not body.is_world] or self.meshes()
+        each = zip(self.bodies, self.shapes(), strict=True)
+        moving = [mesh for body, mesh in each if not body.is_world] or self.shapes()
         used = [used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh in moving]
         return float(np.ptp(np.concatenate(used), axis=0).max()) if used else 0.0
 
@@ -219,6 +243,7 @@ def _placed(pose: FloatArray, points: FloatArray, faces: Int64Array) -> tuple[Fl
 
 def _joined(meshes: Sequence[PlacedMesh], poses: Sequence[FloatArray]) -> trimesh.Trimesh:
     parts = [_placed(pose, mesh.points, mesh.faces) for mesh, pose in zip(meshes, poses, strict=True)]
+    parts = parts or [(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))]
     begins = np.cumsum([0, *(len(points) for points, _ in parts)])
     faces = [faces + begin for (_, faces), begin in zip(parts, begins, strict=False)]
     return trimesh.Trimesh(np.concatenate([points for points, _ in parts]), np.concatenate(faces), process=False)

@@ -6,7 +6,7 @@ Links that fixed joints connect stay apart: programs name them, and attach senso
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -14,11 +14,11 @@ from typing import NamedTuple
 import networkx
 import numpy as np
 
-from rlacd.clear import LinkPair, Motion, urdf_motion
+from rlacd.clear import LinkPair, Motion, Primitive, urdf_motion
 from rlacd.errors import MeshFileError
 from rlacd.io.robots.document import Document, Files, HullFiles, opened
 from rlacd.io.robots.matrix import srdf
-from rlacd.io.robots.poses import read_scale, urdf_origin
+from rlacd.io.robots.poses import numbers, read_scale, urdf_origin
 from rlacd.io.robots.robot import Body, Collider, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
 from rlacd.io.write import write_file
@@ -36,7 +36,9 @@ class _Collision(NamedTuple):
 
     @property
     def kind(self) -> Hashable:
-        """What its element says beside where which mesh is: extensions about contact."""
+        """What its element says beside where which mesh is: extensions about contact; what is shown says nothing."""
+        if self.element.tag == "visual":
+            return ()
         own = {name: value for name, value in self.element.attributes.items() if name != "name"}
         about = {name: value for name, value in self.mesh.attributes.items() if name not in ("filename", "scale")}
         others = [below for below in self.element.children if below.tag not in ("origin", "geometry")]
@@ -55,13 +57,18 @@ class Urdf(Document):
 
     def motion(self, samples: int, seed: int) -> Motion:
         """See `Robot`."""
-        return urdf_motion(self.source, samples, seed, [body.name for body in self.bodies])
+        return self.with_seen(urdf_motion(self.source, samples, seed, [body.name for body in self.bodies]))
 
     def edits(self, place: Path, folder: Path, hulls: HullFiles, *_: object) -> list[Edit]:
         """See `Document`."""
-        edits = []
+        edits = [_behind(one, [_colliding(one, next(one.named("geometry")).with_attributes({}))]) for one in self.seen]
         for collider, (first, *others) in self.found.items():
             names = [self._reference(first.mesh.attributes["filename"], hull, folder) for hull in hulls[collider]]
+            if first.element.tag == "visual":
+                meshes = [first.mesh.with_attributes({"filename": name}) for name in names]
+                pieces = [_colliding(first.element, b"<geometry>" + mesh + b"</geometry>") for mesh in meshes]
+                edits.append(_behind(first.element, pieces))
+                continue
             pieces = [_with_mesh(first, name, index) for index, name in enumerate(names)]
             edits.append(first.element.replaced(first.element.indent.join(pieces)))
             edits += [other.element.removed() for other in others]
@@ -82,7 +89,7 @@ class Urdf(Document):
         return f"{folder.name}/{hull}"
 
 
-def read_urdf(source: Path, files: Files, *, apart: bool) -> Urdf:
+def read_urdf(source: Path, files: Files, *, apart: bool, from_visual: bool) -> Urdf:
     """Find the collision meshes of a URDF, to be decomposed each for itself or, not `apart`, as links.
 
     Raises
@@ -93,25 +100,35 @@ def read_urdf(source: Path, files: Files, *, apart: bool) -> Urdf:
     root = opened(source, "robot")
     if any(element.tag.startswith("xacro:") for element in root.walk()):
         raise MeshFileError(f"{source} holds xacro macros: expand it with the tool xacro first.")
-    poses, bodies = _link_poses(root), []
+    poses, bodies = _link_poses(root), list[Body]()
     found: dict[Collider, list[_Collision]] = {}
+    seen, bare = list[Element](), set[str]()
     for link in root.named("link"):
         name = link.attributes.get("name", "?")
-        collisions = [each for element in link.named("collision") if (each := _collision(element, link, files))]
+        is_bare = from_visual and not any(link.named("collision"))
+        elements = [*link.named("visual" if is_bare else "collision")]
+        collisions = [each for element in elements if (each := _collision(element, link, files))]
         own = colliders(name, [(None if apart else each.kind, each.placed, each) for each in collisions])
         found |= own
-        bodies += [Body(name, poses.get(name, np.eye(4)), [*own])] if own else []
-    replaced = {collision.mesh for collisions in found.values() for collision in collisions}
+        stated = [(element, one) for element in elements for one in _primitives(element, link)]
+        primitives = [one for _, one in stated]
+        seen += [element for element, _ in stated] if is_bare else []
+        bare |= {name} if is_bare else set()
+        if own or (primitives and name != "world"):
+            bodies.append(Body(name, poses.get(name, np.eye(4)), [*own], primitives=primitives))
+    taken = (collision for together in found.values() for collision in together)
+    replaced = {collision.mesh for collision in taken if collision.element.tag == "collision"}
     others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced]
     names = [each.attributes.get("filename", "") for each in others]
     relative = [name for name in names if name and "://" not in name and not name.startswith("/")]
-    return Urdf(source, bodies, _of_mass(root, bodies), 1.0, "z", root, files.references, relative, found)
+    said, of_file = _of_mass(root, bodies), (root, files.references, relative, found)
+    return Urdf(source, bodies, said, 1.0, "z", *of_file, seen=seen, bare=frozenset(bare))
 
 
 def _of_mass(root: Element, bodies: Sequence[Body]) -> list[str]:
     """What to say of links whose mass is for a simulator to find from their collision geometry."""
     stated = {link.attributes.get("name") for link in root.named("link") if any(link.named("inertial"))}
-    light = [body.name for body in bodies if body.name not in stated]
+    light = [body.name for body in bodies if body.colliders and body.name not in stated]
     if not light:
         return []
     some = f"The link {light[0]} has" if len(light) == 1 else f"{len(light)} links, such as {light[0]}, have"
@@ -129,6 +146,22 @@ def _collision(element: Element, link: Element, files: Files) -> _Collision | No
         raise MeshFileError(f"a collision mesh of {where} has no filename: give it one.")
     scale, file = read_scale(mesh.attributes.get("scale"), where), files.mesh(reference, link.file.folder)
     return _Collision(element, mesh, PlacedMesh(file, scale, _origin(element, where), np.eye(4)))
+
+
+SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1}}
+"""What a primitive states of its sizes, and how many numbers that is."""
+
+
+def _primitives(element: Element, link: Element) -> Iterator[Primitive]:
+    """What collides as a primitive, if it does."""
+    where = f"link {link.attributes.get('name', '?')} of {link.file.path}"
+    for shape in (shape for geometry in element.named("geometry") for shape in geometry.named(*SIZES)):
+        said = [numbers(shape.attributes, name, count, where) or [] for name, count in SIZES[shape.tag].items()]
+        sizes = [value for values in said for value in values]
+        whole = 0 if shape.tag == "box" else 1  # radii are whole, lengths are halved
+        halved = [*sizes[:whole], *(value / 2 for value in sizes[whole:])]
+        if (own := Primitive.read(shape.tag, halved, _origin(element, where))) is not None:
+            yield own
 
 
 def _origin(element: Element, where: str) -> FloatArray:
@@ -155,6 +188,17 @@ def _link_poses(root: Element) -> dict[str, FloatArray]:
         carried = [product(poses[up], at) for up, _, at in tree.in_edges(link, data="origin")]
         poses[link] = carried[0] if carried else np.eye(4)
     return poses
+
+
+def _colliding(element: Element, geometry: bytes) -> bytes:
+    """A collision where an element shows something."""
+    origin = next(element.named("origin"), None)
+    return b"<collision>" + (b"" if origin is None else origin.with_attributes({})) + geometry + b"</collision>"
+
+
+def _behind(element: Element, pieces: Sequence[bytes]) -> Edit:
+    """The edit that adds pieces behind an element."""
+    return Edit(element.file, element.end, element.end, b"".join(element.indent + piece for piece in pieces))
 
 
 def _with_mesh(collision: _Collision, reference: str, index: int) -> bytes:

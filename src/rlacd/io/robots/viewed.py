@@ -12,14 +12,14 @@ from typing import Any
 
 import trimesh
 
-from rlacd.clear import Cleared, Motion, at_rest, check
+from rlacd.clear import Cleared, Motion, Solids, at_rest, check
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshFileError
 from rlacd.finish.report import joint_report
 from rlacd.io.robots.decomposed import Checked, check_options, decomposed_robot
 from rlacd.io.robots.read import robot_or_none
 from rlacd.io.robots.rewritten import warnings_of
-from rlacd.io.robots.robot import Robot, turned
+from rlacd.io.robots.robot import Body, Robot, turned
 from rlacd.options.robots import RobotOptions
 from rlacd.result import Result
 from rlacd.solid.input_mesh import InputMesh
@@ -46,9 +46,9 @@ def read_viewed(path: Path, up: str | None = None, package_dirs: Sequence[str] =
     robot = robot_or_none(path, package_dirs)
     if robot is None:
         return read_subject(path, up)
-    if not robot.bodies:
+    if not robot.replaced:
         raise MeshFileError(f"{path} has no collision mesh, so there is nothing to show.")
-    mesh = _whole(robot, robot.meshes(), robot.warnings)
+    mesh = _whole(robot, robot.shapes(), robot.warnings)
     return Subject(path, path.stem, up or robot.up, mesh, is_robot=True)
 
 
@@ -67,11 +67,17 @@ def shown(robot: Robot, done: Checked, warnings: Sequence[str], seconds: float) 
     """Show a robot with at least one link that has hulls."""
     names = [body.name for body in robot.bodies]
     motion = done.motion or at_rest(names, (), [body.pose for body in robot.bodies])
-    meshes, hulls, link_of = robot.meshes([*motion.poses[0, : len(names)]]), list[trimesh.Trimesh](), list[int]()
-    for number, (body, pose) in enumerate(zip(robot.bodies, motion.poses[0], strict=False)):
+    solids = motion.solids or [Solids(body.primitives) for body in robot.bodies]
+    kept = [
+        [turned(pose, one.outside) for one in own.primitives] for own, pose in zip(solids, motion.poses[0], strict=True)
+    ]
+    hulls, meshes, link_of = list[trimesh.Trimesh](), list[trimesh.Trimesh](), list[int]()
+    for number, pose in enumerate(motion.poses[0]):
+        body = robot.bodies[number] if number < len(names) else Body(motion.links[number], pose, ())
         own = [turned(pose, hull) for hull in body.hulls(done.results)]
         hulls += own
         link_of += [number] * len(own)
+        meshes.append(trimesh.util.concatenate([turned(pose, body.mesh()), *kept[number]]))
     each = [(body.name, done.results[collider].report) for body in robot.bodies for collider in body.colliders]
     report = joint_report(each, 2.0 / robot.size if robot.size > 0 else 1.0)
     options = dict(report.options)
@@ -83,18 +89,18 @@ def shown(robot: Robot, done: Checked, warnings: Sequence[str], seconds: float) 
     moves = (
         motion.joints,
         len(motion.sampled),
-        motion.carried[: len(names)],
+        motion.carried,
         _places(robot, done, motion),
         done.samples,
         touching,
     )
     whole = _whole(robot, meshes, warnings)
     source = trimesh.Trimesh(whole.vertices, whole.faces, process=False)
-    return RobotResult(hulls, report, source, None, whole, names, meshes, link_of, *moves)
+    return RobotResult(hulls, report, source, None, whole, [*motion.links], meshes, link_of, kept, *moves)
 
 
 def _whole(robot: Robot, links: Sequence[trimesh.Trimesh], warnings: Sequence[str]) -> InputMesh:
-    """The meshes of all links as one."""
+    """What collides of all links as one."""
     whole = trimesh.util.concatenate(links)
     return InputMesh(whole.vertices, whole.faces, robot.source.name, (*warnings,), robot.up, robot.metres)
 
@@ -103,14 +109,13 @@ def _contacts(robot: Robot, cleared: Cleared, motion: Motion, values: list[float
     """The links that touch at joint positions: all, but those that a joint connects and whose meshes touch."""
     with _ONE:
         found = check(cleared.bodies, motion.at(values))
-    shown = (pair for pair in found if max(pair) < len(robot.bodies))
-    order = sorted(shown, key=lambda pair: (-found[pair].depth, pair))
+    order = sorted(found, key=lambda pair: (-found[pair].depth, pair))
     told = [pair for pair in order if found[pair].depth or pair not in motion.adjacent]
     return [Contact(*pair, _deep(robot, found[pair].depth)) for pair in told]
 
 
 def _deep(robot: Robot, depth: float) -> str:
-    return f"{robot.unit.words(depth)} deep, though their meshes do not" if depth else "as their meshes do"
+    return f"{robot.unit.words(depth)} deep, though in the input they do not" if depth else "as in the input"
 
 
 def _places(robot: Robot, done: Checked, motion: Motion) -> list[Place]:
@@ -120,8 +125,8 @@ def _places(robot: Robot, done: Checked, motion: Motion) -> list[Place]:
     worst = []
     for pair, what in done.cleared.touching.items():
         sample = what.offences[0].sample if what.offences else int(what.hulls.argmax())
-        if max(pair) < len(robot.bodies) and (what.depth or pair not in motion.adjacent):
-            first, second = (robot.bodies[i].name for i in pair)
+        if what.depth or pair not in motion.adjacent:
+            first, second = (motion.links[i] for i in pair)
             share = f"at {100 * what.hulls.mean():.3g} % of the positions"
             said = f"{first} and {second}: {share}, here {_deep(robot, what.depth)}"
             worst.append((-what.depth, said, motion.positions[sample].tolist()))

@@ -29,7 +29,8 @@ export const stageName = (stage) => STAGES[stage] ?? stage;
 export const HINTS = {
   hull: "A convex body: it has no dents. Physics engines collide these fast and reliably.",
   primitives: "Parts that are a box, a ball, a capsule or a cylinder, which models for simulators hold as such.",
-  links: "Bodies with collision meshes, each decomposed as a solid.",
+  links: "Bodies that collide. The meshes of each become hulls as one solid.",
+  kept: "Boxes, balls, capsules, cylinders and ellipsoids of the robot, in grey. They stay as they are.",
   triangles: "Of all hulls together. Fewer are faster to collide.",
   concavity:
     "The farthest that a part's surface and its hull's lie apart, anywhere: how much room the worst dent has that a hull fills. The longest side is 2, as for the threshold.",
@@ -60,6 +61,7 @@ export function summary(scene, { draft = false } = {}) {
   const words = [
     term(plural(parts.length, "hull"), HINTS.hull),
     report.primitives && term(plural(parts.filter((part) => part.primitive).length, "primitive"), HINTS.primitives),
+    scene.kept.length > 0 && term(plural(scene.kept.length, "primitive"), HINTS.kept),
     scene.robot && term(plural(scene.robot.links.length, "link"), HINTS.links),
     term(plural(report.triangles ?? parts.length, "triangle"), HINTS.triangles),
     length && term(`${criterion} at most\u00a0${digits(length.max)}`, HINTS.concavity),

@@ -26,6 +26,7 @@ export class Stage {
     this.scene.add(this.root);
     this.links = []; // of a robot: what moves as one
     this.inputs = [];
+    this.kept = []; // of a robot: primitives, which stay beside the hulls
     this.parts = [];
     this.heat = null;
     this.balls = null;
@@ -44,6 +45,7 @@ export class Stage {
     for (const link of this.links) link.matrixAutoUpdate = false;
     if (this.links.length) this.root.add(...this.links);
     this.inputs = scene.input.map((mesh, link) => this.#addInput(mesh, link));
+    this.kept = scene.kept.map((mesh) => this.#addKept(mesh));
     this.parts = scene.parts.map((part, index) => this.#addPart(part, index));
     this.middle = this.#boxes().reduce((all, box) => all.union(box), new Box3()).getCenter(new Vector3());
     this.balls = scene.balls && this.#addBalls(scene.balls);
@@ -70,7 +72,7 @@ export class Stage {
   #ground() {
     if (!this.grid) return;
     this.root.updateMatrixWorld(true);
-    const all = [...this.parts.map((part) => part.box), ...this.inputs.map(boxOf)];
+    const all = [...this.parts.map((part) => part.box), ...this.inputs.map(boxOf), ...this.kept.map(({ layers }) => boxOf(layers))];
     const points = all.flatMap(cornersOf).map((corner) => this.root.localToWorld(corner));
     if (points.length === 0) return;
     const box = new Box3().setFromPoints(points);
@@ -81,7 +83,7 @@ export class Stage {
 
   /** Boxes at rest around the hulls, or around the input without any. */
   #boxes() {
-    if (this.parts.length) return this.parts.map((part) => part.box);
+    if (this.parts.length) return [...this.parts.map((part) => part.box), ...this.kept.map(({ layers }) => boxOf(layers))];
     return this.inputs.length ? this.inputs.map(boxOf) : [new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1))];
   }
 
@@ -93,7 +95,7 @@ export class Stage {
 
   /** Show some links of a robot in red. */
   touch(links) {
-    for (const { layers, link } of this.parts) layers.paint(links.has(link) ? TOUCHING : layers.color);
+    for (const { layers, link } of [...this.parts, ...this.kept]) layers.paint(links.has(link) ? TOUCHING : layers.color);
     this.draw();
   }
 
@@ -130,8 +132,9 @@ export class Stage {
 
   fit(again = true) {
     this.root.updateMatrixWorld(true);
+    const drawn = [...this.parts.map(({ group, box }) => [group, box]), ...this.kept.map(({ layers }) => [layers, boxOf(layers)])];
     const corners = this.parts.length
-      ? this.parts.flatMap((part) => cornersOf(part.box).map((corner) => part.group.localToWorld(corner)))
+      ? drawn.flatMap(([group, box]) => cornersOf(box).map((corner) => group.localToWorld(corner)))
       : this.#boxes().flatMap((box) => cornersOf(box).map((corner) => this.root.localToWorld(corner)));
     if (corners.length) this.camera.frame(corners, { again });
     this.draw();
@@ -141,6 +144,10 @@ export class Stage {
   refresh() {
     const { input, hulls, edges, heat, balls, grid, pull } = this.look;
     for (const each of this.inputs) each.show(this.parts.length ? input : "solid");
+    for (const { layers, centre } of this.kept) {
+      layers.position.copy(centre).sub(this.middle).multiplyScalar(pull);
+      layers.show(this.picked === null ? hulls : "ghost");
+    }
     if (this.grid) this.grid.visible = grid && pull === 0;
     this.parts.forEach((part, index) => {
       const alone = this.picked !== null;
@@ -191,6 +198,12 @@ export class Stage {
     return layers;
   }
 
+  #addKept(mesh) {
+    const layers = new Layers(geometryOf(mesh), new Color("#c9ced6"));
+    (this.links[mesh.link] ?? this.root).add(layers);
+    return { layers, link: mesh.link, centre: boxOf(layers).getCenter(new Vector3()) };
+  }
+
   #addPart(part, index) {
     const geometry = geometryOf(part);
     const color = new Color(part.color);
@@ -225,7 +238,7 @@ export class Stage {
   }
 
   #empty() {
-    for (const thing of [...this.inputs, this.balls, this.grid, ...this.parts.map((part) => part.group), ...this.links]) {
+    for (const thing of [...this.inputs, ...this.kept.map(({ layers }) => layers), this.balls, this.grid, ...this.parts.map((part) => part.group), ...this.links]) {
       if (!thing) continue;
       thing.traverse((node) => {
         node.geometry?.dispose();
@@ -234,7 +247,7 @@ export class Stage {
       thing.removeFromParent();
     }
     this.heat = this.balls = this.grid = null;
-    this.inputs = this.parts = this.links = [];
+    this.inputs = this.kept = this.parts = this.links = [];
   }
 
   #resize() {
