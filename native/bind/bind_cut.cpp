@@ -84,12 +84,21 @@ void bind_cut(nb::module_& m) {
         "vertices"_a, "faces"_a, "x"_a, "y"_a, "z"_a, "offset"_a, "least"_a,
         "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and "
         "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
-  m.def("halve",
-        released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<Vec3>& directions, double share,
-                    double least) { return columns(halve(mesh, hull, directions, share, least)); }),
-        "vertices"_a, "faces"_a, "hull"_a, "directions"_a, "share"_a, "least"_a,
-        "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length along the one of the "
-        "unit directions [K, 3] in which it is longest: the smaller first, none if one would be empty.");
+  m.def(
+      "halve_between",
+      released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<const ConvexBody*>& around, double share,
+                  double least) { return columns(halve(mesh, hull, between(hull, around), share, least)); }),
+      "vertices"_a, "faces"_a, "hull"_a, "around"_a, "share"_a, "least"_a,
+      "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
+      "other of the two hulls around whose volumes it would add the least to: the smaller first, none if one would "
+      "be empty or there are no two.");
+  m.def("halve_along",
+        released([](const Mesh& mesh, const ConvexBody& hull, bool principal, double share, double least) {
+          const auto axes = principal ? principal_axes(mesh) : std::array<Vec3, 3>{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+          return columns(halve(mesh, hull, {axes.begin(), axes.end()}, share, least));
+        }),
+        "vertices"_a, "faces"_a, "hull"_a, "principal"_a, "share"_a, "least"_a,
+        "The same along the longest coordinate axis or principal axis.");
   m.def(
       "connected_pieces", released([](const Mesh& mesh, double least) {
         std::optional<std::vector<Piece>> found = connected_pieces(mesh, least);

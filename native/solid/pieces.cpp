@@ -86,6 +86,12 @@ std::vector<Mesh> bodies(const Mesh& mesh) {
   return found;
 }
 
+double growth(const Mesh& hull, const std::vector<Vec3>& corners) {
+  HullBuilder joint;
+  joint.add(joined(hull.vertices, corners));
+  return joint.volume() - mesh_volume(hull);
+}
+
 }  // namespace
 
 std::optional<Piece> piece_of(Mesh mesh, double least) {
@@ -135,6 +141,22 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
     if (std::optional<Piece> piece = piece_of(std::move(own), least)) pieces.push_back(std::move(*piece));
   }
   return pieces;
+}
+
+std::vector<Vec3> between(const ConvexBody& hull, const std::vector<const ConvexBody*>& around) {
+  const std::vector<Vec3>& corners = hull.mesh().vertices;
+  if (around.size() < 2 || corners.empty()) return {};  // what one cannot take, it cannot take in halves
+  std::vector<std::pair<double, std::size_t>> by_growth;
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    poll_stop();
+    by_growth.emplace_back(growth(around[i]->mesh(), corners), i);
+  }
+  std::partial_sort(by_growth.begin(), by_growth.begin() + 2, by_growth.end());
+  const Vec3 along =
+      middle_of(around[by_growth[1].second]->mesh().vertices) - middle_of(around[by_growth[0].second]->mesh().vertices);
+  const double length = norm(along);
+  if (length == 0) return {};
+  return {{along.x / length, along.y / length, along.z / length}};
 }
 
 std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::vector<Vec3>& directions, double share,

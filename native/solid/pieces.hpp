@@ -23,6 +23,10 @@ std::optional<Piece> piece_of(Mesh mesh, double least);
 
 std::array<std::optional<Piece>, 2> cut(const Mesh& mesh, Vec3 normal, double offset, double least);
 
+// The direction between the middles of the two hulls around that would grow the least by all of a piece; none if there
+// are no two such hulls apart. Around a round hole it follows the hole, which no axis does.
+std::vector<Vec3> between(const ConvexBody& hull, const std::vector<const ConvexBody*>& around);
+
 // The sides of a plane at a share of a piece's length along the direction of those in which it is longest, the smaller
 // first; none if one would be empty.
 std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::vector<Vec3>& directions, double share,

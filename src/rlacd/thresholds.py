@@ -31,7 +31,7 @@ from rlacd.solid.manifold import to_manifold
 FACTORS = (1, 1.25, 1.5, 2, 2.5, 4, 6, 10, 15, 25)
 """Times the finest threshold."""
 
-FINEST = 0.4
+FINEST_FACTOR = 0.4
 """Share of the usual threshold that the finest is where none is given: 0.02, for 0.02 to 0.5."""
 
 
@@ -131,7 +131,7 @@ def tradeoff(
         raise OptionError("thresholds are compared for a whole mesh, by concavity, distance or volume.")
     if options.get(name) is None:
         usual = about(Options, name).kind.read(getattr(chosen, name))
-        chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options, name: FINEST * usual})
+        chosen = Options.of({"quality": FAST, "max_hulls": max_hulls, **options, name: FINEST_FACTOR * usual})
     check_callback("progress", progress, "a `rlacd.Progress`")
     with Run(chosen.threads, chosen.timeout, progress) as run:
         with run.stage("load"):

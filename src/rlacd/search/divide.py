@@ -15,7 +15,6 @@ import numpy as np
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.unite import feasible_unions, joint_part
 from rlacd.run import Run, work
-from rlacd.solid.arrays import dots, length
 from rlacd.solid.component import Component, Part, reunite
 
 
@@ -88,7 +87,7 @@ def divide(
     """
     division = _Division(around, criterion, random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
-    if not keeps_rest and not all(map(division.may_go, pieces)):
+    if not keeps_rest and not all(division.takers(piece) or division.may_go(piece) for piece in pieces):
         return None  # a quick test that ends most trials
     left: list[Component] = []
     for piece in pieces:
@@ -140,22 +139,18 @@ class _Division:
         return [i for i, _ in sorted(feasible, key=lambda found: found[1] - self.now[found[0]].hull.volume)[:TAKERS]]
 
     def may_go(self, piece: _Piece, halvings: int = PIECE_HALVINGS) -> bool:
-        """Whether the piece, or each of those it is halved into, may be taken by some part."""
-        takers = self.takers(piece)
-        if takers or halvings == 0:
-            return bool(takers)
-        halves = self._halves(piece, takers)
-        return len(halves) > 0 and all(self.may_go(half, halvings - 1) for half in halves)
+        """Whether each of its smallest pieces may be taken: if one may not, hardly anything larger may."""
+        smaller = self._halves(piece) if halvings > 0 else []
+        return all(self.may_go(half, halvings - 1) for half in smaller) if smaller else bool(self.takers(piece))
 
     def left_of(self, piece: _Piece, halvings: int = PIECE_HALVINGS, stop: bool = False) -> list[Component]:
         """Give parts what they can take of a piece; returns the rest, or with `stop` the first of the rest."""
-        takers = self.takers(piece)
-        for i in takers:
+        for i in self.takers(piece):
             union = joint_part(self.now[i], piece.component, self._criterion, self._run.work)
             if union is not None:
                 self.now[i] = union
                 return []
-        halves = self._halves(piece, takers) if halvings > 0 else []
+        halves = self._halves(piece) if halvings > 0 else []
         if not halves:
             return [piece.component]
         left: list[Component] = []
@@ -165,25 +160,15 @@ class _Division:
                 break
         return left
 
-    def _halves(self, piece: _Piece, takers: Sequence[int]) -> list[_Piece]:
+    def _halves(self, piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
             may_cut = self._run.step(0, None, len(self.now)) and self._run.work.pay(work.cutting(piece.component.size))
-            piece.halves = [_Piece(half) for half in self._halved(piece.component, takers)] if may_cut else []
+            piece.halves = [_Piece(half) for half in self._halved(piece.component)] if may_cut else []
         return piece.halves
 
-    def _halved(self, component: Component, takers: Sequence[int]) -> list[Component]:
-        """Cut near the middle; the smaller half comes first.
-
-        The first time from the one to the other of the best takers, else of the nearest parts: around a round hole that
-        follows the hole, which no axis does.
-        """
+    def _halved(self, component: Component) -> list[Component]:
+        """Cut near the middle; the smaller half comes first."""
         share = self._random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-        if not self._again and len(self.now) > 1:
-            middles = np.array([part.hull.vertices.mean(axis=0) for part in self.now])
-            gaps = middles - component.hull.vertices.mean(axis=0)
-            nearest = [i for i in np.argsort(dots(gaps, gaps)).tolist() if i not in takers]
-            first, second = [*takers, *nearest][:2]
-            along = middles[second] - middles[first]
-            if length(along) > 0:
-                return component.halved(share, along[None] / length(along))
-        return component.halved(share, np.eye(3) if self._random.random() < 0.5 else component.principal_axes)
+        if not self._again:
+            return component.halved_between(share, [part.hull for part in self.now])
+        return component.halved(share, self._random.random() >= 0.5)

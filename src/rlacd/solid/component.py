@@ -218,12 +218,18 @@ class Component(Part):
         below, above = _native.cut(self.vertices, self.faces, *plane.normal, plane.offset, least)
         return below and Component.of(below, self), above and Component.of(above, self)
 
-    def halved(self, share: float, directions: FloatArray) -> list[Component]:
-        """Cut at a share of its length along the one of the unit directions [K, 3] in which it is longest.
+    def halved(self, share: float, principal: bool) -> list[Component]:
+        """Cut at a share of its length along its longest coordinate axis or principal axis.
 
         The smaller side comes first; an empty list if one would be empty.
         """
-        sides = _native.halve(self.vertices, self.faces, self.hull.body, directions, share, NEGLIGIBLE_VOLUME)
+        sides = _native.halve_along(self.vertices, self.faces, self.hull.body, principal, share, NEGLIGIBLE_VOLUME)
+        return [Component.of(side, self) for side in sides]
+
+    def halved_between(self, share: float, hulls: Sequence[Hull]) -> list[Component]:
+        """The same from one to the other of the two hulls that would grow the least by it; empty if there are none."""
+        around, own = [hull.body for hull in hulls], self.hull.body
+        sides = _native.halve_between(self.vertices, self.faces, own, around, share, NEGLIGIBLE_VOLUME)
         return [Component.of(side, self) for side in sides]
 
     def inside(self, hull: Hull) -> Component | None:

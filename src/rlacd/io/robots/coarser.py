@@ -17,7 +17,7 @@ from rlacd.options import FAST, Options
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Run
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.thresholds import FACTORS, FINEST, TradeoffRow, picked, rows_of
+from rlacd.thresholds import FACTORS, FINEST_FACTOR, TradeoffRow, picked, rows_of
 
 MANY = 20
 """A link of more hulls is told of, with what would make it fewer."""
@@ -90,7 +90,7 @@ def tradeoff_of(robot: Robot, options: Mapping[str, Any]) -> RobotTradeoff:
     robot, given, asked = with_lengths(robot, options, RobotOptions())
     given = {name: value for name, value in given.items() if value is not None}
     if given.get("threshold") is None and given.get("threshold_abs") is None:
-        given["threshold_abs"] = float(f"{FINEST * SHARE * robot.size:.3g}")
+        given["threshold_abs"] = float(f"{FINEST_FACTOR * SHARE * robot.size:.3g}")
     each = options_of_bodies(robot, {"quality": FAST, **given}, asked)
     links, known, finest = dict[str, list[int]](), dict[Hashable, list[TradeoffRow]](), 0.0
     for body, own in zip(robot.bodies, each, strict=True):

@@ -24,6 +24,7 @@ from rlacd.clear import (
     link_pairs,
     warnings_of,
 )
+from rlacd.clear.mend import Exact, Redo
 from rlacd.decompose_mesh import decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
@@ -150,9 +151,16 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         return _moving(bodies[number], results).hulls
 
     tell("clear", 0)
+    return _checked(robot, results, asked, options.get("seed") or 0, (redo, exact))
+
+
+def _checked(
+    robot: Robot, results: dict[Collider, Decomposition], asked: RobotOptions, seed: int, ways: tuple[Redo, Exact]
+) -> Checked:
+    """Check links against each other, and mend those that touch in two ways (see `kept_clear`)."""
     try:
-        motion, said = _motion(robot, asked.samples, options.get("seed") or 0)
-        cleared = kept_clear([*_links(bodies, results, motion)], motion, redo, exact)
+        motion, said = _motion(robot, asked.samples, seed)
+        cleared = kept_clear([*_links(robot.bodies, results, motion)], motion, *ways)
     except (MissingExtraError, CrowdedError) as error:
         if asked.exclude or asked.srdf:
             raise
