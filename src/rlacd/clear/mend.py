@@ -87,7 +87,7 @@ class _Wishes:
 
 
 def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact = lambda _: None) -> Cleared:
-    """Decompose bodies again until no hulls touch mostly where the bodies do not, or that does not help.
+    """Decompose bodies again until no hulls touch where the bodies do not, or that does not help.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
     """
     bodies = list(bodies)
     touching = check(bodies, motion)
-    first, wishes = {pair for pair, found in touching.items() if found.is_wrong}, _Wishes()
+    first, wishes = {pair for pair, found in touching.items() if found.offences}, _Wishes()
     finer = {
         i: hulls
         for i in sorted({*chain(*(pair for pair, found in touching.items() if found.offences))})
@@ -106,7 +106,7 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
     touching = _renewed(bodies, motion, touching, {*finer})
     most = [max(MOST_GROWTH * len(body.hulls), len(body.hulls) + SPARE) for body in bodies]
     for _ in range(MOST_ROUNDS):
-        wrong = {pair: found for pair, found in touching.items() if found.is_wrong}
+        wrong = {pair: found for pair, found in touching.items() if found.offences}
         again = _wish(bodies, wrong, wishes)
         if not again:
             break
@@ -121,7 +121,7 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
             bodies[body] = bodies[body].with_hulls(hulls)
             wishes.renewed[body] += 1
         touching = _renewed(bodies, motion, touching, again - wishes.given_up)
-    mended = sorted(pair for pair in first if pair not in touching or not touching[pair].is_wrong)
+    mended = sorted(pair for pair in first if pair not in touching or not touching[pair].offences)
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended), frozenset(wishes.given_up))
 
 

@@ -71,8 +71,8 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
     """What to say of links that touch: all are named; `length` says one in words."""
     names, sentences = [body.name for body in cleared.bodies], list[str]()
     new = {pair: found for pair, found in cleared.touching.items() if found.offences}
-    wrong = sorted((pair for pair in new if new[pair].is_wrong), key=lambda pair: (-new[pair].depth, pair))
-    for pair in wrong[:MOST_SAID]:
+    deepest_first = sorted(new, key=lambda pair: (-new[pair].depth, pair))
+    for pair in deepest_first[:MOST_SAID]:
         deepest, places = new[pair].offences[0], len(new[pair].offences)
         more = "" if places == 1 else f", the deepest of {places} places"
         sentences.append(
@@ -80,18 +80,9 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
             f"{length(deepest.depth)} deep {motion.words(deepest.sample)}{more}"
             f"{'' if cleared.given_up.isdisjoint(pair) else TOO_MANY}."
         )
-    earlier = sorted(new.keys() - {*wrong})
-    for pairs, which, why in (
-        (wrong[MOST_SAID:], "Hulls of other links touch too though the links do not", ""),
-        (
-            earlier,
-            "Hulls of links that often collide themselves touch a little earlier",
-            ", as they were not cut finer",
-        ),
-    ):
-        if pairs:
-            depth = length(max(new[pair].depth for pair in pairs))
-            sentences.append(f"{which}, up to {depth} deep{why}: {_listed(pairs, names)}.")
+    if others := deepest_first[MOST_SAID:]:
+        depth = length(new[others[0]].depth)
+        sentences.append(f"Hulls of other links touch too, up to {depth} deep: {_listed(others, names)}.")
     always = [pair for pair, found in cleared.touching.items() if found.meshes.all() and pair not in motion.adjacent]
     if always:
         more = "" if len(always) == 1 else f", and {len(always) - 1} more pairs,"

@@ -41,11 +41,6 @@ class Touching:
     offences: tuple[Offence, ...]  # the deepest first
 
     @property
-    def is_wrong(self) -> bool:
-        """Whether hulls touch mostly where the bodies do not; elsewhere they only touch a little earlier than these."""
-        return bool(np.count_nonzero(self.hulls & ~self.meshes) > np.count_nonzero(self.meshes))
-
-    @property
     def depth(self) -> float:
         """How deep hulls overlap where the bodies do not touch, at most."""
         return self.offences[0].depth if self.offences else 0.0
