@@ -165,3 +165,9 @@ def test_bad_places_and_axes_are_refused(result: Decomposition, tmp_path: Path) 
     with pytest.raises(OptionError, match="x, y or z"):
         save_report_page(result, tmp_path / "out.html", up="w")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_as_json_is_what_the_result_says(result: rlacd.Decomposition, tmp_path: Path) -> None:
+    for name in ("a.json", "b.JSON"):
+        written = json.loads(result.save_report(tmp_path / name).read_text(encoding="utf-8"))
+        assert written == json.loads(json.dumps(result.report.as_dict()))
