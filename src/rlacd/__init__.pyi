@@ -123,7 +123,7 @@ def decompose(
     max_faces : int | None
         At most this many triangles per hull; a low limit acts as a low limit on vertices.
     detail : DetailName
-        simple leaves out corners of hulls that add little, within the threshold; full keeps the exact hulls. Default:
+        simple leaves out corners that add little, within the threshold, of hulls not filled; full keeps all. Default:
         simple.
     primitives : bool | Sequence[PrimitiveKind]
         Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF,

@@ -15,7 +15,7 @@ from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
 from rlacd.limit import at_most, cut_to_limits
-from rlacd.merge import grow_cover
+from rlacd.merge import grow_cover, grown_parts, may_grow
 from rlacd.options import FAST, Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -43,6 +43,14 @@ search divides them by more than 1.32."""
 PIECES_A_FACE = 4
 """Sheets are cut into at most so many pieces a face: real ones take a quarter of one, those that cross themselves may
 take a hundred."""
+
+
+EXACT, EXACT_WORK = 0.02, 0.25e6
+"""Share of the goal under which pieces are exact, and the work that may take, if cutting and merging took no more:
+furniture of ten boards takes 0.22e6."""
+
+FEW_SIDES = 6
+"""So many planes a part are few: those of a box, if no two boxes share one."""
 
 
 class Reached(NamedTuple):
@@ -229,6 +237,19 @@ class _Decomposer:
                     moved = sorted([self._transferred(parts, goal), *moved], key=cost, reverse=True)
             return moved, goal, found
 
+    def _exact(self, parts: list[Part], goal: Criterion) -> list[Part]:
+        """The convex bodies that a solid of few sides is made of, if they are no more than the parts, or larger.
+
+        Its pieces under a far finer goal grow back to the bodies.
+        """
+        if self.model.proxy is not None or self.problem.root.sides > FEW_SIDES * len(parts) or not may_grow(goal):
+            return parts
+        with self.run.limited(max(self.run.work.done, EXACT_WORK)):
+            finer = goal.scaled(EXACT)
+            pieces, left = self.tree.cut_until(finer)
+            found = [] if left else grown_parts(pieces, len(parts), finer, self.run)
+        return min(parts, found or parts, key=cost)
+
     def coarser(self, free: list[list[Part]], goal: Criterion) -> Iterator[list[Part]]:
         """Get decompositions under coarser and coarser goals, until one part is left; `free` are those under the goal.
 
@@ -264,6 +285,9 @@ class _Decomposer:
         assert options.quality is not None, "filled in by the options"
         most = math.inf if options.max_hulls is None else TIMES_TOO_MANY * options.max_hulls + TOO_MANY
         goes_on = options.merge and policy not in AS_PUBLISHED
+        if goes_on and run.stopped_by is None:
+            with run.stage("merge"):
+                states = [parts := self._exact(parts, goal)]
         if run.stopped_by is not None:
             return states, None
         with run.until_stopped():

@@ -219,10 +219,11 @@ GROWTHS_TRIED = 3
 def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: FloatArray = NO_SIDES) -> Part:
     """Get the part with a hull of few corners that still meets the criterion; the same part if there is none.
 
+    What the solid fills to rounding stays as it is: a box keeps its corners, and bodies that touch go on to.
     A criterion that does not bound how far a hull may reach beyond its part leaves hulls as they are. A hull that
     exceeds the limits is left for `limit_part`. For `sides` see `limit_hull`.
     """
-    if not math.isfinite(criterion.outward_deviation):
+    if not math.isfinite(criterion.outward_deviation) or part.filled >= (1 - TOLERANCE) * part.hull.volume:
         return part
     growth = SHARE_OF_DEVIATION * criterion.outward_deviation
     for _ in range(GROWTHS_TRIED):

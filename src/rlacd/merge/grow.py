@@ -54,14 +54,17 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]
     run : Run
         The merged parts are returned when its work runs out.
     """
-    if criterion.obstacles is not None or not math.isfinite(criterion.outward_deviation):
+    if not may_grow(criterion) or merged[0].whole.size > DENSE:
         return merged
-    if merged[0].whole.size > DENSE or sum(map(_shares, merged)) < CROSSING * len(merged):
+    if sum(map(_shares, merged)) < CROSSING * len(merged):
         return merged
-    parts = merged
-    with run.until_stopped():
-        parts = _regrown(merged, criterion, run)
-    return parts if len(parts) <= WORTH * len(merged) and not run.is_over else merged
+    pieces = [member for part in merged for member in part.members]
+    return grown_parts(pieces, WORTH * len(merged), criterion, run) or merged
+
+
+def may_grow(criterion: Criterion) -> bool:
+    """Whether a criterion bounds how far hulls may reach beyond the solid, and by nothing else."""
+    return criterion.obstacles is None and math.isfinite(criterion.outward_deviation)
 
 
 def _shares(part: Part) -> bool:
@@ -69,22 +72,23 @@ def _shares(part: Part) -> bool:
     return len(part.members) > 1 and part.filled > SHARED * part.volume
 
 
-def _regrown(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]:
-    """Parts grown from the pieces and merged; the merged parts if samples show that growing saves none."""
-    whole = merged[0].whole
-    pieces = [member for part in merged for member in part.members]
-    if not run.work.pay(sum(work.uniting(len(piece.hull.vertices)) for piece in pieces)):
-        return merged
+def grown_parts(pieces: Sequence[Component], most: float, criterion: Criterion, run: Run) -> list[Part]:
+    """Cover a solid by parts grown from its pieces, which meet the criterion, and merged.
+
+    Empty if that takes more than so many parts, or more work or time than there is.
+    """
+    parts, whole = list[Part](), pieces[0].whole
     depth = DEPTH * criterion.outward_deviation
-    grown = run.map(lambda piece: whole.against.grown(piece.hull.body, depth), pieces)
-    chosen = _chosen(pieces, grown)
-    if len(chosen) > WORTH * len(merged):
-        return merged
-    parts = _taken(pieces, [grown[i] for i in chosen], criterion, run, whole)
-    if not parts:
-        return merged
-    parts = drop_slivers(parts, run)
-    return drop_slivers(merge_parts(parts, criterion, run), run)
+    with run.until_stopped():
+        if not run.work.pay(sum(work.uniting(len(piece.hull.vertices)) for piece in pieces)):
+            return []
+        grown = run.map(lambda piece: whole.against.grown(piece.hull.body, depth), pieces)
+        chosen = _chosen(pieces, grown)
+        if len(chosen) > most:  # samples show it
+            return []
+        parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run, whole), run)
+        parts = drop_slivers(merge_parts(parts, criterion, run), run) if parts else []
+    return [] if run.is_over or len(parts) > most else parts
 
 
 def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[int]:

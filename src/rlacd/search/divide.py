@@ -15,7 +15,7 @@ import numpy as np
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.unite import feasible_unions, joint_part
 from rlacd.run import Run, work
-from rlacd.solid.arrays import length
+from rlacd.solid.arrays import dots, length
 from rlacd.solid.component import Component, Part, reunite
 
 
@@ -172,13 +172,18 @@ class _Division:
         return piece.halves
 
     def _halved(self, component: Component, takers: Sequence[int]) -> list[Component]:
-        """Cut near the middle, first from the one to the other of the best takers; the smaller half comes first.
+        """Cut near the middle; the smaller half comes first.
 
-        Around a round hole that follows the hole, which no axis does.
+        The first time from the one to the other of the best takers, else of the nearest parts: around a round hole that
+        follows the hole, which no axis does.
         """
         share = self._random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-        if not self._again and len(takers) > 1:
-            along = np.subtract(*(self.now[i].hull.vertices.mean(axis=0) for i in takers[1::-1]))
+        if not self._again and len(self.now) > 1:
+            middles = np.array([part.hull.vertices.mean(axis=0) for part in self.now])
+            gaps = middles - component.hull.vertices.mean(axis=0)
+            nearest = [i for i in np.argsort(dots(gaps, gaps)).tolist() if i not in takers]
+            first, second = [*takers, *nearest][:2]
+            along = middles[second] - middles[first]
             if length(along) > 0:
                 return component.halved(share, along[None] / length(along))
         return component.halved(share, np.eye(3) if self._random.random() < 0.5 else component.principal_axes)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rlacd import _native
-from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.arrays import FloatArray, IntArray, dots
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.solid import Shape, mesh_of
@@ -26,6 +26,9 @@ NEGLIGIBLE_VOLUME = 1e-12
 LOST_VOLUME = TOLERANCE
 """Share of a solid's volume that may be lost in a boolean, or as slivers (see `rlacd.cut`)."""
 
+
+FLAT = 1e-5
+"""Faces whose planes differ by less lie in one."""
 
 DENSE = 10_000
 """Solids and bodies of so many triangles are dense: a simpler copy is decomposed, and their noise is that of a scan."""
@@ -183,6 +186,18 @@ class Component(Part):
     def size(self) -> int:
         """Triangles."""
         return len(self.faces)
+
+    @property
+    def sides(self) -> int:
+        """Number of planes that its faces lie in, without the smallest, which hold 1 % of the area."""
+        corners = self.vertices[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = np.linalg.norm(normals, axis=1)
+        normals = normals[areas > 0] / areas[areas > 0, None]
+        planes = np.concatenate([normals, dots(normals, corners[areas > 0, 0])[:, None]], axis=1)
+        _, side = np.unique(np.round(planes / FLAT), axis=0, return_inverse=True)
+        shares = np.sort(np.bincount(side.ravel(), areas[areas > 0] / areas.sum()))
+        return int(np.count_nonzero(np.cumsum(shares) > 0.01))
 
     @cached_property
     def against(self) -> _native.Against:
