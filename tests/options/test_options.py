@@ -289,7 +289,7 @@ def test_a_length_with_a_unit_is_kept_until_the_mesh_says_its_own() -> None:
         assert again.as_plain() == options.as_plain()
         assert (again.typed_unit, again.in_unit(1.0, "mesh").typed_unit) == ("mm", None)
     cube = creation.box()
-    with pytest.raises(OptionError, match=r"threshold is 2mm, but a mesh does not say its unit: .* threshold_abs"):
+    with pytest.raises(OptionError, match=r"threshold is 2mm, but Trimesh does not say its unit: .* threshold_abs"):
         rlacd.decompose(cube, threshold="2mm")
     assert rlacd.decompose(cube, threshold="2mm", unit="cm").report.options["threshold_abs"] == 0.002
     assert rlacd.decompose(cube, threshold="20%").report.options["threshold"] == 0.4

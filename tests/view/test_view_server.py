@@ -161,7 +161,7 @@ def test_everything_offered_can_be_downloaded_and_read(viewer: ViewServer) -> No
                 model = archive.read(f"{NAME}.xml").decode()
                 assert model.count('class="collision"') >= 2
         elif name == "report.json":
-            assert answer.json["parts"] == 2
+            assert answer.json["hulls"] == 2
         elif name == "report.html":
             assert b"connect-src 'none'" in answer.body
 

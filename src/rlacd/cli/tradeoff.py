@@ -32,7 +32,7 @@ def _tradeoff(
     package_dirs: Sequence[str] | None,
     **how: Any,
 ) -> None:
-    """Show how many hulls each of ten thresholds leads to; of a robot, link by link.
+    """Show how many hulls each of ten thresholds leads to.
 
     \b
     Examples:
