@@ -144,7 +144,7 @@ INPUT = {"mesh", "faces", "file_type"}
 
 @pytest.mark.promise("all-options")
 def test_the_table_names_every_option_and_the_command_offers_every_argument() -> None:
-    table = "".join(line.split("|")[1] for line in options_table().splitlines())
+    table = "".join(line.split("|")[1] for line in options_table().splitlines() if line.startswith("|"))
     command = app.get_command(click.Context(app), "decompose")
     options = {
         name for p in command.params if not getattr(p, "hidden", False) for name in p.opts if name.startswith("--")
