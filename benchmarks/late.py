@@ -39,7 +39,7 @@ at = []
 threading.Timer(seconds, lambda: at.append((time.perf_counter(), time.process_time()))).start()
 {}
 wall, cpu = at[0] if at else (float("nan"), float("nan"))
-told = [time.perf_counter() - wall, time.process_time() - cpu, result["parts"], result["hausdorff"]["missed"]]
+told = [time.perf_counter() - wall, time.process_time() - cpu, result["hulls"], result["hausdorff"]["missed"]]
 print(json.dumps(told))
 """
 

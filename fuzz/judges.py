@@ -55,7 +55,7 @@ class Case:
     hulls : list of (vertices [V, 3], faces [F, 3])
         In the input's unit, as read from the output file.
     report : dict
-        Parts, hausdorff, warnings, complete, and what the criterion says.
+        Hulls, hausdorff, warnings, complete, and what the criterion says.
     """
 
     shape: Shape
@@ -114,7 +114,7 @@ def limits(case: Case) -> list[str]:
     if most_hulls is not None and len(case.hulls) > most_hulls and case.report["complete"]:
         found.append(f"{len(case.hulls)} hulls, not {most_hulls}; said: {case.warned!r}")
     if len(case.hulls) != case.report["hulls"] or not case.hulls:
-        found.append(f"{len(case.hulls)} hulls in the file, {case.report['parts']} in the report")
+        found.append(f"{len(case.hulls)} hulls in the file, {case.report['hulls']} in the report")
     return found
 
 

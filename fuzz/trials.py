@@ -258,7 +258,7 @@ class Laboratory:
             if first.code == 4 and main.endswith((".obj", ".ply")):
                 report = {**said["report"], "complete": False, "warnings": ["Incomplete exceed outside the hulls"]}
                 hulls = read_hulls(after[main], main[-3:])
-                report |= {"parts": len(hulls), "hausdorff": {"missed": None, "added": None}, "concavity": None}
+                report |= {"hulls": len(hulls), "hausdorff": {"missed": None, "added": None}, "concavity": None}
                 found += judge(Case(shape, {**options, "max_hulls": None}, hulls, report))
             if fault.name == "timeout":
                 found += _lateness(first.cpu, float(fault.words[1]), options["threads"])

@@ -57,14 +57,14 @@ def test_what_was_promised_and_is_not_so_is_seen(
     """The first of two hulls alone, or one hull of all under the options of a decomposition into more."""
     good, whole = case(), case(threshold=1.5)
     assert (len(good.hulls), len(whole.hulls), judge(whole)) == (2, 1, [])
-    report = {**(whole if options else good).report, "parts": 1, **said}
+    report = {**(whole if options else good).report, "hulls": 1, **said}
     wrong = replace(good, hulls=(good if count else whole).hulls[:1], options=options or good.options, report=report)
     assert any(seen in word for word in judge(wrong))
 
 
 def test_no_warning_excuses_what_lies_outside_where_repair_dropped_nothing() -> None:
     good = case()
-    told = {**good.report, "parts": 1, "warnings": ["Some of the surface lies outside the hulls: repair dropped it."]}
+    told = {**good.report, "hulls": 1, "warnings": ["Some of the surface lies outside the hulls: repair dropped it."]}
     wrong = replace(good, hulls=good.hulls[:1], report=told)
     assert any("without a reason" in word for word in judge(wrong))
     rows = [{**body, "step": "capped"} for body in told["repair"]]
