@@ -228,7 +228,7 @@ class TestTables:
             average, worst = map(float, away.split(", "))
             row = {
                 **{"method": method, "version": "1.0.14", "setting": 0.05, "parts": int(hulls.replace(",", "")) / 58},
-                **{"faces": int(faces.replace(",", "")), "uncovered": float(left.split()[0]) / 100, "invalid": 0},
+                **{"faces": int(faces.replace(",", "")), "uncovered": float(left.rstrip("%")) / 100, "invalid": 0},
                 **{"cpu": 1 / float(faster), "exceeding": {compare.AS_MANY: None, "coacd": 1}.get(method, 0)},
                 "concavity": float(sure.split()[-1]) if "up to" in sure else 0.05,
                 "hausdorff": average - (worst - average) / 57,
