@@ -116,7 +116,7 @@ def published(groups: Mapping[str, Sequence[Row]]) -> Table:
     lines = []
     for name, (number, form, best) in numbers.items():
         values = [number(rows) for rows in good]
-        cells = [f"{value:{form if value < 10 else ',.0f'}}".replace("%", " %") for value in values]
+        cells = [f"{value:{form if value < 10 else ',.0f'}}" for value in values]
         if best:
             cells = [f"**{c}**" if v == best(values) else c for c, v in zip(cells, values, strict=True)]
         if "worst" in name:
