@@ -16,7 +16,7 @@ from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.io.robots.viewed import decompose_viewed
 from tests.models import TABLE_VOLUME, inside, table
-from tests.moving import drawer
+from tests.moving import fork_and_lug
 
 pytest.importorskip("pxr", reason="the extra usd is not installed")
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdValidation, Vt
@@ -217,24 +217,24 @@ def test_what_cannot_be_rewritten_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.promise("links-clear")
 def test_bodies_that_do_not_touch_do_not_as_hulls_and_fixed_meshes_may(tmp_path: Path) -> None:
-    """A drawer that slides in a cabinet, which is no rigid body; both are turned, scaled and mirrored."""
+    """A lug that turns in a fork, which is no rigid body; both are turned, scaled and mirrored."""
     pytest.importorskip("coal", reason="extra clear")
     stage = Usd.Stage.CreateNew(str(tmp_path / "in.usda"))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     root = UsdGeom.Xform.Define(stage, "/scene")
     root.AddRotateXYZOp().Set((20, 30, 40))
     root.AddScaleOp().Set((-2, 2, 2))
-    for name, shape in drawer(0.004).links.items():
+    for name, shape in fork_and_lug().links.items():
         mesh = add_mesh(stage, f"/scene/{name}", shape.vertices, shape.faces)
         UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
-    UsdPhysics.RigidBodyAPI.Apply(stage.GetPrimAtPath("/scene/drawer"))
+    UsdPhysics.RigidBodyAPI.Apply(stage.GetPrimAtPath("/scene/lug"))
     stage.Save()
     done = rlacd.rewrite_robot(tmp_path / "in.usda", tmp_path / "out.usda", threshold=0.06, quality="fast", threads=1)
     (pair,) = done.pairs
     assert (pair.kept_clear, pair.share, pair.loose) == (True, 0, True)
     after = Usd.Stage.Open(str(done.path))
     hulls = [(placed(prim), str(prim.GetPath())) for prim in colliders(after)]
-    groups = [[hull.convex_hull for hull, path in hulls if f"/{name}" in path] for name in ("cabinet", "drawer")]
+    groups = [[hull.convex_hull for hull, path in hulls if f"/{name}" in path] for name in ("fork", "lug")]
     assert all(groups)
     bodies = [
         Body(name, Surface(own[0].vertices, own[0].faces), [Surface(h.vertices, h.faces) for h in own])
