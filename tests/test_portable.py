@@ -80,7 +80,7 @@ def test_a_mesh_is_decomposed_and_written(ring: Path, ending: str) -> None:
     out = ring.with_name(f"結果.{ending}")
     run = elsewhere("-m", "rlacd", "decompose", ring, "-o", out, "--report", "-")
     assert run.returncode == 0, run.stderr
-    assert json.loads(run.stdout)["parts"] > 2
+    assert json.loads(run.stdout)["hulls"] > 2
     assert out.exists()
 
 

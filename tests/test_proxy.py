@@ -156,6 +156,7 @@ def test_simplifying_gives_the_same_bytes_every_time_and_for_any_number_of_threa
 
 def test_simple_hulls_hold_the_full_ones_and_have_fewer_corners() -> None:
     mesh = trimesh.creation.capsule(height=2, radius=1, count=[32, 32])
+    mesh.vertices *= 1 - 1e-3 * (np.arange(len(mesh.vertices)) % 3 == 0)[:, None]  # dents: no hull is full of it
     simple, full = (rlacd.decompose(mesh, quality="fast", detail=detail) for detail in ("simple", "full"))
     assert len(simple) == len(full) == 1
     assert len(simple.hulls[0].vertices) < 0.8 * len(full.hulls[0].vertices)

@@ -99,6 +99,10 @@ class Surface:
         return bool(self._winding.winding(point, accuracy=4.0, threads=1)[0] > 0.5)
 
 
+LARGEST_SIZE = 1e10
+"""MuJoCo takes no larger number as a position."""
+
+
 class Primitive(Surface):
     """A box, sphere, capsule, cylinder or ellipsoid: exact as coal's shape, and just inside of its triangles.
 
@@ -116,9 +120,10 @@ class Primitive(Surface):
 
     @classmethod
     def read(cls, kind: str, sizes: Sequence[float], place: FloatArray) -> Primitive | None:
-        """One that a file states; None for another kind, and where a size is missing or is not above 0."""
+        """One that a file states; None for another kind, and where a size is missing or no simulator takes it."""
         own = [*sizes[: PRIMITIVES.get(kind, 0)]]
-        return cls(kind, own, place) if len(own) == PRIMITIVES.get(kind) and min(own) > 0 else None
+        is_whole = len(own) == PRIMITIVES.get(kind) and all(1 / LARGEST_SIZE < size < LARGEST_SIZE for size in own)
+        return cls(kind, own, place) if is_whole and np.abs(place).max() < LARGEST_SIZE else None
 
     def __reduce__(self) -> Any:
         return Primitive, (self.kind, self.sizes, self.place)
