@@ -123,8 +123,8 @@ def decompose(
     max_faces : int | None
         At most this many triangles per hull; a low limit acts as a low limit on vertices.
     detail : DetailName
-        simple leaves out corners that add little, within the threshold, of hulls not filled; full keeps all. Default:
-        simple.
+        simple drops corners that add little, within the threshold, unless the solid fills the hull; full keeps all.
+        Default: simple.
     primitives : bool | Sequence[PrimitiveKind]
         Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF,
         SDF, USD and Unreal, else as meshes. True allows all. A primitive contains the hull of its part, and is the

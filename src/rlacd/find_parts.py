@@ -238,9 +238,9 @@ class _Decomposer:
             return moved, goal, found
 
     def _exact(self, parts: list[Part], goal: Criterion) -> list[Part]:
-        """The convex bodies that a solid of few sides is made of, if they are no more than the parts, or larger.
+        """The convex bodies that a solid of few sides is made of, to which its pieces under a far finer goal grow back.
 
-        Its pieces under a far finer goal grow back to the bodies.
+        The given parts if they are fewer, or as many and smaller, or if no bodies are found.
         """
         if self.model.proxy is not None or self.problem.root.sides > FEW_SIDES * len(parts) or not may_grow(goal):
             return parts

@@ -106,6 +106,8 @@ def united_in_turn(
     errors = dict(zip(alive.parts, run.map(criterion.error, parts), strict=True))
     yield alive.in_order(), max(errors.values())
     for reach in (FIRST_REACH, math.inf):
+        if account.is_spent:
+            return  # bounding all pairs would be in vain
         for pair, number in _united(alive, _ByError(criterion, reach), account, run):
             errors[number] = pair.cost
             del errors[pair.first], errors[pair.second]

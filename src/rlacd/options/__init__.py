@@ -205,7 +205,7 @@ class Options:
     max_faces: int | None = option(None, LIMITS, _CORNERS)
     """At most this many triangles per hull; a low limit acts as a low limit on vertices."""
     detail: DetailName = option(SIMPLE, LIMITS, one_of=DetailName)
-    """simple leaves out corners that add little, within the threshold, of hulls not filled; full keeps all."""
+    """simple drops corners that add little, within the threshold, unless the solid fills the hull; full keeps all."""
     primitives: bool | Sequence[PrimitiveKind] = option(
         (), LIMITS, _PRIMITIVES, metavar="all|box,sphere,…", usual="none"
     )
