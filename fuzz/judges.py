@@ -26,7 +26,6 @@ from fuzz.geometry import (
     distance_to_union,
     sampled,
     why_not_convex,
-    winding_number,
 )
 from fuzz.recipes import Shape
 from rlacd import PRESETS, NavigableSpace
@@ -245,11 +244,10 @@ def concavity(
     random: np.random.Generator,
     samples: int,
 ) -> list[str]:
-    """The intersection of the solid with each hull gives a lower bound of its part's concavity.
+    """The solid gives a lower bound of each hull's concavity.
 
-    The part lies in that intersection, which therefore leaves no more of the hull empty than the part does, and no
-    point of the hull's surface is farther from the intersection than from the part. Where two faces of the input
-    [F, 3, 3] lie on each other, the part has a film that the intersection has not.
+    A point of the hull's surface is as far from the solid as from its nearest triangle, or lies on the surface of the
+    intersection, at no distance from the solid; and the intersection is what the solid fills of the hull.
     """
     reported = case.report.get("concavity")
     if reported is None:
@@ -268,10 +266,7 @@ def concavity(
         if body.is_empty() or not shares:
             continue  # too thin for booleans
         points = sampled(hull.vertices, hull.faces, max(LEAST_A_HULL, samples // len(hulls)), random)
-        least = min(_least_concavity(body, share, points, random, weight) for share in shares)
-        if least > reported + 1e-3:
-            films = corners[without_volume(corners)]
-            least = min(_least_concavity(body, share, points, random, weight, films) for share in shares)
+        least = min(_least_concavity(body, share, corners, points, random, weight) for share in shares)
         if least > reported + 1e-3:
             found.append(f"hull {i} is {least:.6g} concave, the report says {reported:.6g} at most")
     return found
@@ -280,25 +275,16 @@ def concavity(
 def _least_concavity(
     body: manifold3d.Manifold,
     share: manifold3d.Manifold,
+    corners: Floats,
     points: Floats,
     random: np.random.Generator,
     weight: float,
-    films: Floats | None = None,
 ) -> float:
-    """Lower bound, from points of the hull, of the concavity of the part in the hull's intersection with the solid."""
+    """Lower bound, from points of the hull, of its concavity; `share` is what the solid, of these `corners`, fills."""
     radius = math.pow(max(0.0, 3 * (body.volume() - share.volume()) / (4 * math.pi)), 1 / 3)
     vertices, faces = triangles_of(share)
-    corners = vertices[faces] if films is None else np.concatenate([vertices[faces], films])
-    return max(weight * radius, farthest_from_triangles(points, corners, random).distance)
-
-
-def without_volume(corners: Floats) -> npt.NDArray[np.bool_]:
-    """Which triangles [F, 3, 3] of a closed surface have nothing behind some place: another triangle lies there."""
-    grid = np.array([(i, j, 5 - i - j) for i in range(1, 4) for j in range(1, 5 - i)]) / 5
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    behind = grid @ corners - HAIR * np.divide(across, length, out=np.zeros_like(across), where=length > 0)[:, None]
-    return np.asarray((winding_number(behind.reshape(-1, 3), corners) < 0.5).reshape(behind.shape[:2]).any(axis=1))
+    near = np.concatenate([vertices[faces], corners])
+    return max(weight * radius, farthest_from_triangles(points, near, random).distance)
 
 
 def _a_hair_larger(body: manifold3d.Manifold) -> manifold3d.Manifold:
