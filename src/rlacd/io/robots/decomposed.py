@@ -30,7 +30,7 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
-from rlacd.options import LENGTHS, DetailName, Options
+from rlacd.options import LENGTHS, DetailName, OpeningsName, Options
 from rlacd.options.fields import shown
 from rlacd.options.lengths import LONGEST_SIDE, in_unit, read_lengths, unit_of
 from rlacd.options.robots import RobotOptions
@@ -43,6 +43,9 @@ from rlacd.solid.topology import used_points
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
+
+SMALL: OpeningsName = "small"
+"""Links are solids, which nothing gets into; what is as open as a bucket stays open."""
 
 FULL: DetailName = "full"
 """Hulls with all their corners: simpler ones hold them, and a little more."""
@@ -210,7 +213,7 @@ def options_of_bodies(robot: Robot, options: Mapping[str, Any], asked: RobotOpti
 
 def _relative_to_robot(options: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
     """Options with lengths in the robot's unit, where they are shares of its longest side; by default a distance."""
-    given = {name: value for name, value in options.items() if value is not None}
+    given = {"openings": SMALL} | {name: value for name, value in options.items() if value is not None}
     if given.pop("relative_to", "scene") == "mesh" or not robot.bodies:
         return given
     if given.setdefault("criterion", "distance") in ("distance", "concavity") and "threshold_abs" not in given:
