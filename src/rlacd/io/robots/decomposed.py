@@ -25,7 +25,7 @@ from rlacd.clear import (
     warnings_of,
 )
 from rlacd.clear.mend import Exact, Redo
-from rlacd.decompose_mesh import decompose_quietly
+from rlacd.decompose_mesh import Memory, decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
 from rlacd.fit import Unit
@@ -121,13 +121,15 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     tell = _teller(len(bodies), options.get("progress"))
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
+    found: dict[Hashable, Memory] = {}
 
     def decompose_body(number: int) -> None:
         body, own = bodies[number], each[number]
         tell(LINK + body.name, number)
         for collider in body.colliders:
-            if (key := (collider.key, own.get("threshold_abs"), own.get("detail"))) not in done:
-                done[key] = decomposed(body, collider, own, robot.unit)
+            parts = collider.key, own.get("threshold_abs")
+            if (key := (parts, own.get("detail"))) not in done:
+                done[key] = decomposed(body, collider, own, robot.unit, found.setdefault(parts, Memory()))
             results[collider] = done[key]
 
     for number in range(len(bodies)):
@@ -224,11 +226,14 @@ def _relative_to_robot(options: Mapping[str, Any], robot: Robot) -> dict[str, An
     return given
 
 
-def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit: Unit) -> Decomposition:
+def decomposed(
+    body: Body, collider: Collider, options: Mapping[str, Any], unit: Unit, memory: Memory | None = None
+) -> Decomposition:
     """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
+    own = fitting(mesh, options, body, collider)
     try:
-        return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, **fitting(mesh, options, body, collider))
+        return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, memory=memory, **own)
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
