@@ -148,7 +148,7 @@ def _hulls(
     key = collider.key, options["threshold_abs"], options["openings"]
     if key not in known:
         mesh = collider.mesh()
-        given = {name: value for name, value in fitting(mesh, options, body, collider).items() if name not in SEARCH}
+        given = {name: value for name, value in fitting(mesh, options, body).items() if name not in SEARCH}
         own = Options.of(given)
         with Run(own.threads, own.timeout, options.get("progress")) as run:
             source = InputMesh(mesh.vertices, mesh.faces, collider.name, ())

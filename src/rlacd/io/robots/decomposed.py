@@ -149,7 +149,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         return hulls
 
     def exact(number: int) -> list[Surface] | None:
-        if "detail" in each[number] or all(collider.is_convex for collider in bodies[number].colliders):
+        if "detail" in each[number]:
             return None
         each[number] |= {"detail": FULL}
         decompose_body(number)
@@ -231,7 +231,7 @@ def decomposed(
 ) -> Decomposition:
     """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
-    own = fitting(mesh, options, body, collider)
+    own = fitting(mesh, options, body)
     try:
         return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, memory=memory, **own)
     except OptionError as error:
@@ -242,15 +242,10 @@ def decomposed(
         raise type(error)(f"{path}: {error}") from error
 
 
-def fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body, collider: Collider) -> dict[str, Any]:
-    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's.
-
-    What is convex keeps its corners.
-    """
+def fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> dict[str, Any]:
+    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's."""
     fitted = dict(options)
     scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
-    if collider.is_convex:
-        fitted.setdefault("detail", FULL)
     for name, (least, most) in LENGTHS.items():
         if isinstance(length := fitted.get(f"{name}_abs"), (int, float)):
             length = max(length, least / scale * (1 + ROUNDING)) if body.is_world else length
