@@ -13,6 +13,7 @@ from manifold3d import Manifold, OpType
 
 import rlacd
 from rlacd import _native
+from rlacd.decompose_mesh import Memory, decompose_quietly
 from rlacd.policies import POLICIES
 from tests.hulls import assert_convex_hull, assert_same_hulls, strict_json
 from tests.shapes import dense, depth_in, from_manifold, table, to_manifold, trimesh_of
@@ -215,3 +216,21 @@ def test_real_meshes(corpus) -> None:
         assert report.concavity.max <= 0.05, name
         assert report.hausdorff.added <= 0.055 or report.warnings, name
         assert report.hausdorff.missed <= 0.01, name
+
+
+@pytest.mark.parametrize("shape", ["cup", "torus"])
+def test_parts_found_once_are_finished_again_with_all_corners(shape: str) -> None:
+    """As robots do where links touch: the same hulls as when all is found anew."""
+    mesh, memory = SHAPES[shape](), Memory()
+    simple = decompose_quietly(mesh, threshold=0.2, threads=1, quality="fast", memory=memory)
+    full, anew = (
+        decompose_quietly(mesh, threshold=0.2, threads=1, quality="fast", detail="full", memory=each)
+        for each in (memory, None)
+    )
+    assert len(simple) == len(full) == len(anew) > 0
+    assert sum(len(hull.vertices) for hull in full) > sum(len(hull.vertices) for hull in simple)
+    for one, other in zip(full, anew, strict=True):
+        assert one.vertices.tobytes() == other.vertices.tobytes()
+        assert one.faces.tobytes() == other.faces.tobytes()
+    ours, theirs = ({**each.report.as_dict(), "seconds": None} for each in (full, anew))
+    assert ours == theirs

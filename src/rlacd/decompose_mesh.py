@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
@@ -95,6 +95,13 @@ def decompose(
     return done
 
 
+@dataclass
+class Memory:
+    """The parts that a decomposition found: with other `detail`, the same input is only finished again."""
+
+    reached: Reached | None = None
+
+
 def decompose_quietly(
     mesh: MeshLike,
     faces: ArrayLike | None = None,
@@ -102,6 +109,7 @@ def decompose_quietly(
     file_type: str | None = None,
     progress: ProgressCallback | None = None,
     told_in: Unit | None = None,
+    memory: Memory | None = None,
     **options: Any,
 ) -> Decomposition:
     """Decompose as `decompose` does, but warn of nothing.
@@ -121,7 +129,7 @@ def decompose_quietly(
         if asked.per_node and not apart:
             alone = f"per_node had no effect: {source.name} was read as one node"
             source = replace(source, warnings=(*source.warnings, alone))
-        done = _each_node(source, asked, run) if apart else _as_one(source, asked, run)
+        done = _each_node(source, asked, run) if apart else _as_one(source, asked, run, memory or Memory())
     report = replace(
         done.report,
         name=Path(source.name).stem or "mesh" if isinstance(mesh, (str, os.PathLike)) else "mesh",
@@ -157,10 +165,12 @@ def _obstacle(mesh: MeshLike | Obstacle) -> Obstacle:
     return Obstacle(mesh_name(mesh), found.vertices, found.faces.astype(np.int32))
 
 
-def _as_one(source: InputMesh, options: Options, run: Run) -> Finished:
-    reached = _whole(find_parts(source, options, run), source, options, run)
+def _as_one(source: InputMesh, options: Options, run: Run, memory: Memory) -> Finished:
+    if memory.reached is None:
+        memory.reached = _whole(find_parts(source, options, run), source, options, run)
+    reached = memory.reached
     run.begin_finishing()
-    done = finish(reached, run)
+    done = finish(reached._replace(options=replace(reached.options, detail=options.detail)), run)
     if (node_of := source.node_of) is not None:
         places = run.if_in_time(lambda: owners(done.hulls, source.vertices, source.faces, node_of), lambda: [])
         for hull, place in zip(done.hulls, places, strict=False):

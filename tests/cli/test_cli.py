@@ -296,7 +296,7 @@ def test_a_file_in_place_of_a_command_tells_what_to_type(mesh: Path, words: list
         ("view {dir}/ell.stl --threshold -1", "threshold is -1"),
         ("view {dir}/ell.stl --criterion beauty", "distance, volume or navigable"),
         ("view {dir}/ell.stl --criterion volume --threshold 0.05", "threshold is 0.05; it has to be left out"),
-        ("view {dir}/ell.stl --openings wide", "auto, solid, thin"),
+        ("view {dir}/ell.stl --openings wide", "auto, small, solid, thin"),
         ("info -", "only rlacd decompose reads stdin"),
         ("view {dir}/ell.stl --threshold 2mm", "it has to be a number or a share such as 2%"),
         ("decompose {dir}/no/chair.glb", "{dir}/no/chair.glb does not exist: check the spelling and the folder"),

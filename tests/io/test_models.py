@@ -18,6 +18,7 @@ import rlacd
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MissingExtraError, OptionError, OutputError
 from rlacd.io.write import FORMATS, MODELS, save
+from tests.assets import read_glb
 from tests.hulls import assert_convex_hull, hull_of, random_hull
 from tests.models import (
     FALLS,
@@ -171,6 +172,11 @@ def test_unreal_finds_the_hulls_of_the_mesh_by_name(tmp_path: Path, wooden: Deco
     read = trimesh.load_scene(path, process=False, **({"split_objects": True} if ending == "obj" else {}))
     assert sorted(read.geometry) == sorted(["my_table", *(f"UCX_my_table_{i:02d}" for i in range(len(wooden)))])
     assert read.geometry["my_table"].volume == pytest.approx(TABLE_VOLUME, rel=1e-5)
+    # An engine would make an asset of the material of every hull.
+    if ending == "glb":
+        assert [material["name"] for material in read_glb(path)[0]["materials"]] == ["my_table"]
+    else:
+        assert all(len(line.split()) == 4 for line in path.read_text().splitlines() if line.startswith("v "))
     for index, hull in enumerate(wooden):
         assert_convex_hull(read.geometry[f"UCX_my_table_{index:02d}"])
         assert read.geometry[f"UCX_my_table_{index:02d}"].volume == pytest.approx(hull.volume, rel=1e-5)

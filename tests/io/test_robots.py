@@ -459,7 +459,7 @@ def rings(tmp_path: Path) -> Path:
     """A ring, a bowl that is open at the top, and a box, which no joint connects."""
     trimesh.creation.torus(0.4, 0.1, major_sections=64, minor_sections=24).export(tmp_path / "ring.stl")
     bowl = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
-    trimesh.Trimesh(bowl.vertices, bowl.faces[bowl.triangles_center[:, 2] < 0.3]).export(tmp_path / "bowl.stl")
+    trimesh.Trimesh(bowl.vertices, bowl.faces[bowl.triangles_center[:, 2] < 0.1]).export(tmp_path / "bowl.stl")
     trimesh.creation.box().export(tmp_path / "box.stl")
     collision = '<link name="{0}"><collision><geometry><mesh filename="{0}.stl"/></geometry></collision></link>'
     links = "".join(map(collision.format, ("ring", "bowl", "box")))
@@ -484,6 +484,18 @@ def test_a_link_of_many_hulls_is_told_with_what_makes_it_fewer(rings: Path) -> N
     assert len(solid.links[1].hulls) == int(filled) < counts["bowl"]
     own = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), relative_to="mesh", threads=1, samples=0)
     assert not [warning for warning in own.warnings if "twice" in warning]
+
+
+def test_a_link_with_a_small_opening_is_a_solid_and_told(rings: Path) -> None:
+    """A palm without the cap beneath its wrist; a ball cannot roll in only if it is larger than that."""
+    palm = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
+    trimesh.Trimesh(palm.vertices, palm.faces[palm.triangles_center[:, 2] < 0.3]).export(rings.with_name("bowl.stl"))
+    options: dict[str, Any] = {"samples": 0, "threads": 1, "quality": "fast"}
+    done = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), **options)
+    assert [len(link.hulls) for link in done.links][1] == 1
+    assert any("Holes were closed" in warning and "bowl" in warning for warning in done.warnings)
+    shell = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), openings="auto", **options)
+    assert len(shell.links[1].hulls) > 20
 
 
 def test_a_robots_tradeoff_has_the_hulls_of_each_link(rings: Path) -> None:

@@ -14,6 +14,7 @@ import rlacd
 from rlacd.clear import Body, Surface, at_rest, check
 from rlacd.cli.main import app
 from rlacd.errors import MeshFileError, OptionError
+from rlacd.io.robots.read import read_robot
 from rlacd.io.robots.viewed import decompose_viewed
 from tests.models import TABLE_VOLUME, inside, table
 from tests.moving import fork_and_lug
@@ -272,3 +273,73 @@ def test_pairs_of_bodies_that_a_joint_connects_are_filtered_where_asked(tmp_path
     }
     assert filtered == ({"/robot": ["/arm"]} if how == "adjacent" else {})
     assert findings(after) == []
+
+
+@pytest.mark.parametrize("axis", "XYZ")
+@pytest.mark.parametrize(
+    ("kind", "scale", "is_compared"),
+    [
+        (UsdGeom.Cube, (2.0, 3.0, 4.0), True),
+        (UsdGeom.Sphere, (3.0, 3.0, 3.0), True),
+        (UsdGeom.Sphere, (2.0, 3.0, 4.0), True),
+        (UsdGeom.Capsule, (3.0, 3.0, 3.0), True),
+        (UsdGeom.Capsule, (2.0, 3.0, 4.0), False),
+        (UsdGeom.Cylinder, (2.0, 3.0, 4.0), False),
+        (UsdGeom.Cylinder, None, True),
+        (UsdGeom.Cone, (1.0, 1.0, 1.0), False),
+        (UsdGeom.Plane, (1.0, 1.0, 1.0), False),
+    ],
+)
+def test_primitives_of_a_stage_are_where_it_shows_them(
+    tmp_path: Path, kind: Any, scale: tuple[float, ...] | None, axis: str, is_compared: bool
+) -> None:
+    """As OpenUSD's own extents say, turned and scaled, below a body that is turned and scaled too."""
+    if kind in (UsdGeom.Cube, UsdGeom.Sphere) and axis != "Z":
+        return
+    stage = Usd.Stage.Open(str(write_stage(tmp_path / "in.usda")))
+    body = UsdGeom.Xform.Define(stage, "/finger")
+    body.AddTranslateOp().Set((300.0, -20.0, 10.0))
+    body.AddRotateXYZOp().Set((30.0, 40.0, 50.0))
+    body.AddScaleOp().Set((5.0, 5.0, 5.0))
+    UsdPhysics.RigidBodyAPI.Apply(body.GetPrim())
+    shape = kind.Define(stage, "/finger/tip")
+    if kind not in (UsdGeom.Cube, UsdGeom.Sphere):
+        shape.CreateAxisAttr(axis)
+    shape.AddTranslateOp().Set((1.0, 2.0, 3.0))
+    shape.AddScaleOp().Set(scale or tuple(6.0 if each == axis else 4.0 for each in "XYZ"))
+    UsdPhysics.CollisionAPI.Apply(shape.GetPrim())
+    stage.Save()
+    (finger,) = [each for each in read_robot(tmp_path / "in.usda").bodies if each.name == "/finger"] or [None]
+    assert (finger is not None) == is_compared
+    if finger is None:
+        return
+    assert finger.colliders == []
+    (tip,) = finger.primitives
+    extent = np.array(kind.ComputeExtentFromPlugins(UsdGeom.Boundable(shape), 0), dtype=float)
+    to_body = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(shape.GetPrim())).T
+    to_body = np.linalg.inv(finger.pose) @ to_body
+    corners = trimesh.transform_points(trimesh.bounds.corners(extent), to_body)
+    assert tip.box == pytest.approx(np.stack([corners.min(axis=0), corners.max(axis=0)]), abs=0.2)
+
+
+def test_a_primitive_of_a_stage_counts_for_its_size_and_is_checked(tmp_path: Path) -> None:
+    stage = Usd.Stage.Open(str(write_stage(tmp_path / "in.usda")))
+    table = placed(colliders(stage)[0])
+    ball = UsdGeom.Sphere.Define(stage, "/ball")
+    ball.CreateRadiusAttr(5.0)
+    ball.AddTranslateOp().Set(tuple(table.vertices[0].tolist()))
+    far = UsdGeom.Cube.Define(stage, "/far")
+    far.AddTranslateOp().Set((2000.0, 0.0, 0.0))
+    for prim in (ball.GetPrim(), far.GetPrim()):
+        UsdPhysics.RigidBodyAPI.Apply(prim)
+        UsdPhysics.CollisionAPI.Apply(prim)
+    stage.Save()
+    done = rlacd.rewrite_robot(tmp_path / "in.usda", tmp_path / "out.usda", threads=1, quality="fast")
+    assert done.size == pytest.approx(2001 - table.bounds[0, 0], abs=6)
+    assert [link.name for link in done.links] == ["/robot", "/ball", "/far"]
+    touching = {(pair.first, pair.second): (pair.contact, pair.meshes) for pair in done.pairs}
+    assert touching == {
+        ("/robot", "/ball"): ("always", 1.0),
+        ("/robot", "/far"): ("never", 0.0),
+        ("/ball", "/far"): ("never", 0.0),
+    }

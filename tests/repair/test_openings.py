@@ -92,6 +92,32 @@ def test_a_pipe_a_bottle_a_cup_and_a_lampshade_stay_hollow_unless_they_shall_be_
     assert not thin.warnings
 
 
+FENDER = trimesh.creation.cylinder(1.0, 0.5, sections=32)
+FENDER.update_faces((FENDER.triangles_center[:, 1] > 0) & (FENDER.face_normals @ [0, 0, 1] < 0.5))
+FLASK = ((0, 0), (0.5, 0), (0.5, 1.4), (0.3, 1.7))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "step"),
+    [
+        (revolved(*CUP), "slab"),
+        (revolved(*LAMPSHADE), "slab"),
+        (revolved(*LONG_PIPE), "slab"),
+        (trimesh.Trimesh(FENDER.vertices, FENDER.faces), "slab"),
+        (revolved(*FLASK), "capped"),
+        (revolved(*BOTTLE), "capped"),
+    ],
+    ids=["cup", "lampshade", "pipe", "fender", "flask", "bottle"],
+)
+def test_of_links_only_those_with_openings_as_wide_as_they_are_stay_open(mesh, step):
+    assert steps(solid_of(mesh)) == ["slab"]
+    link = solid_of(mesh, open_bodies="small")
+    assert steps(link) == [step]
+    if step == "capped":
+        assert volume(link) == pytest.approx(volume(solid_of(mesh, open_bodies="solid")))
+        assert "Holes were closed" in link.warnings[0]
+
+
 def bent_tube(radii, sections=8):
     """A tube along half a circle of radius 1, open at both ends, with these radii along its way."""
     turn = np.linspace(0, 2 * np.pi, sections, endpoint=False)

@@ -49,7 +49,7 @@ CRITERIA = {
 """Each criterion by its name, with the numbers that say how tight it is."""
 
 VolumeOf = Literal["part", "whole"]
-OpeningsName = Literal["auto", "solid", "thin"]
+OpeningsName = Literal["auto", "small", "solid", "thin"]
 DetailName = Literal["simple", "full"]
 QualityName = Literal["fast", "balanced", "best"]
 RelativeTo = Literal["scene", "node", "mesh"]
@@ -255,7 +255,8 @@ class Options:
     """Grid cells along the longest side, used to repair bodies that are not closed."""
     openings: OpeningsName = option("auto", METHOD, one_of=OpeningsName)
     """Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
-    others thin shells; solid fills all that enclose a space; thin fills none."""
+    others thin shells; small, the default for robots, also fills those whose openings are small beside them; solid
+    fills all that enclose a space; thin fills none."""
     keep_cavities: bool = option(False, METHOD)
     """Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are filled, as
     nothing can get in, and only the mass leaves them out.

@@ -9,22 +9,24 @@ sheet. Whether a hole may be closed is decided by the first of these questions t
   round ring is not. A hole with another body all along its rim, such as a counter's with a basin in it, never is.
 - Is it small beside its body, and its cap not far from the surface? Where a tube ends, it may be larger if it is the
   only hole: one end of a bar may be open where it was joined to something. A pipe has two.
+- If asked, as of links of robots: does the cap cover little of the body, seen along its normal? A bucket's covers all.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rlacd._native import components, face_areas, poll_stop, signed_tetrahedra
+from rlacd._native import components, face_areas, long_normals, poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import MOST_FREE_EDGES
 from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_points
 from rlacd.repair.rims import Rims, caps_of, rims_of
 from rlacd.repair.soup import FLAPS, Soup
 from rlacd.repair.state import State
-from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
+from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots, length
 from rlacd.solid.frame import HALF_THICKNESS
+from rlacd.solid.hull import Hull
 from rlacd.solid.solid import Hole
-from rlacd.solid.topology import first_of_doubled, marked
+from rlacd.solid.topology import first_of_doubled, marked, used_points
 
 HOLE, HOLE_SHARE = 0.1, 0.02
 """A body is closed if its caps lead at most this far away from the surface and have at most this share of its area: a
@@ -43,6 +45,9 @@ _DAMAGE_EDGES, _DAMAGE = 2 * _RING, 5 * HOLE_SHARE
 _DAMAGED = 4
 # Share of the rim along which the cap of damage continues the faces.
 _GOOD_PART = 0.3
+COVERED = 0.6
+"""An opening is small beside its body if the cap is at most this share of the shadow of the body's hull along the cap's
+normal. Mouths of buckets, cups and tubes have 1."""
 
 
 class _Caps:
@@ -129,7 +134,23 @@ class _Caps:
     def leading_away(self, depth: FloatArray) -> BoolArray:
         """Return ``[bodies]`` the bodies with a cap that leads farther away from the surface, ``[H]``, than it may."""
         may_lead = self._is_damage | (self._is_small & (depth <= HOLE))
+        if self._state.wanted.open_bodies == "small":
+            open_ = np.flatnonzero((depth > 0) & ~may_lead)
+            may_lead[open_] = self._covered(open_) <= COVERED
         return marked(self.body[(depth > 0) & ~may_lead], self._bodies)
+
+    def _covered(self, holes: Int64Array) -> FloatArray:
+        """Areas of the caps of holes, as shares of the shadows of their bodies' hulls along the caps' normals."""
+        soup, tiny = self._soup, float(np.finfo(float).tiny)
+        hulls = {one: Hull.of(used_points(soup.vertices, soup.faces[self._body == one])) for one in self.body[holes]}
+        shares = []
+        for hole in holes.tolist():
+            cap = long_normals(soup.vertices, self._faces[self._hole_of == hole])  # twice as long as areas
+            normal, hull = cap.sum(axis=0), hulls[self.body[hole]]
+            around = cap[:0] if hull is None else long_normals(hull.vertices, hull.faces.astype(np.int64))
+            shadow = np.abs(dots(around, normal)).sum() / 2 / max(length(normal), tiny)
+            shares.append(np.sqrt(dots(cap, cap)).sum() / max(shadow, tiny))
+        return np.array(shares)
 
     def added(self, chosen: BoolArray) -> Soup:
         """The soup with the caps of chosen bodies ``[bodies]``."""

@@ -108,8 +108,8 @@ def repair(
         Cells along the longest side of the grid on which voids are searched.
     open_bodies
         ``auto``: a body with openings is solid if nothing can get inside, or if the openings look like damage; else it
-        is a shell as thin as its faces. ``solid``: every body is filled that has an inside once its openings are
-        closed. ``thin``: open bodies stay shells.
+        is a shell as thin as its faces. ``small``: a body is solid too if each opening covers little of it. ``solid``:
+        every body is filled that has an inside once its openings are closed. ``thin``: open bodies stay shells.
     gap
         Radius of a ball, where the longest side is 2: what it cannot get through is closed. Small balls roll on a finer
         grid than `resolution` asks for.

@@ -127,7 +127,7 @@ def many_told(robot: Robot, results: Results, options: Sequence[Mapping[str, Any
             f"--link '{re.escape(body.name)}={4 * length:.3g}'"
         )
         steps = {one.step for collider in body.colliders for one in results[collider].report.repair}
-        if "slab" in steps and own.get("openings", "auto") == "auto":
+        if "slab" in steps and own["openings"] in ("auto", "small"):
             filled = [
                 _hulls(body, collider, {**quick, "openings": "solid"}, (1,), known) for collider in body.colliders
             ]
@@ -145,10 +145,10 @@ def _hulls(
     known: dict[Hashable, list[TradeoffRow]],
 ) -> list[int]:
     """How many hulls a tolerance leads to times each factor; empty if there was no time. The same solids share that."""
-    key = collider.key, options["threshold_abs"], options.get("openings")
+    key = collider.key, options["threshold_abs"], options["openings"]
     if key not in known:
         mesh = collider.mesh()
-        given = {name: value for name, value in fitting(mesh, options, body, collider).items() if name not in SEARCH}
+        given = {name: value for name, value in fitting(mesh, options, body).items() if name not in SEARCH}
         own = Options.of(given)
         with Run(own.threads, own.timeout, options.get("progress")) as run:
             source = InputMesh(mesh.vertices, mesh.faces, collider.name, ())

@@ -25,12 +25,12 @@ from rlacd.clear import (
     warnings_of,
 )
 from rlacd.clear.mend import Exact, Redo
-from rlacd.decompose_mesh import decompose_quietly
+from rlacd.decompose_mesh import Memory, decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
-from rlacd.options import LENGTHS, DetailName, Options
+from rlacd.options import LENGTHS, DetailName, OpeningsName, Options
 from rlacd.options.fields import shown
 from rlacd.options.lengths import LONGEST_SIDE, in_unit, read_lengths, unit_of
 from rlacd.options.robots import RobotOptions
@@ -43,6 +43,9 @@ from rlacd.solid.topology import used_points
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
+
+SMALL: OpeningsName = "small"
+"""Links are solids, which nothing gets into; what is as open as a bucket stays open."""
 
 FULL: DetailName = "full"
 """Hulls with all their corners: simpler ones hold them, and a little more."""
@@ -118,13 +121,15 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     tell = _teller(len(bodies), options.get("progress"))
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
+    found: dict[Hashable, Memory] = {}
 
     def decompose_body(number: int) -> None:
         body, own = bodies[number], each[number]
         tell(LINK + body.name, number)
         for collider in body.colliders:
-            if (key := (collider.key, own.get("threshold_abs"), own.get("detail"))) not in done:
-                done[key] = decomposed(body, collider, own, robot.unit)
+            parts = collider.key, own.get("threshold_abs")
+            if (key := (parts, own.get("detail"))) not in done:
+                done[key] = decomposed(body, collider, own, robot.unit, found.setdefault(parts, Memory()))
             results[collider] = done[key]
 
     for number in range(len(bodies)):
@@ -144,7 +149,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         return hulls
 
     def exact(number: int) -> list[Surface] | None:
-        if "detail" in each[number] or all(collider.is_convex for collider in bodies[number].colliders):
+        if "detail" in each[number]:
             return None
         each[number] |= {"detail": FULL}
         decompose_body(number)
@@ -210,7 +215,7 @@ def options_of_bodies(robot: Robot, options: Mapping[str, Any], asked: RobotOpti
 
 def _relative_to_robot(options: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
     """Options with lengths in the robot's unit, where they are shares of its longest side; by default a distance."""
-    given = {name: value for name, value in options.items() if value is not None}
+    given = {"openings": SMALL} | {name: value for name, value in options.items() if value is not None}
     if given.pop("relative_to", "scene") == "mesh" or not robot.bodies:
         return given
     if given.setdefault("criterion", "distance") in ("distance", "concavity") and "threshold_abs" not in given:
@@ -221,11 +226,14 @@ def _relative_to_robot(options: Mapping[str, Any], robot: Robot) -> dict[str, An
     return given
 
 
-def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit: Unit) -> Decomposition:
+def decomposed(
+    body: Body, collider: Collider, options: Mapping[str, Any], unit: Unit, memory: Memory | None = None
+) -> Decomposition:
     """Decompose one collider of a body, with lengths that are larger than it cut to it, and told in a unit."""
     mesh, path = collider.mesh(), collider.meshes[0].file.path
+    own = fitting(mesh, options, body)
     try:
-        return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, **fitting(mesh, options, body, collider))
+        return decompose_quietly((mesh.vertices, mesh.faces), told_in=unit, memory=memory, **own)
     except OptionError as error:
         raise OptionError(f"of {body.name}, {error}") from error
     except MeshError as error:
@@ -234,15 +242,10 @@ def decomposed(body: Body, collider: Collider, options: Mapping[str, Any], unit:
         raise type(error)(f"{path}: {error}") from error
 
 
-def fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body, collider: Collider) -> dict[str, Any]:
-    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's.
-
-    What is convex keeps its corners.
-    """
+def fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> dict[str, Any]:
+    """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's."""
     fitted = dict(options)
     scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
-    if collider.is_convex:
-        fitted.setdefault("detail", FULL)
     for name, (least, most) in LENGTHS.items():
         if isinstance(length := fitted.get(f"{name}_abs"), (int, float)):
             length = max(length, least / scale * (1 + ROUNDING)) if body.is_world else length

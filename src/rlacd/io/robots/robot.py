@@ -30,9 +30,6 @@ from rlacd.solid.topology import used_points
 
 Found = TypeVar("Found")
 
-SAME_VOLUME = 1e-6
-"""Share of a volume up to which another is the same: single precision moves corners by less."""
-
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
@@ -92,17 +89,6 @@ class Collider:
     def mesh(self) -> trimesh.Trimesh:
         """All its meshes, in the frame of the first one's element."""
         return _joined(self.meshes, self._poses)
-
-    @cached_property
-    def is_convex(self) -> bool:
-        """Whether it fills its hull, to a millionth of the volume."""
-        mesh = self.mesh()
-        hull = Hull.of(np.asarray(mesh.vertices)) if len(mesh.faces) else None
-        if hull is None:
-            return False
-        corners = np.asarray(mesh.vertices)[mesh.faces] - np.asarray(mesh.vertices).mean(axis=0)
-        volume, whole = float(np.linalg.det(corners).sum()) / 6, float(hull.volume)
-        return abs(abs(volume) - whole) <= SAME_VOLUME * whole
 
     def in_file(self, hull: trimesh.Trimesh) -> trimesh.Trimesh:
         """A hull in the coordinates of the first mesh's file, which the description places as it does that mesh.
@@ -165,7 +151,7 @@ class Robot(ABC):
     """A robot file that has been read."""
 
     source: Path
-    bodies: list[Body]  # those that collide, in the order of the file; of a stage, those with meshes
+    bodies: list[Body]  # those that collide, in the order of the file; of a stage, first those with meshes
     warnings: list[str]  # what of it is left unchanged, and why
     metres: float  # its unit of length
     up: Axis

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 
-from rlacd.clear import LinkPair, Motion, at_rest
+from rlacd.clear import LinkPair, Motion, Primitive, Solids, at_rest
 from rlacd.decompose_mesh import decompose
 from rlacd.io.read.apart import answer_of
 from rlacd.io.robots.document import left_behind
@@ -39,12 +39,14 @@ class Stage(Robot):
     nodes: Sequence[Mapping[str, Any]]
     prims: Mapping[Collider, Sequence[int]]  # which nodes are its meshes
     joints: Sequence[tuple[str, str]]  # the bodies that each connects
+    solids: Sequence[Solids]  # of each body
 
     def motion(self, samples: int, seed: int) -> Motion:
         """See `Robot`; a stage is looked at as it stands."""
         names, fixed = [body.name for body in self.bodies], [body.name for body in self.bodies if body.is_world]
         places = [sorted(map(names.index, ends)) for ends in self.joints if {*ends} <= {*names}]
-        return at_rest(names, fixed, [body.pose for body in self.bodies], [(one, other) for one, other in places])
+        rest = at_rest(names, fixed, [body.pose for body in self.bodies], [(one, other) for one, other in places])
+        return replace(rest, solids=tuple(self.solids))
 
     def write(
         self, place: Path, results: Results, pairs: Sequence[LinkPair] | None, asked: RobotOptions, *, whole: bool
@@ -75,7 +77,7 @@ class Stage(Robot):
 
 
 def read_stage(source: Path, *, apart: bool = False) -> Stage:
-    """Find the meshes of a stage that collide.
+    """Find the meshes and primitives of a stage that collide.
 
     They are sorted by the rigid bodies they belong to, and not `apart` by what may become one solid; those that no body
     carries stay apart, each a body of its own.
@@ -92,11 +94,16 @@ def read_stage(source: Path, *, apart: bool = False) -> Stage:
     nodes, of_body = answer.values["nodes"], dict[str, list[int]]()
     for index, node in enumerate(nodes):
         of_body.setdefault(node["body"] or node["path"], []).append(index)
+    kept = dict[str, list[Any]]()
+    for node in answer.values["kept"]:
+        kept.setdefault(node["body"] or node["path"], []).append(node)
     arrays: dict[tuple[bytes, bytes], tuple[FloatArray, Int64Array]] = {}
     bodies: list[Body] = []
     prims: dict[Collider, list[int]] = {}
-    for name, places in of_body.items():
-        first = nodes[places[0]]
+    solids: list[Solids] = []
+    for name in {**of_body, **kept}:
+        places, others = of_body.get(name, []), kept.get(name, [])
+        first = nodes[places[0]] if places else others[0]
         pose = _rigid(first["body_pose"]) if first["body"] else np.eye(4)
         uses: list[tuple[Hashable | None, PlacedMesh, int]] = []
         for index in places:
@@ -107,10 +114,20 @@ def read_stage(source: Path, *, apart: bool = False) -> Stage:
             mesh = PlacedMesh(file, np.array(node["scale"]), placed, np.eye(4))
             uses.append((None if apart or not node["body"] else node["kind"], mesh, index))
         joined = colliders(name, uses)
-        bodies.append(Body(name, pose, [*joined], not first["body"]))
+        found = [own for node in others if (own := _primitive(node, pose)) is not None]
+        if not joined and not found:  # a plane
+            continue
+        bodies.append(Body(name, pose, [*joined], not first["body"], found))
+        solids.append(Solids(found, len(places), len(others) - len(found)))
         prims |= joined
     warnings, metres, up = (answer.values[name] for name in ("warnings", "metres", "up"))
-    return Stage(source, bodies, warnings, metres, up, nodes, prims, answer.values["joints"])
+    return Stage(source, bodies, warnings, metres, up, nodes, prims, answer.values["joints"], solids)
+
+
+def _primitive(node: Mapping[str, Any], pose: FloatArray) -> Primitive | None:
+    """A primitive in the frame of its body; None for another shape."""
+    place = product(inverse(pose), product(_rigid(node["pose"]), np.array(node["turn"]).reshape(4, 4)))
+    return Primitive.read(node["kind"], node["sizes"], place)
 
 
 def _rigid(rows: Sequence[float]) -> FloatArray:

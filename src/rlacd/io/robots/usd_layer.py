@@ -32,6 +32,9 @@ OF_BODIES = re.compile(
 TO_COLLIDERS = re.compile(r"collection:.*:(in|ex)cludes$|physics:filteredPairs$|physxContactReport:reportPairs$")
 """Relationships that name colliders, any number of them: they name the hulls too."""
 
+ROUND = 1e-5
+"""Share of a scale up to which another is the same: stages say many in single precision."""
+
 TO_FRAMES = re.compile(r"physics:body[01]$")
 """Relationships that name where something is, which a mesh still says."""
 
@@ -51,7 +54,7 @@ def rewrite(values: Values, blobs: Blobs) -> Answered:
             layer.pseudoRoot.SetInfo(key, original.pseudoRoot.GetInfo(key))
     layer.subLayerPaths = [original.realPath]
     stage = Usd.Stage.Open(layer)
-    colliders, warnings = _colliders(path, stage)
+    colliders, others, warnings = _colliders(path, stage)
     if "counts" in values:
         for body in {body.GetPath(): body for prim in colliders if (body := _body(prim))}.values():
             _fix_mass(path, body, values["masses"])
@@ -77,11 +80,13 @@ def rewrite(values: Values, blobs: Blobs) -> Answered:
         nodes.append({**said, **_place(prim)})
         arrays |= {f"{index}.points": points.tobytes(), f"{index}.faces": faces.tobytes()}
     whole = {"metres": float(UsdGeom.GetStageMetersPerUnit(stage)), "up": str(UsdGeom.GetStageUpAxis(stage)).lower()}
-    return {"nodes": nodes, "warnings": warnings, "joints": _joints(stage), **whole}, arrays
+    kept = [{"path": str(prim.GetPath()), **_primitive(prim), **_place(prim)} for prim in others]
+    return {"nodes": nodes, "kept": kept, "warnings": warnings, "joints": _joints(stage), **whole}, arrays
 
 
-def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:
-    """The meshes that collide; instances that hold some become prims of their own, as instances cannot be edited."""
+def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[Any], list[str]]:
+    """The meshes and the other shapes that collide; instances that hold meshes become prims of their own, as instances
+    cannot be edited."""
     from pxr import Usd, UsdGeom, UsdPhysics
 
     opened = 0
@@ -102,7 +107,35 @@ def _colliders(path: Path, stage: Any) -> tuple[list[Any], list[str]]:
         warnings.append(f"{len(groups)} prims collide and are no shapes, as {groups[0].GetPath()}: left unchanged.")
     if any(prim.IsA(UsdGeom.PointInstancer) for prim in stage.Traverse()):
         raise MeshFileError(f"{path} has a point instancer, which is not rewritten: convert its instances first")
-    return [prim for prim in on if prim.IsA(UsdGeom.Mesh)], warnings
+    shapes = [prim for prim in on if prim.IsA(UsdGeom.Gprim)]
+    meshes = [prim for prim in shapes if prim.IsA(UsdGeom.Mesh)]
+    return meshes, [prim for prim in shapes if not prim.IsA(UsdGeom.Mesh)], warnings
+
+
+def _primitive(prim: Any) -> Values:
+    """The kind and sizes of a primitive that bodies are compared with, along its axes on the stage, and how these are
+    turned to them; of other shapes an empty kind."""
+    from pxr import Usd, UsdGeom
+
+    def of(name: str) -> float:
+        return float(prim.GetAttribute(name).Get(Usd.TimeCode.EarliestTime()))
+
+    rows = np.array(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))[:3, :3]
+    scale, kind, sizes, turn = np.linalg.norm(rows, axis=1), str(prim.GetTypeName()).lower(), list[float](), np.eye(4)
+    spread = np.abs(rows @ rows.T - np.diag(scale**2)).max()
+    if np.isfinite(rows).all() and scale.min() > 0 and spread <= ROUND * scale.min() ** 2:  # not sheared
+        is_even = bool(np.ptp(scale) <= ROUND * scale.max())
+        if kind == "cube":
+            kind, sizes = "box", (of("size") / 2 * scale).tolist()
+        elif kind == "sphere":
+            kind, sizes = ("sphere" if is_even else "ellipsoid"), (of("radius") * scale).tolist()
+        elif kind in ("capsule", "cylinder"):
+            about = "XYZ".index(str(prim.GetAttribute("axis").Get()))
+            turn[:3, :3] = np.roll(np.eye(3), 2 - about, axis=1)  # z to the axis
+            around = np.delete(scale, about)
+            if is_even or (kind == "cylinder" and np.ptp(around) <= ROUND * around.max()):
+                sizes = [of("radius") * float(around.max()), of("height") / 2 * float(scale[about])]
+    return {"kind": kind if sizes else "", "sizes": sizes, "turn": turn.ravel().tolist()}
 
 
 def _scale(prim: Any) -> list[float]:
@@ -263,7 +296,8 @@ def _filter(stage: Any, pairs: Sequence[tuple[str, str]], hulls: Mapping[Any, li
         first, second = sorted(
             map(stage.GetPrimAtPath, pair), key=lambda prim: not prim.HasAPI(UsdPhysics.RigidBodyAPI)
         )
-        named = [second.GetPath()] if second.HasAPI(UsdPhysics.RigidBodyAPI) else hulls[second.GetPath()]
+        is_body = second.HasAPI(UsdPhysics.RigidBodyAPI)
+        named = [second.GetPath()] if is_body else hulls.get(second.GetPath(), [second.GetPath()])
         for path in named:
             UsdPhysics.FilteredPairsAPI.Apply(first).CreateFilteredPairsRel().AddTarget(path)
 

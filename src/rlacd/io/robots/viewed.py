@@ -16,7 +16,7 @@ from rlacd.clear import Cleared, Motion, Solids, at_rest, check
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshFileError
 from rlacd.finish.report import joint_report
-from rlacd.io.robots.decomposed import Checked, check_options, decomposed_robot
+from rlacd.io.robots.decomposed import SMALL, Checked, check_options, decomposed_robot
 from rlacd.io.robots.read import robot_or_none
 from rlacd.io.robots.rewritten import warnings_of
 from rlacd.io.robots.robot import Body, Robot, turned
@@ -26,7 +26,7 @@ from rlacd.solid.input_mesh import InputMesh
 from rlacd.viewer.controls import Subject, read_subject
 from rlacd.viewer.robot import Contact, Place, RobotResult
 
-USUAL = {"criterion": "distance", "threshold": 0.03}
+USUAL = {"criterion": "distance", "threshold": 0.03, "openings": SMALL}
 """First values of the page's controls for a robot: those of `rlacd.rewrite_robot`."""
 
 MOST_PLACES = 40

@@ -89,11 +89,11 @@ def _with_scene(result: Result, file_type: str, ending: str, keep_input: bool) -
 
 
 def _for_engine(model: RigidBody, engine: str, ending: str) -> bytes:
-    """The input as one grey node, and the hulls named for the engine."""
+    """The input as one node, and the hulls named for the engine, which makes an asset of every material of theirs."""
     name = node_name(model.name)
     names = [ENGINE_NAMES[engine](name, index, primitive) for index, primitive in enumerate(model.primitives)]
     encode = encode_glb if ending == "glb" else encode_obj
-    return encode(model.hulls, names, None if model.visual is None else (name, model.visual))
+    return encode(model.hulls, names, None if model.visual is None else (name, model.visual), colored=False)
 
 
 def _save_with_meshes(result: Result, model: RigidBody, target: Target, one_mesh: bool) -> None:

@@ -36,8 +36,10 @@ def encode_glb(
     hulls: Sequence[trimesh.Trimesh],
     names: Sequence[str] | None = None,
     visual: tuple[str, trimesh.Trimesh] | None = None,
+    *,
+    colored: bool = True,
 ) -> bytes:
-    """Binary glTF 2.0 with a node, a mesh and a material per hull, named `names`, after those of the `visual`.
+    """Binary glTF 2.0 with a node, a mesh and, if `colored`, a material per hull, named `names`, after the `visual`.
 
     Positions in glTF are float32. A hull too far from the origin to keep its shape is stored about its own centre, with
     the translation in its node; all others are stored in place, for readers that ignore transforms.
@@ -52,7 +54,7 @@ def encode_glb(
         file.add(Placed(visual[0], *placed_mesh(visual[1]), linear_from_srgb(VISUAL_COLOR)), visual[0])
     names = names or [hull_name(index) for index in range(len(hulls))]
     for name, hull, color in zip(names, hulls, linear_from_srgb(hull_colors(len(hulls))), strict=True):
-        file.add(Placed(name, *required_hull(hull, name, "as GLB"), color), name)
+        file.add(Placed(name, *required_hull(hull, name, "as GLB"), color), name, colored=colored)
     return file.encoded()
 
 
@@ -60,8 +62,10 @@ def encode_obj(
     hulls: Sequence[trimesh.Trimesh],
     names: Sequence[str] | None = None,
     visual: tuple[str, trimesh.Trimesh] | None = None,
+    *,
+    colored: bool = True,
 ) -> bytes:
-    """Wavefront OBJ with an object per hull, its colour on every vertex, and every digit of the coordinates.
+    """Wavefront OBJ with an object per hull, and every digit of the coordinates; if `colored`, colours of vertices.
 
     trimesh's writer prints a fixed number of decimals, which erases small meshes; here every number is the shortest
     text that reads back to the same float64. Hulls are named `names` and follow the `visual`, if there is one.
@@ -73,9 +77,9 @@ def encode_obj(
     lines = [f"# {GENERATOR}: {len(hulls)} convex hulls"]
     first = 1
     for name, mesh, color in objects:
-        tint = " ".join(f"{channel / 255.0:.3f}" for channel in color)
+        tint = "".join(f" {channel / 255.0:.3f}" for channel in color) if colored else ""
         lines.append(f"o {name}")
-        lines += [f"v {x!r} {y!r} {z!r} {tint}" for x, y, z in mesh.vertices.tolist()]
+        lines += [f"v {x!r} {y!r} {z!r}{tint}" for x, y, z in mesh.vertices.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + first).tolist()]
         first += len(mesh.vertices)
     return ("\n".join(lines) + "\n").encode()

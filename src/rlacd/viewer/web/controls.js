@@ -162,6 +162,7 @@ export class Controls {
       "openings",
       [
         ["auto", "Auto", "Fill bodies that nothing can get into, or that have lost some faces; the others become thin shells."],
+        ["small", "Small", "Also fill those whose openings are small beside them, as links of robots are."],
         ["solid", "Solid", "Fill every body that encloses a space once its openings are closed."],
         ["thin", "Thin", "Fill none: every open body becomes a thin shell."],
       ],
