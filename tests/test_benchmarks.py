@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import inspect
+import json
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import trimesh
-from benchmarks import compare
+from benchmarks import compare, curves
 from benchmarks.__main__ import COMMANDS
 from benchmarks.learned.compare import policy_of
 from benchmarks.methods import make_method, rlacd_options
@@ -316,3 +318,36 @@ def test_the_oracle_finds_the_fewest_parts_and_its_returns_are_those_of_episodes
         return step.saved + sum(discount * discounted(env, child) for discount, child in below)
 
     assert greedy.earned == pytest.approx(discounted(CutEnv(solid, criterion), solid), abs=1e-9)
+
+
+def test_curves_are_drawn_to_scale_within_their_panels(tmp_path: Path) -> None:
+    points = [
+        (100, {"loss": 4.0}),
+        (200, {"loss": 1.0, "epsilon": 0.5}),
+        (400, {"loss": 2.0, "validation_own_plane": 3}),
+    ]
+    for name in ("one", "two & three"):
+        (tmp_path / name).mkdir()
+        lines = [json.dumps({"env_steps": cuts, **values, "seconds": 1.0}) for cuts, values in points]
+        (tmp_path / name / "curves.jsonl").write_text("\n".join(lines))
+    run(curves.app, tmp_path / "one", tmp_path / "two & three" / "curves.jsonl", "--out", tmp_path / "c.svg")
+    drawn = [e for e in ElementTree.parse(tmp_path / "c.svg").iter() if e.tag.endswith(("rect", "line", "text"))]
+    texts = [e.text for e in drawn if e.tag.endswith("text")]
+    assert str(tmp_path / "two & three" / "curves.jsonl") in texts
+    panels = [e for e in drawn if e.tag.endswith("rect") and "x" in e.attrib]
+    lines_of = [[tuple(map(float, xy.split(","))) for xy in e.attrib.get("points", "").split()] for e in drawn]
+    known = [line for line in lines_of if line]
+    assert (len(panels), sorted(map(len, known))) == (3, [1, 1, 1, 1, 3, 3])  # Q and the pace are left out
+    loss = panels[1]
+    left, top, wide, high = (float(loss.attrib[key]) for key in ("x", "y", "width", "height"))
+    expected = [(left + wide * cuts / 400, top + high * (1 - value["loss"] / 4)) for cuts, value in points]
+    assert np.allclose([line for line in known if len(line) == 3], [expected] * 2, atol=0.06)
+
+
+@pytest.mark.parametrize("content", ["[1]", "{", '{"loss": 1}', '{"env_steps": 1, "loss": "x"}'])
+def test_files_without_curves_are_one_sentence(content: str, tmp_path: Path) -> None:
+    (tmp_path / "curves.jsonl").write_text(content)
+    for path in (tmp_path, tmp_path / "nowhere"):
+        told = run(curves.app, path, "--out", tmp_path / "c.svg", code=2)
+        assert "holds no curves of `rlacd train`" in told
+        assert len(told.strip().splitlines()) == 1
