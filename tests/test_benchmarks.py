@@ -22,12 +22,19 @@ from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Task, save_row
 from benchmarks.tables import Ratio, failures, managed, ratio_of
 from click.testing import CliRunner
+from manifold3d import Manifold
 
 import rlacd
 from rlacd.criteria import Concavity
+from rlacd.cut import CutCache, CutTree
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.environment import CutEnv
+from rlacd.merge import merge_parts
+from rlacd.planes.candidates import Candidates
+from rlacd.planes.sweep import paper_planes, sweep
 from rlacd.policies import make_policy
+from rlacd.policies.greedy import hull_sum, least_hulls, paper_planes_and_edges
+from rlacd.policies.plane_features import PLANES
 from rlacd.pool import ProcessLimits
 from rlacd.run import Run
 from rlacd.solid.component import Component
@@ -351,3 +358,48 @@ def test_files_without_curves_are_one_sentence(content: str, tmp_path: Path) -> 
         told = run(curves.app, path, "--out", tmp_path / "c.svg", code=2)
         assert "holds no curves of `rlacd train`" in told
         assert len(told.strip().splitlines()) == 1
+
+
+def cup(radius: float, height: float) -> Manifold:
+    """A cylinder with a floor."""
+    outer, inner = (Manifold.cylinder(height, r, r, 24) for r in (radius, 0.8 * radius))
+    return outer - inner.translate([0, 0, 0.15 * height])
+
+
+@pytest.mark.parametrize("solid", [cup(1, 2), cup(1, 2) + cup(1.5, 1).rotate([30, 0, 0]).translate([0.8, 0, 0])])
+def test_forceable_planes_are_what_the_papers_rule_cuts_by_if_a_network_prefers_them(solid: Manifold) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from benchmarks.learned.labels import valid_of
+    from benchmarks.learned.whole import forceable
+
+    whole = Component(solid)
+    candidates, s = paper_planes(whole), sweep(whole, paper_planes_and_edges(whole))
+    valid, total = valid_of(s), hull_sum(s)
+    assert valid is not None
+    order = np.argsort(np.where(valid, total, np.inf)[:PLANES], kind="stable")[: int(valid[:PLANES].sum())]
+    forced, worst = forceable(s, valid), order[-9:]
+    assert len(forced) > 1
+    edge = float(np.where(valid, total, np.inf)[PLANES:].min())
+    for plane in {*order.tolist(), *forced.tolist()}:
+        chosen = least_hulls(whole, candidates, worst if plane >= PLANES else np.append(plane, worst), reflex_edges=4)
+        assert chosen is not None
+        cut = sweep(whole, Candidates(np.array([chosen.normal]), np.array([[chosen.offset]])))
+        assert hull_sum(cut)[0] == pytest.approx(total[plane] if plane in forced else edge)
+
+
+def test_whole_solids_end_in_what_greedy_and_merging_leave() -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from benchmarks.learned.whole import GREEDY, THRESHOLD, Completions
+
+    root, cache = Component(small_solids()["table"]), CutCache()
+    with Run(1) as run:
+        tree = CutTree(root, GREEDY, run, cache)
+        done, left = tree.cut_until(Concavity(THRESHOLD))
+        counts = [len(merge_parts(done, Concavity(THRESHOLD).settled(done), run, across=a)) for a in (False, True)]
+        assert not left
+        nodes = [c for c, below in tree._children.items() if len(below) == 2 and cache.pieces(c) == [c]]
+        assert len(nodes) > 1
+        for node in nodes:  # by greedy's own plane
+            plane = GREEDY.choose(node)
+            assert plane is not None
+            assert Completions(tree, GREEDY, cache).whole(node, plane) == [len(done), *counts]
