@@ -403,3 +403,17 @@ def test_whole_solids_end_in_what_greedy_and_merging_leave() -> None:
             plane = GREEDY.choose(node)
             assert plane is not None
             assert Completions(tree, GREEDY, cache).whole(node, plane) == [len(done), *counts]
+
+
+def test_planning_leaves_no_more_merged_parts_than_greedy() -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from benchmarks.learned.whole import GREEDY, THRESHOLD, counts_of, planned
+
+    root = Component(cup(1, 2) + cup(1.5, 1).rotate([30, 0, 0]).translate([0.8, 0, 0]))
+    with Run(1) as run:
+        greedy, left = CutTree(root, GREEDY, run).cut_until(Concavity(THRESHOLD))
+    found = planned(root)
+    assert not left
+    assert all(Concavity(THRESHOLD).is_met(part) for part in found)
+    assert sum(part.volume for part in found) == pytest.approx(root.volume)
+    assert counts_of(found)[-1] <= counts_of(greedy)[-1]

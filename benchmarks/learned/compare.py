@@ -5,9 +5,9 @@ merging, and the CPU seconds of cutting. A criterion is a concavity threshold, o
 space: ``0.05,0.01``. A policy is a name that ``decompose`` takes; ``learned:FOLDER``, with the networks that ``fit.py``
 wrote there; ``forcing:FOLDER``, with those of `whole.py`, by the paper's rule; the paper's deployment of a network with
 other planes, ``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``; or ``half:SEED``, greedy-162 over a random
-half of the planes. A run that was interrupted goes on where it stopped. In the end, means, and geometric means of the
-ratios to the first policy's numbers with 95 % intervals by resampling meshes; the same of the fewest parts that any of
-the policies leaves a mesh in.
+half of the planes; or ``planned``, by what `whole.py` labels with. A run that was interrupted goes on where it stopped.
+In the end, means, and geometric means of the ratios to the first policy's numbers with 95 % intervals by resampling
+meshes; the same of the fewest parts that any of the policies leaves a mesh in.
 """
 
 from __future__ import annotations
@@ -103,7 +103,12 @@ def measure(
         return None
     with Run(1) as run:
         begin = time.process_time()
-        done, left = CutTree(root, policy_of(policy, length), run).cut_until(decides, MOST_PARTS)
+        if policy == "planned":
+            from benchmarks.learned.whole import planned  # needs torch
+
+            done, left = planned(root), list[Component]()
+        else:
+            done, left = CutTree(root, policy_of(policy, length), run).cut_until(decides, MOST_PARTS)
         row = {"cut_s": time.process_time() - begin, "raw": float(len(done) + len(left))}
         if left and row["raw"] >= MOST_PARTS:
             return None

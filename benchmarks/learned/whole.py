@@ -134,14 +134,45 @@ class Completions:
         """Raw parts, after NavACD's merging, and after all merging, of the whole solid; None if nothing is cut."""
         if not (sides := self._cache.sides(node, plane)):
             return None
-        pieces = self.rest(node) + [part for side in sides for part in self.parts(side)]
-        settled, counts = Concavity(THRESHOLD).settled(pieces), [len(pieces)]
-        alive = NumberedParts(pieces, settled)
-        for across in (False, True):  # as `merge_parts` does
-            for _ in _united(alive, _ByGrowth(settled, across), RUN.work, RUN):
-                pass
-            counts.append(len(alive.parts))
-        return counts
+        return counts_of(self.rest(node) + [part for side in sides for part in self.parts(side)])
+
+
+def counts_of(pieces: list[Component]) -> list[int]:
+    """Raw parts, after NavACD's merging, and after all merging."""
+    settled, counts = Concavity(THRESHOLD).settled(pieces), [len(pieces)]
+    alive = NumberedParts(pieces, settled)
+    for across in (False, True):  # as `merge_parts` does
+        for _ in _united(alive, _ByGrowth(settled, across), RUN.work, RUN):
+            pass
+        counts.append(len(alive.parts))
+    return counts
+
+
+def planned(root: Component) -> list[Component]:
+    """The parts if the plane that cuts a component is that after which greedy leaves the whole in fewest merged parts."""
+    cache, rng, left, done = CutCache(), np.random.default_rng(0), [root], list[Component]()
+    greedy = Completions(CutTree(root, GREEDY, RUN, cache), GREEDY, cache)
+    while left:
+        node = left.pop(int(np.argmax([c.hull.volume for c in left])))
+        if Concavity(THRESHOLD).is_met(node):
+            done.append(node)
+            continue
+        if (pieces := cache.pieces(node)) != [node]:
+            left += pieces
+            continue
+        s, rest = sweep(node, paper_planes_and_edges(node)), [*done]
+        valid = valid_of(s)
+        planes = [] if valid is None else tried_of(s, forceable(s, valid), rng)
+        tried = [sides for plane in planes if (sides := cache.sides(node, s.candidates.plane(plane)))]
+        if not tried:
+            done += greedy.parts(node)
+            continue
+        if len(tried) > 1:
+            rest += [part for other in left for part in greedy.parts(other)]
+            counts = [counts_of(rest + [part for side in sides for part in greedy.parts(side)]) for sides in tried]
+            tried = [tried[counts.index(min(counts, key=lambda c: c[::-1]))]]
+        left += tried[0]
+    return done
 
 
 def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
