@@ -409,7 +409,7 @@ def test_planning_leaves_no_more_merged_parts_than_greedy() -> None:
     pytest.importorskip("torch", reason="needs the extra train")
     from benchmarks.learned.whole import GREEDY, THRESHOLD, counts_of, planned
 
-    root = Component(cup(1, 2) + cup(1.5, 1).rotate([30, 0, 0]).translate([0.8, 0, 0]))
+    root = Component(CROSS + CROSS.rotate([20, 30, 40]))
     with Run(1) as run:
         greedy, left = CutTree(root, GREEDY, run).cut_until(Concavity(THRESHOLD))
     found = planned(root)

@@ -149,7 +149,7 @@ def counts_of(pieces: list[Component]) -> list[int]:
 
 
 def planned(root: Component) -> list[Component]:
-    """The parts if the plane that cuts a component is that after which greedy leaves the whole in fewest merged parts."""
+    """The parts if each component is cut by the plane after which greedy leaves the whole in fewest merged parts."""
     cache, rng, left, done = CutCache(), np.random.default_rng(0), [root], list[Component]()
     greedy = Completions(CutTree(root, GREEDY, RUN, cache), GREEDY, cache)
     while left:
