@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import inspect
+import json
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import trimesh
-from benchmarks import compare
+from benchmarks import compare, curves
 from benchmarks.__main__ import COMMANDS
 from benchmarks.learned.compare import policy_of
 from benchmarks.methods import make_method, rlacd_options
@@ -20,12 +22,19 @@ from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Task, save_row
 from benchmarks.tables import Ratio, failures, managed, ratio_of
 from click.testing import CliRunner
+from manifold3d import Manifold
 
 import rlacd
 from rlacd.criteria import Concavity
+from rlacd.cut import CutCache, CutTree
 from rlacd.errors import MissingExtraError, OptionError
 from rlacd.learn.environment import CutEnv
+from rlacd.merge import merge_parts
+from rlacd.planes.candidates import Candidates
+from rlacd.planes.sweep import paper_planes, sweep
 from rlacd.policies import make_policy
+from rlacd.policies.greedy import hull_sum, least_hulls, paper_planes_and_edges
+from rlacd.policies.plane_features import PLANES
 from rlacd.pool import ProcessLimits
 from rlacd.run import Run
 from rlacd.solid.component import Component
@@ -316,3 +325,95 @@ def test_the_oracle_finds_the_fewest_parts_and_its_returns_are_those_of_episodes
         return step.saved + sum(discount * discounted(env, child) for discount, child in below)
 
     assert greedy.earned == pytest.approx(discounted(CutEnv(solid, criterion), solid), abs=1e-9)
+
+
+def test_curves_are_drawn_to_scale_within_their_panels(tmp_path: Path) -> None:
+    points = [
+        (100, {"loss": 4.0}),
+        (200, {"loss": 1.0, "epsilon": 0.5}),
+        (400, {"loss": 2.0, "validation_own_plane": 3}),
+    ]
+    for name in ("one", "two & three"):
+        (tmp_path / name).mkdir()
+        lines = [json.dumps({"env_steps": cuts, **values, "seconds": 1.0}) for cuts, values in points]
+        (tmp_path / name / "curves.jsonl").write_text("\n".join(lines))
+    run(curves.app, tmp_path / "one", tmp_path / "two & three" / "curves.jsonl", "--out", tmp_path / "c.svg")
+    drawn = [e for e in ElementTree.parse(tmp_path / "c.svg").iter() if e.tag.endswith(("rect", "line", "text"))]
+    texts = [e.text for e in drawn if e.tag.endswith("text")]
+    assert str(tmp_path / "two & three" / "curves.jsonl") in texts
+    panels = [e for e in drawn if e.tag.endswith("rect") and "x" in e.attrib]
+    lines_of = [[tuple(map(float, xy.split(","))) for xy in e.attrib.get("points", "").split()] for e in drawn]
+    known = [line for line in lines_of if line]
+    assert (len(panels), sorted(map(len, known))) == (3, [1, 1, 1, 1, 3, 3])  # Q and the pace are left out
+    loss = panels[1]
+    left, top, wide, high = (float(loss.attrib[key]) for key in ("x", "y", "width", "height"))
+    expected = [(left + wide * cuts / 400, top + high * (1 - value["loss"] / 4)) for cuts, value in points]
+    assert np.allclose([line for line in known if len(line) == 3], [expected] * 2, atol=0.06)
+
+
+@pytest.mark.parametrize("content", ["[1]", "{", '{"loss": 1}', '{"env_steps": 1, "loss": "x"}'])
+def test_files_without_curves_are_one_sentence(content: str, tmp_path: Path) -> None:
+    (tmp_path / "curves.jsonl").write_text(content)
+    for path in (tmp_path, tmp_path / "nowhere"):
+        told = run(curves.app, path, "--out", tmp_path / "c.svg", code=2)
+        assert "holds no curves of `rlacd train`" in told
+        assert len(told.strip().splitlines()) == 1
+
+
+def cup(radius: float, height: float) -> Manifold:
+    """A cylinder with a floor."""
+    outer, inner = (Manifold.cylinder(height, r, r, 24) for r in (radius, 0.8 * radius))
+    return outer - inner.translate([0, 0, 0.15 * height])
+
+
+@pytest.mark.parametrize("solid", [cup(1, 2), cup(1, 2) + cup(1.5, 1).rotate([30, 0, 0]).translate([0.8, 0, 0])])
+def test_forceable_planes_are_what_the_papers_rule_cuts_by_if_a_network_prefers_them(solid: Manifold) -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from benchmarks.learned.labels import valid_of
+    from benchmarks.learned.whole import forceable
+
+    whole = Component(solid)
+    candidates, s = paper_planes(whole), sweep(whole, paper_planes_and_edges(whole))
+    valid, total = valid_of(s), hull_sum(s)
+    assert valid is not None
+    order = np.argsort(np.where(valid, total, np.inf)[:PLANES], kind="stable")[: int(valid[:PLANES].sum())]
+    forced, worst = forceable(s, valid), order[-9:]
+    assert len(forced) > 1
+    edge = float(np.where(valid, total, np.inf)[PLANES:].min())
+    for plane in {*order.tolist(), *forced.tolist()}:
+        chosen = least_hulls(whole, candidates, worst if plane >= PLANES else np.append(plane, worst), reflex_edges=4)
+        assert chosen is not None
+        cut = sweep(whole, Candidates(np.array([chosen.normal]), np.array([[chosen.offset]])))
+        assert hull_sum(cut)[0] == pytest.approx(total[plane] if plane in forced else edge)
+
+
+def test_whole_solids_end_in_what_greedy_and_merging_leave() -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from benchmarks.learned.whole import GREEDY, THRESHOLD, Completions
+
+    root, cache = Component(small_solids()["table"]), CutCache()
+    with Run(1) as run:
+        tree = CutTree(root, GREEDY, run, cache)
+        done, left = tree.cut_until(Concavity(THRESHOLD))
+        counts = [len(merge_parts(done, Concavity(THRESHOLD).settled(done), run, across=a)) for a in (False, True)]
+        assert not left
+        nodes = [c for c, below in tree._children.items() if len(below) == 2 and cache.pieces(c) == [c]]
+        assert len(nodes) > 1
+        for node in nodes:  # by greedy's own plane
+            plane = GREEDY.choose(node)
+            assert plane is not None
+            assert Completions(tree, GREEDY, cache).whole(node, plane) == [len(done), *counts]
+
+
+def test_planning_leaves_no_more_merged_parts_than_greedy() -> None:
+    pytest.importorskip("torch", reason="needs the extra train")
+    from benchmarks.learned.whole import GREEDY, THRESHOLD, counts_of, planned
+
+    root = Component(CROSS + CROSS.rotate([20, 30, 40]))
+    with Run(1) as run:
+        greedy, left = CutTree(root, GREEDY, run).cut_until(Concavity(THRESHOLD))
+    found = planned(root)
+    assert not left
+    assert all(Concavity(THRESHOLD).is_met(part) for part in found)
+    assert sum(part.volume for part in found) == pytest.approx(root.volume)
+    assert counts_of(found)[-1] <= counts_of(greedy)[-1]

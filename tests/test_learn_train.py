@@ -371,6 +371,7 @@ def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tm
     from rlacd.learn.train import load_policy
     from rlacd.run import Run
 
+    assert "the first 30 of 120 cuts are random" in said[1]
     assert "times greedy's parts" in said[-1]
     policy, solid = make_policy(str(path), scale=0.04), Component(small_solids()["cross"])
     assert load_policy(tmp_path / "run", shortlist=10, reflex_edges=4).choose(solid) == policy.choose(solid)

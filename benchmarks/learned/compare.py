@@ -3,10 +3,11 @@
 For each mesh, policy and criterion: parts before merging, after merging neighbours (as NavACD does) and after all
 merging, and the CPU seconds of cutting. A criterion is a concavity threshold, or radius and tolerance of navigable
 space: ``0.05,0.01``. A policy is a name that ``decompose`` takes; ``learned:FOLDER``, with the networks that ``fit.py``
-wrote there; or the paper's deployment of a network with other planes,
-``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``. A run that was interrupted goes on where it
-stopped. In the end, means, and geometric means of the ratios to the first policy's numbers with 95 % intervals by
-resampling meshes.
+wrote there; ``forcing:FOLDER``, with those of `whole.py`, by the paper's rule; the paper's deployment of a network with
+other planes, ``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``; or ``half:SEED``, greedy-162 over a random
+half of the planes; or ``planned``, by what `whole.py` labels with. A run that was interrupted goes on where it stopped.
+In the end, means, and geometric means of the ratios to the first policy's numbers with 95 % intervals by resampling
+meshes; the same of the fewest parts that any of the policies leaves a mesh in.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,8 +30,8 @@ from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
 from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS
-from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
-from rlacd.policies import Policy, make_policy
+from rlacd.planes.sweep import SweepCache, distinct_planes, paper_planes, valid_planes
+from rlacd.policies import Greedy, Policy, make_policy
 from rlacd.policies.greedy import least_hulls
 from rlacd.policies.learned import Learned, networks_in
 from rlacd.policies.network import SHORTLIST, QFunction, best_planes, q_values
@@ -42,6 +44,8 @@ from rlacd.solid.solid import Solid
 MOST_PARTS = 500
 """Meshes of which the first policy makes more parts are left out."""
 
+FEWEST = "fewest of all"
+
 
 def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
     """Get a criterion, and its length if it has one."""
@@ -53,6 +57,12 @@ def criterion_of(name: str, solid: Solid) -> tuple[Criterion, float | None]:
 
 def policy_of(name: str, length: float | None) -> Policy:
     """Get a policy by its name, or a deployment."""
+    if name.startswith("half:"):
+        return Greedy("hull-sum", SweepCache(seed=[int(name.removeprefix("half:"))]))
+    if name.startswith("forcing:"):
+        from benchmarks.learned.whole import Forcing  # needs torch
+
+        return Forcing(networks_in(Path(name.removeprefix("forcing:"))))
     if name.startswith("learned:"):
         return Learned(scale=length, networks=networks_in(Path(name.removeprefix("learned:"))))
     if not name.startswith("planes:"):
@@ -93,7 +103,12 @@ def measure(
         return None
     with Run(1) as run:
         begin = time.process_time()
-        done, left = CutTree(root, policy_of(policy, length), run).cut_until(decides, MOST_PARTS)
+        if policy == "planned":
+            from benchmarks.learned.whole import planned  # needs torch
+
+            done, left = planned(root), list[Component]()
+        else:
+            done, left = CutTree(root, policy_of(policy, length), run).cut_until(decides, MOST_PARTS)
         row = {"cut_s": time.process_time() - begin, "raw": float(len(done) + len(left))}
         if left and row["raw"] >= MOST_PARTS:
             return None
@@ -105,15 +120,22 @@ def measure(
     return row
 
 
-def summary(rows: list[dict[str, object]], policies: list[str], criteria: list[str]) -> None:
+def parts_of(rows: list[dict[str, Any]], policy: str) -> dict[tuple[str, str], float]:
+    """Raw parts of a policy by mesh and criterion; 0 where there is nothing to cut."""
+    return {(r["file"], r["criterion"]): r.get("raw", 0) for r in rows if r["policy"] == policy}
+
+
+def summary(rows: list[dict[str, Any]], policies: list[str], criteria: list[str]) -> None:
     """Print the ratios."""
     for criterion in criteria:
         of = {(r["file"], r["policy"]): r for r in rows if r["criterion"] == criterion and "raw" in r}
         names = [f for f in dict.fromkeys(f for f, _ in of) if all((f, p) in of for p in policies)]
-        for policy in policies if names else ():
+        for f in names:
+            of[f, FEWEST] = {k: min(of[f, p].get(k, 0) for p in policies) for k in ("raw", "navacd", "merged")}
+        for policy in [*policies, FEWEST] if names else ():
             for key in ("raw", "navacd", "merged", "cut_s"):
                 pairs = [(of[f, policy].get(key), of[f, policies[0]].get(key)) for f in names]
-                shared = [(float(a), float(b)) for a, b in pairs if a and b]  # type: ignore[arg-type]
+                shared = [(a, b) for a, b in pairs if a and b]
                 if shared:
                     own, first = zip(*shared, strict=True)
                     print(
@@ -131,6 +153,9 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--sets", nargs="+", help="collections; all of the split by default")
     parser.add_argument("--count", type=int, default=10**6)
     parser.add_argument("--faces", type=int, default=10**6)
+    parser.add_argument(
+        "--parts", type=int, nargs=2, default=(0, MOST_PARTS), help="meshes of so many, raw, by the first policy"
+    )
     parser.add_argument("--merge", action="store_true")
     parser.add_argument("--criteria", nargs="+", default=["0.05"])
     parser.add_argument("--policies", nargs="+", default=["greedy-hull-sum+edges", "greedy", "learned"])
@@ -146,6 +171,7 @@ def main() -> None:
     names = [names[i] for i in np.sort(np.random.default_rng(0).permutation(len(names))[: args.count])]
     rows = [json.loads(line) for line in args.out.read_text().splitlines()] if args.out.exists() else []
     known = {(r["file"], r["policy"], r["criterion"]) for r in rows}
+    first, (least, most) = parts_of(rows, args.policies[0]), args.parts
     with open(args.out, "a") as out:
         for _, name in names:
             wanted = [(p, c) for c in args.criteria for p in args.policies if (name, p, c) not in known]
@@ -156,10 +182,13 @@ def main() -> None:
             made: dict[str, tuple[Criterion, float | None]] = {}
             for policy, criterion in wanted:
                 assert solid is not None
+                if policy != args.policies[0] and not least <= first.get((name, criterion), least) <= most:
+                    continue
                 row = {"file": name, "policy": policy, "criterion": criterion}
                 made[criterion] = made.get(criterion) or criterion_of(criterion, solid)
                 row |= measure(solid, policy, made[criterion], args.merge) or {}
                 rows.append(row)
+                first |= parts_of([row], args.policies[0])
                 print(json.dumps(row), file=out, flush=True)
     summary(rows, args.policies, args.criteria)
 

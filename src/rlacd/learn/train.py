@@ -84,6 +84,7 @@ def train(
     write_file(run / "options.json", json.dumps(dataclasses.asdict(options), indent=1).encode())
     left_out = f"{listed.unreadable} cannot be read, {listed.too_large} are too large"
     say(f"{len(listed.training)} meshes to learn from, {len(listed.validation)} to validate with; {left_out}")
+    say(f"the first {options.learning_starts} of {options.env_steps} cuts are random; learning begins after them")
     with ExitStack() as stack:
         where, solids = pool or stack.enter_context(InProcessPool()), Solids(meshes, run / "solids", say)
         points = options.encoder == "points"
