@@ -18,6 +18,7 @@ from benchmarks.__main__ import COMMANDS
 from benchmarks.learned.compare import policy_of
 from benchmarks.methods import make_method, rlacd_options
 from benchmarks.oracle import Oracle, planes_of
+from benchmarks.playback import seconds_on
 from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Task, save_row
 from benchmarks.tables import Ratio, failures, managed, ratio_of
@@ -417,3 +418,13 @@ def test_planning_leaves_no_more_merged_parts_than_greedy() -> None:
     assert all(Concavity(THRESHOLD).is_met(part) for part in found)
     assert sum(part.volume for part in found) == pytest.approx(root.volume)
     assert counts_of(found)[-1] <= counts_of(greedy)[-1]
+
+
+@pytest.mark.parametrize(("cores", "seconds"), [(1, 11.0), (2, 6.0), (3, 13 / 3), (16, 3.0)])
+def test_played_back_work_shares_the_cores_and_the_main_thread_waits_for_what_it_needs(
+    cores: int, seconds: float
+) -> None:
+    """Three pieces of 2, 2 and 1 seconds; the main thread works 2 beside them, waits, and shares four items of 1."""
+    begin: list[tuple[str, Any]] = [("begin", number) for number in range(3)]
+    steps = [*begin, ("alone", 2.0), ("wait", 0), ("wait", 1), ("wait", 2), ("map", [1.0] * 4)]
+    assert seconds_on(cores, steps, {0: 2.0, 1: 2.0, 2: 1.0}) == pytest.approx(seconds)

@@ -60,16 +60,39 @@ void bind_surface(nb::module_& m) {
            }),
            "points"_a, "threads"_a = 0,
            "Closest points of the surface [N, 3] to points [N, 3], and the faces [N] they lie on.")
+      .def("between",
+           released([](const Surface& self, const std::vector<Vec3>& points, const VectorIn<double>& least,
+                       const VectorIn<double>& most, int threads) {
+             require(least.size() == points.size() && most.size() == points.size(), "one distance for each point");
+             std::vector<std::int32_t> lies(points.size());
+             const auto find = [&](std::size_t i) {
+               const Bvh::Hit hit = self.bvh().closest(points[i], -1, least.data()[i], most.data()[i]);
+               lies[i] = hit.slot >= 0 && hit.distance2 > least.data()[i] * least.data()[i];
+             };
+             parallel_for(points.size(), threads, find, kChunk);
+             return lies;
+           }),
+           "points"_a, "least"_a, "most"_a, "threads"_a = 0,
+           "Whether [N] the distance of each point [N, 3] from the surface lies between two others [N].")
+      .def("held_balls",
+           released([](const Surface& self, const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
+                       double least, double most, int threads) {
+             require(normals.size() == points.size(), "one normal for each point");
+             return held_balls(self.bvh(), points, normals, least, most, threads);
+           }),
+           "points"_a, "normals"_a, "least"_a, "most"_a, "threads"_a = 0,
+           "Radii [N] of balls of `least` to `most` that touch the surface in points [N, 3], from the side of their "
+           "unit normals, and elsewhere at least 60 degrees away; 0 where there is none.")
       .def("pushed",
            released([](const Surface& self, const std::vector<Vec3>& points, const std::vector<Vec3>& against,
-                       const VectorIn<double>& steps, int times, int threads) {
+                       const VectorIn<double>& steps, int times, double least, int threads) {
              require(steps.size() == points.size() && against.size() == points.size(), "one step for each point");
-             return pushed(self.bvh(), points, against, copied<double>(steps), times, threads);
+             return pushed(self.bvh(), points, against, copied<double>(steps), times, least, threads);
            }),
-           "points"_a, "against"_a, "steps"_a, "times"_a, "threads"_a = 0,
+           "points"_a, "against"_a, "steps"_a, "times"_a, "least"_a, "threads"_a = 0,
            "Points [N, 3] pushed `times` times away from the nearest place of the surface, each by its step [N], but "
-           "towards it along its unit vector `against` [N, 3], unless that is 0: the places [N, 3] on their ways that "
-           "are farthest from the surface, how far [N], and the ends [N, 3].")
+           "towards it along its unit vector `against` [N, 3], unless that is 0, and no further once they are within "
+           "`least`: the places [N, 3] on their ways farthest from the surface, how far [N], and the ends [N, 3].")
       .def(
           "crossing", released([](const Surface& self, const Mesh& mesh, double slack) {
             require(slack >= 0, "the slack must not be negative");

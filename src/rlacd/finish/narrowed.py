@@ -140,8 +140,8 @@ def _have_a_way(balls: Balls, pairs: NDArray[np.intp], surface: _native.Surface,
             way, place = np.meshgrid(np.flatnonzero(goes & (depth == bits)), level, indexing="ij")
             way, place = way[place < places[way]], place[place < places[way]]
             at = starts[way] + (place * larger[way] / (4 * lengths[way]))[:, None] * ways[way]
-            space = surface.distance(at, threads)
-            goes[way[(space <= larger[way] / 2) | (space >= WIDER * larger[way])]] = False
+            stays = surface.between(at, larger[way] / 2, WIDER * larger[way], threads) > 0
+            goes[way[~stays]] = False
     return goes
 
 

@@ -13,9 +13,10 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -48,9 +49,9 @@ class SearchContext:
     enough: Callable[[], int] = lambda: 1
 
 
-LAG = 4
-"""A trial starts from the state before the latest `LAG` - 1 trials, which may still be under way. The lag does not
-depend on the number of threads, so neither does the result."""
+AHEAD = 16
+"""Trials chosen ahead, each as if those before it changed nothing; one whose part or neighbours they do change is made
+between what is there then. So it starts from the state that they leave, whatever the number of threads."""
 
 MOST_TRIES = 3
 """How often a part is divided between the same parts: of 470 further trials none saved one."""
@@ -61,6 +62,17 @@ class _Trial(NamedTuple):
 
     gives: bool
     part: int
+
+
+@dataclass
+class _Chosen:
+    """A trial between some parts, and the work it may do; it is under way once there is a thread for it."""
+
+    trial: _Trial
+    near: tuple[int, ...]
+    exchange: Callable[[Run], Exchange | None]
+    units: float
+    apart: Apart[Exchange | None] | None = None
 
 
 class Neighbourhood:
@@ -86,15 +98,14 @@ class Neighbourhood:
     def __init__(self, context: SearchContext, parts: Sequence[Part], run: Run) -> None:
         self._context = context
         self._run = run
-        self._random = np.random.default_rng(context.seed)
         self._now = NumberedParts(parts, context.criterion)
         self.best = list(parts)
         self.gained = time.perf_counter()
         self.steps = self.accepted = 0
         self._near = min(context.criterion.reach, 2 * context.criterion.outward_deviation)
         self._around: dict[int, tuple[int, ...]] = {}
-        self._begun: deque[tuple[_Trial, Apart[Exchange | None]]] = deque()
-        self._again: deque[_Trial] = deque()  # to be repeated: what they found came too late
+        self._chosen: deque[_Chosen] = deque()
+        self._stale: list[Apart[Exchange | None]] = []  # may still be under way
         self._tries: dict[tuple[_Trial, tuple[int, ...]], int] = {}
         self._in_vain = dict.fromkeys((False, True), 0)  # units since trials that give, or do not, last saved a part
 
@@ -111,24 +122,22 @@ class Neighbourhood:
     def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
         """Search until the run or `most` trials are over, `patience` units save nothing, or no fewer parts can do."""
         self._in_vain = dict.fromkeys((False, True), 0)
-        self._make(self._trials(patience), most)
+
+        def goes_on() -> bool:
+            return self.steps < most and sum(self._in_vain.values()) < patience and not self.is_least
+
+        self._make(self._most_due, goes_on)
 
     def redistribute_all(self) -> None:
         """Offer each part to those around, the smallest first."""
-        self._make(_Trial(False, which) for which in self._by_size())
+        trials = iter([_Trial(False, which) for which in self._by_size()])
+        self._make(lambda: next(trials, None))
         self.steps = 0
 
-    def _trials(self, patience: float) -> Iterator[_Trial]:
-        """Trials of the kind that has done the least work in vain."""
-        while sum(self._in_vain.values()) < patience and not self.is_least:
-            found = map(self._least_tried, sorted(self._in_vain, key=self._in_vain.__getitem__))
-            trial = next((trial for trial in found if trial is not None), None)
-            if trial is not None:
-                yield trial
-            elif self._begun:
-                self._settle()  # what they find may bring something new to try
-            else:
-                return
+    def _most_due(self) -> _Trial | None:
+        """A trial of the kind that has done the least work in vain."""
+        found = map(self._least_tried, sorted(self._in_vain, key=self._in_vain.__getitem__))
+        return next((trial for trial in found if trial is not None), None)
 
     def _least_tried(self, gives: bool) -> _Trial | None:
         """The part tried least often between the same neighbours; the smallest of several."""
@@ -151,44 +160,56 @@ class Neighbourhood:
             self._around = {i: tuple(sorted(near)) for i, near in around.items()}
         return self._around
 
-    def _exchange(self, trial: _Trial) -> Callable[[Run], Exchange | None] | None:
-        """Make the function that finds the exchange of a trial; None if the trial's part has gone."""
+    def _choose(self, trial: _Trial) -> None:
+        """Choose a trial, unless its part has gone. What it draws depends on what it is, not on others."""
         parts, context = self._now.parts, self._context
         if trial.part not in parts:
-            return None
+            return
         near = self._neighbours()[trial.part]
         tries = self._tries[trial, near] = self._tries.get((trial, near), 0) + 1
-        return partial(
+        exchange = partial(
             divide,
             parts[trial.part],
             [parts[i] for i in near],
             context.criterion,
-            np.random.default_rng(int(self._random.integers(2**32))),
+            np.random.default_rng([context.seed, trial.gives, trial.part, tries, *near]),
             keeps_rest=trial.gives,
             again=trial.gives or tries > 1,
         )
+        self._chosen.append(_Chosen(trial, near, exchange, self._run.work.left))
 
-    def _make(self, trials: Iterator[_Trial], most: float = math.inf) -> None:
-        """Make trials, `LAG` at a time, and apply what they find, until there are `most`."""
+    def _make(self, due: Callable[[], _Trial | None], goes_on: Callable[[], bool] = lambda: True) -> None:
+        """Make trials as they are due, and apply what they find."""
         run = self._run
         with run.until_stopped():
             try:
-                while self.steps < most and run.step(self.steps, None, len(self.best)):
-                    trial = self._again.popleft() if self._again else next(trials, None)
-                    if trial is None and not self._begun:
+                while goes_on() and run.step(self.steps, None, len(self.best)):
+                    trial = due()
+                    if trial is not None:
+                        self._choose(trial)
+                    elif not self._chosen:
                         break
-                    if trial is not None and (exchange := self._exchange(trial)) is not None:
-                        self._begun.append((trial, run.apart(exchange, run.work.left)))
-                    if trial is None or len(self._begun) == LAG:
+                    if trial is None or len(self._chosen) == AHEAD:
                         self._settle()
             finally:
-                run.abandon(apart for _, apart in self._begun)
-                self._begun.clear()
+                run.abandon([*self._stale, *(one.apart for one in self._chosen if one.apart)])
+                self._chosen.clear()
+                self._stale.clear()
+
+    def _begin(self) -> Apart[Exchange | None]:
+        """Begin trials, two for each thread: some take ten times as long as others. Returns the first."""
+        run = self._run
+        for one in islice(self._chosen, 2 * run.threads):
+            one.apart = one.apart or run.apart(one.exchange, one.units)
+        first = self._chosen[0].apart
+        assert first is not None
+        return first
 
     def _settle(self) -> None:
-        """Apply what the first trial under way has found, or make it again if parts that it changes have gone."""
-        trial, apart = self._begun.popleft()
+        """Apply what the first trial chosen has found."""
+        apart = self._begin()
         exchange = self._run.result(apart.begun)
+        trial = self._chosen.popleft().trial
         self._run.work.pay(apart.account.done)
         if apart.account.is_spent:  # it was given all that was left
             self._run.work.close()
@@ -196,9 +217,7 @@ class Neighbourhood:
         self._in_vain[trial.gives] += apart.account.done
         if exchange is None:
             return
-        if not self._apply(exchange):
-            self._again.append(trial)
-            return
+        self._apply(exchange)
         self.accepted += 1
         if exchange.gain > 0:
             self._in_vain[trial.gives] = 0
@@ -207,16 +226,24 @@ class Neighbourhood:
                 self.gained = time.perf_counter()
             self.best = self.parts
 
-    def _apply(self, exchange: Exchange) -> bool:
-        """Apply an exchange; False if some of the parts it takes out are already gone."""
+    def _apply(self, exchange: Exchange) -> None:
+        """Apply an exchange, and choose trials between parts that it changes again."""
         numbers = {id(part): i for i, part in self._now.parts.items()}
-        if any(id(part) not in numbers for part in exchange.out):
-            return False
         self._now.remove([numbers[id(part)] for part in exchange.out])
         for part in exchange.into:
             self._now.add(part)
         self._around = {}
-        return True
+        around, chosen = self._neighbours(), self._chosen
+        self._chosen = deque()
+        for one in chosen:
+            if around.get(one.trial.part) == one.near:
+                self._chosen.append(one)
+                continue
+            if one.apart is not None:
+                one.apart.account.close()
+                self._stale.append(one.apart)
+            self._tries[one.trial, one.near] -= 1
+            self._choose(one.trial)
 
 
 def cost(parts: Sequence[Part]) -> tuple[int, float]:

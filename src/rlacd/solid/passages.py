@@ -30,9 +30,6 @@ to see whether it drifts."""
 STRAY = 0.75
 """A ball that goes so much of the way nearly straight finds no other wall: to the middle, it is a third or half."""
 
-SHRINKS = 32
-"""So often a ball shrinks at most. In the holes of a thin plate it halves each time."""
-
 GROWTH = 1.5
 """A ball that touches walls beside its passage's middle is by less than this smaller than one in it."""
 
@@ -87,10 +84,11 @@ def passage_balls(
     """
     (least, most), (starts, spacing) = radii, density
     points, normals = _starts(*solid, starts)
-    balls = _shrunk(points, normals, surface, (least / GROWTH, most), threads)
+    held = surface.held_balls(points, normals, least / GROWTH, most, threads)
+    balls = Balls(points + held[:, None] * normals, held).some(held > 0)
     if wanted is not None:
         balls = balls.some(wanted(balls))
-    balls = _pushed(_one_a_cell(balls, 2 * spacing), spacing, surface, threads)
+    balls = _pushed(_one_a_cell(balls, 2 * spacing), least / GROWTH, spacing, surface, threads)
     balls = balls.some((balls.radii >= least) & (balls.radii <= most))
     return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5), spacing)
 
@@ -118,36 +116,9 @@ def _apart(middles: FloatArray, normals: FloatArray) -> IntArray:
     return some.astype(np.int32)
 
 
-def _shrunk(
-    points: FloatArray, normals: FloatArray, surface: _native.Surface, radii: tuple[float, float], threads: int
-) -> Balls:
-    """Balls that touch the surface at a point and, seen from their centre, at least 60 degrees away from it.
-
-    A wall that goes on at less of an angle stops them, so that the sides of a round hole do not count as creases.
-    """
-    least, most = radii
-    radius, is_held = np.full(len(points), most), np.zeros(len(points), dtype=bool)
-    active = np.arange(len(points))
-    for _ in range(SHRINKS):
-        centres = points[active] + radius[active, None] * normals[active]
-        touched, _ = surface.closest(centres, threads)
-        chord, gap = touched - points[active], touched - centres
-        square, rise = dots(chord, chord), dots(chord, normals[active])
-        shrinks = (dots(gap, gap) < (0.999 * radius[active]) ** 2) & (rise > 0)
-        smaller = square / np.where(shrinks, 2 * rise, 1.0)
-        across = shrinks & (square >= smaller * smaller)
-        is_held[active[across]] = smaller[across] >= least
-        going = across & (smaller >= least)
-        active = active[going]
-        radius[active] = smaller[going]
-        if not len(active):
-            break
-    return Balls(points[is_held] + radius[is_held, None] * normals[is_held], radius[is_held])
-
-
-def _pushed(balls: Balls, spacing: float, surface: _native.Surface, threads: int) -> Balls:
+def _pushed(balls: Balls, least: float, spacing: float, surface: _native.Surface, threads: int) -> Balls:
     """The balls that are held, in the best place near theirs, one of those that meet there; and those in throats."""
-    throats = _in_throats(balls, surface, threads)
+    throats = _in_throats(balls, least, surface, threads)
     for step in STEPS:
         balls, _, share = _pushed_by(step, PUSHES, balls, np.zeros_like(balls.centres), surface, threads)
         balls = _one_a_cell(balls.some(share <= STRAY), spacing)
@@ -156,25 +127,28 @@ def _pushed(balls: Balls, spacing: float, surface: _native.Surface, threads: int
     return Balls(np.concatenate([balls.centres, throats.centres]), np.concatenate([balls.radii, throats.radii]))
 
 
-def _in_throats(balls: Balls, surface: _native.Surface, threads: int) -> Balls:
-    """Balls that drift, but are held where they go against their drift: there the way out is narrowest."""
+def _in_throats(balls: Balls, least: float, surface: _native.Surface, threads: int) -> Balls:
+    """Balls that drift, but are held where they go against their drift: there the way out is narrowest.
+
+    Most find no throat but the bottom of a crease, where they become smaller than `least`.
+    """
     _, drifts, share = _pushed_by(STEPS[1], PUSHES, balls, np.zeros_like(balls.centres), surface, threads)
     balls, drifts = balls.some(share > LARGEST_DRIFT), drifts[share > LARGEST_DRIFT]
     against = drifts / np.sqrt(dots(drifts, drifts))[:, None]
     for step, times, most in [*((step, 2 * PUSHES, STRAY) for step in STEPS[1:]), (STEPS[-1], MORE, LARGEST_DRIFT)]:
-        _, ways, share = _pushed_by(step, times, balls, against, surface, threads)
+        _, ways, share = _pushed_by(step, times, balls, against, surface, threads, least)
         balls = Balls(ends := balls.centres + ways, surface.distance(ends, threads))
-        stay = (share <= most) & (balls.radii > 0)
+        stay = (share <= most) & (balls.radii >= least)
         balls, against = balls.some(stay), against[stay]
     return balls
 
 
 def _pushed_by(
-    step: float, times: int, balls: Balls, against: FloatArray, surface: _native.Surface, threads: int
+    step: float, times: int, balls: Balls, against: FloatArray, surface: _native.Surface, threads: int, least: float = 0
 ) -> tuple[Balls, FloatArray, FloatArray]:
     """The best balls on the ways of pushed ones, the ways from begin to end, and their share of a straight way."""
     size = step * balls.radii
-    best, radii, ends = surface.pushed(balls.centres, against, size, times, threads)
+    best, radii, ends = surface.pushed(balls.centres, against, size, times, least, threads)
     ways = ends - balls.centres
     return Balls(best, radii), ways, np.sqrt(dots(ways, ways)) / (times * size)
 
@@ -199,4 +173,4 @@ def _one_a_cell(balls: Balls, spacing: float) -> Balls:
     cells = np.floor(balls.centres / np.ldexp(spacing / (2 * np.sqrt(3)), size)[:, None]).astype(np.int64)
     x, y, z = cells.T + (1 << 17)
     _, first = np.unique(((x << 18 | y) << 18 | z) << 6 | (size & 63), return_index=True)
-    return balls.some(np.sort(first))
+    return balls.some(first)
