@@ -29,14 +29,18 @@ LIKE = "The options and the seed of an earlier run, from the file that --report 
 class PoolOptions:
     """Where `rlacd batch` and `rlacd train` work, and what each process may take."""
 
-    jobs: int | None = option(None, least=0, usual="all cores")
-    """Processes at a time."""
-    ray: str | None = option(None, metavar="ADDRESS")
-    """Use a Ray cluster: its address, auto, or local."""
-    limit: float = option(600.0, kind=number(0.1), metavar="SECONDS", usual="600")
-    """The longest that one mesh may take; after it the process is killed."""
-    memory: float = option(4.0, kind=number(0.0), metavar="GB", usual="4")
-    """Memory limit of a process; 0 means no limit."""
+    jobs: int | None = option(None, least=0, usual="all cores", help="Processes at a time.")
+    ray: str | None = option(None, metavar="ADDRESS", help="Use a Ray cluster: its address, auto, or local.")
+    limit: float = option(
+        600.0,
+        kind=number(0.1),
+        metavar="SECONDS",
+        usual="600",
+        help="The longest that one mesh may take; after it the process is killed.",
+    )
+    memory: float = option(
+        4.0, kind=number(0.0), metavar="GB", usual="4", help="Memory limit of a process; 0 means no limit."
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
