@@ -15,7 +15,6 @@ COMMANDS = {
     "robots": "whole robots: hulls a link, farthest, MuJoCo's speed, each mesh at its own scale and links as solids",
     "planted": "solids made of k convex bodies: furniture, stairs, combs, crossing boxes, bars, rods and blobs",
     "paper": "the paper's training to the letter, on the features of I2P-MAE",
-    "oracle": "small solids: the best trees of cuts by the paper's objective and by the number of parts",
 }
 """Name to purpose; each is a module of that name with a click command ``app``."""
 
