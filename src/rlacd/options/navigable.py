@@ -131,7 +131,7 @@ class NavigableSpace:
         for name, usual in USUAL.items():
             bare, length = getattr(self, name), getattr(self, f"{name}_abs")
             if bare is not None and length is not None:
-                raise OptionError(f"{name} is {bare!r}; it has to be left out with {name}_abs, its length.")
+                raise OptionError(f"{name} is {bare!r} and {name}_abs is {length!r}; give one of them.")
             if bare is None and length is None:
                 object.__setattr__(self, name, usual)
 

@@ -127,4 +127,4 @@ class OutputOptions:
     def __post_init__(self) -> None:
         check_fields(self)
         if self.mass is not None and self.density is not None:
-            raise OptionError(f"density is {self.density}; it has to be left out with mass, that of the whole body.")
+            raise OptionError(f"density is {self.density} and mass is {self.mass}; give one of them.")
