@@ -5,7 +5,7 @@ merging, and the CPU seconds of cutting. A criterion is a concavity threshold, o
 space: ``0.05,0.01``. A policy is a name that ``decompose`` takes; ``learned:FOLDER``, with the networks that ``fit.py``
 wrote there; or the paper's deployment of a network with other planes,
 ``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``. A run that was interrupted goes on where it
-stopped. In the end, means, and geometric means of the ratios to the first policy's numbers with 95 % intervals by
+stopped. In the end, means, and geometric means of the ratios to the first policy's numbers with 95% intervals by
 resampling meshes.
 """
 
