@@ -16,7 +16,6 @@ COMMANDS = {
     "planted": "solids made of k convex bodies: furniture, stairs, combs, crossing boxes, bars, rods and blobs",
     "paper": "the paper's training to the letter, on the features of I2P-MAE",
     "curves": "the curves of trainings, drawn",
-    "oracle": "small solids: the best trees of cuts by the paper's objective and by the number of parts",
 }
 """Name to purpose; each is a module of that name with a click command ``app``."""
 

@@ -174,7 +174,7 @@ def comparison(groups: Mapping[str, Sequence[Row]]) -> Table:
         return Table(["no mesh that all managed", *groups], [failed])
     cells = [_column(rows, reference) for rows in good.values()]
     lines = [[name, *(column[name] for column in cells)] for name in cells[0]]
-    note = "Ratios are geometric means over the meshes that every method managed, with 95 % intervals."
+    note = "Ratios are geometric means over the meshes that every method managed, with 95% intervals."
     return Table([f"{len(reference)} meshes", *groups], [*lines, failed], note)
 
 

@@ -120,7 +120,7 @@ NOTE = (
     "Over objects that every way solved; ratios are to the first way. Bytes: the MJCF file with its collision "
     "meshes. Over: how far the hulls reach beyond the input (longest side: 2). Holes: of the balls that pass through "
     "by the exact mesh, how many pass. Hollows: of those that come to rest inside the convex hull, how many rest "
-    f"within {100 * NEAR:g} % of the longest side of that place; both where a ball wider by as much does the same."
+    f"within {100 * NEAR:g}% of the longest side of that place; both where a ball wider by as much does the same."
 )
 
 

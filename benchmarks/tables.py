@@ -67,7 +67,7 @@ class Page:
 
 @dataclass(frozen=True)
 class Ratio:
-    """Geometric mean of paired ratios, and its 95 % interval by resampling the pairs."""
+    """Geometric mean of paired ratios, and its 95% interval by resampling the pairs."""
 
     mean: float
     low: float

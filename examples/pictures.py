@@ -39,8 +39,9 @@ def main(docs: Path, meshes: Path) -> None:
     with step("the chair of make demo, and its boxes"), TemporaryDirectory() as folder:
         mesh = Path(folder) / "chair.glb"
         sample().export(mesh)
-        rlacd.decompose(mesh).save_picture(docs / "demo.png")
-        rlacd.decompose(mesh, primitives="all").save_picture(docs / "primitives.png", width=1200)
+        hulls, boxes = rlacd.decompose(mesh), rlacd.decompose(mesh, primitives="all")
+        (docs / "demo.png").write_bytes(picture_bytes(hulls, clear=True))
+        (docs / "primitives.png").write_bytes(picture_bytes(boxes, width=1200, clear=True))
     with step("a mug on a peg"), TemporaryDirectory() as folder:
         mug.draw(mug.main(Path(folder)), docs / "mug.png")
     with step("furnished rooms"), TemporaryDirectory() as folder:

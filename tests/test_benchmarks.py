@@ -17,7 +17,6 @@ from benchmarks import compare, curves
 from benchmarks.__main__ import COMMANDS
 from benchmarks.learned.compare import policy_of
 from benchmarks.methods import make_method, rlacd_options
-from benchmarks.oracle import Oracle, planes_of
 from benchmarks.playback import seconds_on
 from benchmarks.runner import Bench, Limits, find_meshes
 from benchmarks.store import Task, save_row
@@ -29,7 +28,6 @@ import rlacd
 from rlacd.criteria import Concavity
 from rlacd.cut import CutCache, CutTree
 from rlacd.errors import MissingExtraError, OptionError
-from rlacd.learn.environment import CutEnv
 from rlacd.merge import merge_parts
 from rlacd.planes.candidates import Candidates
 from rlacd.planes.sweep import paper_planes, sweep
@@ -305,27 +303,6 @@ class TestCommands:
         assert says in told
         assert len(told.strip().splitlines()) == 1
         assert not Path("run").exists()
-
-
-@pytest.mark.parametrize(("name", "fewest"), [("angle", 2), ("cross", 3), ("table", 5)])
-def test_the_oracle_finds_the_fewest_parts_and_its_returns_are_those_of_episodes(name: str, fewest: int) -> None:
-    solid, criterion = Component(small_solids()[name]), Concavity(0.04)
-    with Run(1) as run:
-        oracle = Oracle(solid, criterion, run, budget=60)
-        [root] = oracle.roots
-        oracle.fewest(root)
-        greedy, best = oracle.greedy(root), oracle.best(root, 0.0)
-    assert (len(root.fewest), root.least) == (fewest, fewest)
-    assert greedy.earned - 1e-9 <= best.earned <= root.high[1] + 1e-9
-
-    def discounted(env: CutEnv, component: Component) -> float:
-        """The return from a component on, by rewards and discounts, of the plane that saves most."""
-        tried = [CutEnv(component, criterion).step(component, plane).saved for plane in planes_of(component)]
-        step = env.step(component, planes_of(component)[int(np.argmax(tried))])
-        below = zip(step.discounts, step.left.unfinished, strict=True)
-        return step.saved + sum(discount * discounted(env, child) for discount, child in below)
-
-    assert greedy.earned == pytest.approx(discounted(CutEnv(solid, criterion), solid), abs=1e-9)
 
 
 def test_curves_are_drawn_to_scale_within_their_panels(tmp_path: Path) -> None:

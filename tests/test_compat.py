@@ -18,7 +18,6 @@ import trimesh
 import rlacd
 from rlacd.compat import UnusedOptionWarning
 from rlacd.compat import coacd as our_coacd
-from rlacd.compat import obj2mjcf as our_obj2mjcf
 from rlacd.compat.pybullet import vhacd
 from rlacd.compat.trimesh import convex_decomposition
 from rlacd.compat.vhacd import compute_vhacd
@@ -232,37 +231,3 @@ def test_vhacd_writes_an_object_a_hull_and_a_log(tmp_path: Path) -> None:
     assert f"{len(hulls)} hulls" in Path(files[2]).read_text()
     vhacd(*files, concavity=1.0)
     assert Path(files[1]).read_text().count("o hull") == 1, "one hull adds less than its own volume"
-
-
-# --- obj2mjcf ---------------------------------------------------------------------------------------------------------
-
-
-def test_obj2mjcf_has_the_originals_flags(capsys: pytest.CaptureFixture[str]) -> None:
-    cli = pytest.importorskip("obj2mjcf.cli", reason="obj2mjcf is not installed")
-    helps = []
-    for main in (lambda: cli.tyro.cli(cli.Args, args=["--help"]), lambda: our_obj2mjcf.main(["--help"])):
-        with pytest.raises(SystemExit):
-            main()
-        helps.append(set(re.findall(r"(?<![\w-])--[a-z][a-z.-]*", capsys.readouterr().out)))
-    assert helps[0] == helps[1]
-
-
-def test_obj2mjcf_writes_models_that_mujoco_compiles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
-    for name in ("table", "left_alone"):
-        table().export(tmp_path / f"{name}.obj")
-    words = ["--obj-dir", str(tmp_path), "--obj-filter", "^table", "--save_mjcf", "--compile-model"]
-    with pytest.warns(UnusedOptionWarning) as said:
-        our_obj2mjcf.main([*words, "--decompose", "--texture-resize-percent", "0.5", "--coacd-args.pca"])
-    ignored = {str(each.message).split()[3] for each in said if each.category is UnusedOptionWarning}
-    assert ignored == {"texture_resize_percent:", "pca:"}
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "table" / "table.xml"))
-    assert (model.geom_contype != 0).sum() > 3
-    assert model.njnt == 0
-    assert not (tmp_path / "left_alone").exists()
-    with pytest.raises(SystemExit):
-        our_obj2mjcf.main(words)
-    assert "--overwrite" in capsys.readouterr().err
-    our_obj2mjcf.main([*words, "--overwrite", "--add-free-joint"])
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "table" / "table.xml"))
-    assert ((model.geom_contype != 0).sum(), model.njnt) == (1, 1)

@@ -6,7 +6,7 @@ space: ``0.05,0.01``. A policy is a name that ``decompose`` takes; ``learned:FOL
 wrote there; ``forcing:FOLDER``, with those of `whole.py`, by the paper's rule; the paper's deployment of a network with
 other planes, ``planes:[ap=N:][ce=N:][no-spatial:][no-principal:]FILE.npz``; or ``half:SEED``, greedy-162 over a random
 half of the planes; or ``planned``, by what `whole.py` labels with. A run that was interrupted goes on where it stopped.
-In the end, means, and geometric means of the ratios to the first policy's numbers with 95 % intervals by resampling
+In the end, means, and geometric means of the ratios to the first policy's numbers with 95% intervals by resampling
 meshes; the same of the fewest parts that any of the policies leaves a mesh in.
 """
 

@@ -156,7 +156,7 @@ class Fit(NamedTuple):
             return None
         if self.name == "added_volume":
             most, tolerance = told_apart(100 * self.max, 100 * self.limit)
-            return f"hulls add up to {most} % of volume (tolerance {tolerance} %)"
+            return f"hulls add up to {most}% of volume (tolerance {tolerance}%)"
         most, threshold = unit.apart(self.max, self.limit)
         return f"{self.name} at most {most} (threshold {threshold}{', exceeded' * (self.max > self.limit)})"
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
+import inspect
+import itertools
 import json
 import math
+import textwrap
 import types
 import typing
 from collections.abc import Mapping
 from typing import Any
-
-from rlacd.options.fields import meanings
 
 _TYPES = {str: "string", bool: "boolean", int: "integer", float: "number", type(None): "null"}
 
@@ -47,10 +49,13 @@ def as_plain(value: Any) -> Any:
 
 
 def schema_of(kind: Any) -> dict[str, Any]:
-    """JSON schema of a dataclass as `as_plain` writes it, from its annotations and its docstring."""
+    """JSON schema of a dataclass as `as_plain` writes it, from its annotations and the docstrings below its fields.
+
+    Keys have no description where the package's source is not at hand, as in a frozen program.
+    """
     if isinstance(kind, type) and dataclasses.is_dataclass(kind):
-        hints, said, fields = typing.get_type_hints(kind), meanings(kind), dataclasses.fields(kind)
-        known = {f.name: schema_of(hints[f.name]) | {"description": " ".join(said[f.name].split())} for f in fields}
+        hints, said, fields = typing.get_type_hints(kind), _meanings(kind), dataclasses.fields(kind)
+        known = {f.name: schema_of(hints[f.name]) | said.get(f.name, {}) for f in fields}
         needed = [f.name for f in fields if "if_asked" not in f.metadata]
         about = {"description": str(kind.__doc__).partition("\n")[0]}
         return about | {"type": "object", "properties": known, "required": needed, "additionalProperties": False}
@@ -68,3 +73,19 @@ def schema_of(kind: Any) -> dict[str, Any]:
     if origin is not None:  # an array of numpy
         return {"type": "array"}
     return {} if kind is Any else {"type": _TYPES[kind]}
+
+
+def _meanings(kind: type) -> dict[str, dict[str, str]]:
+    """What the fields of a dataclass and its bases mean: the docstring below each."""
+    found: dict[str, dict[str, str]] = {}
+    for base in reversed(kind.__mro__[:-1]):
+        try:
+            (written,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+        except (OSError, TypeError):
+            continue
+        assert isinstance(written, ast.ClassDef)
+        for field, below in itertools.pairwise(written.body):
+            match field, below:
+                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(said))):
+                    found[name] = {"description": " ".join(said.split())}
+    return found

@@ -218,7 +218,11 @@ def test_a_folder_can_be_filled_in_any_format(mesh: Path, stand_in: StandIn) -> 
         (["--report", "{dir}/r.html", "--up", "w"], 2, "x, y or z"),
         (["--preset", "havok"], 2, "one of mujoco, physx"),
         (["--density", "-1", "-o", "{dir}/out.xml"], 2, "density is -1.0"),
-        (["--density", "7", "--mass", "3", "-o", "{dir}/out.xml"], 2, "density is 7.0; it has to be left out with"),
+        (
+            ["--density", "7", "--mass", "3", "-o", "{dir}/out.xml"],
+            2,
+            "density is 7.0 and mass is 3.0",
+        ),
         (["--format", "urdf", "-o", "{dir}/out.glb"], 2, "ends in .urdf"),
         (["--one-mesh", "-o", "{dir}/out.xml"], 2, "for .urdf files only"),
         (["--package-dir", "a=b"], 2, "is for robots"),

@@ -72,7 +72,6 @@ WAYS = {"50mm": "mm", "5cm": "cm", "0.05m": "m", f"{0.05 / 0.0254}in": "in"}
         ("--threshold LENGTH --max-vertices 8 --max-hulls 6 --overlap 2%", 12),
         ("--threshold LENGTH --avoid rod.stl --keep-open 0.9 --max-hulls 4 --openings solid", 9),
         ("--threshold LENGTH --max-hulls 1 --per-node", 9),
-        ("--threshold LENGTH --timeout 0.000001", 3),
         ("--criterion navigable --radius LENGTH --max-hulls 2 --max-vertices 6", 8),
         ("--keep-open LENGTH --max-hulls 4", 7),
     ],
@@ -86,14 +85,15 @@ def test_a_run_tells_all_lengths_in_one_unit(
     troubles().to_mesh().export("all.stl")
     rod(0.1, 0.1, 0).export("rod.stl")
     common = f"-o out.glb --quality fast --threads 1 {given}"
-    runs = [told("decompose all.glb " + common.replace("LENGTH", typed)) for typed in WAYS]
-    assert [units for _, units, _ in runs] == [{unit} for unit in WAYS.values()]
+    ways = dict([*WAYS.items()] if "--per-node" in given else [*WAYS.items()][::3])  # all where a run is short
+    runs = [told("decompose all.glb " + common.replace("LENGTH", typed)) for typed in ways]
+    assert [units for _, units, _ in runs] == [{unit} for unit in ways.values()]
     assert len(runs[0][2]) >= least
     for plain, _, lengths in runs:
         assert plain == runs[0][0]
         assert lengths == pytest.approx(runs[0][2], rel=1e-3)
-    for share in ("60%", "0.6") if "--keep-open LENGTH" in given else ("2.5%", "0.06"):
-        assert told("decompose all.glb " + common.replace("LENGTH", share))[1] == {"m"}
+    share = "60%" if "--keep-open LENGTH" in given else "2.5%"
+    assert told("decompose all.glb " + common.replace("LENGTH", share))[1] == {"m"}
     if "--per-node" not in given:
         assert told("decompose all.stl " + common.replace("LENGTH", share))[1] == {"units"}
 
@@ -107,7 +107,7 @@ def test_a_comparison_of_thresholds_is_in_their_unit(tmp_path: Path, monkeypatch
         assert {unit for _, unit, _ in LENGTH.findall(table)} == units
 
 
-@pytest.mark.parametrize("typed", ["5mm", "2%"])
+@pytest.mark.parametrize("typed", [pytest.param("5mm", marks=pytest.mark.nightly), "2%"])
 def test_a_robot_tells_all_lengths_in_one_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, typed: str) -> None:
     monkeypatch.chdir(tmp_path)
     robot = fork_and_lug(play=1e-3).write(tmp_path).name
@@ -128,9 +128,7 @@ def test_a_batch_tells_all_lengths_in_one_unit(tmp_path: Path, monkeypatch: pyte
     common = "batch assets -o out --max-vertices 8 --max-hulls 6 --quality fast --jobs 1"
     for given, units in (
         ("-t 50mm --unit m", {"mm"}),
-        ("-t 5cm --unit m", {"cm"}),
         ("-t 0.05", {"m", "units"}),
-        ("-t 0.05 --unit m", {"m"}),
     ):
         _, found, _ = told(f"{common} {given}")
         assert found == units

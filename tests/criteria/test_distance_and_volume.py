@@ -151,7 +151,7 @@ def test_a_limit_on_hulls_may_exceed_the_share_and_says_by_how_much() -> None:
     assert result.report.search is None
     assert any("Nothing was searched" in warning for warning in result.report.warnings)
     assert result.report.volume.max > 0.01
-    assert any("add more than 1 % of volume" in warning for warning in result.report.warnings)
+    assert any("add more than 1% of volume" in warning for warning in result.report.warnings)
 
 
 @pytest.mark.parametrize(

@@ -389,7 +389,7 @@ def test_lengths_in_the_meshs_own_unit() -> None:
     assert len(by_share) == len(by_length) == 2
     assert np.allclose(by_share.balls.centres * 1000, by_length.balls.centres, atol=1e-3)
     for share in (0.1, rlacd.NavigableSpace().radius):  # the default, but given
-        with pytest.raises(rlacd.OptionError, match="it has to be left out with radius_abs"):
+        with pytest.raises(rlacd.OptionError, match="and radius_abs is 1"):
             rlacd.NavigableSpace(share, radius_abs=1.0)
 
 

@@ -61,7 +61,7 @@ def check(hull: Hull, max_vertices: int | None = None, max_faces: int | None = N
 
 
 def test_corners_that_stick_out_too_far_are_evened_out() -> None:
-    """No 64 corners around a ball stick out by less than 3.9 %, no 32 by less than 8 %."""
+    """No 64 corners around a ball stick out by less than 3.9%, no 32 by less than 8%."""
     ball = Hull.of(trimesh.creation.icosphere(4).vertices)
     for most, plain, even in ((64, 0.08, 0.05), (32, 0.15, 0.1)):
         sizes = [
@@ -120,7 +120,7 @@ ROUND = {
 
 
 # For comparison: circumscribed platonic bodies of a ball with 12, 6 and 4 corners add 21 %, 65 % and 231 %, two
-# regular octagons around a circle 5.5 %, and the cube is what a chamfered cube should become.
+# regular octagons around a circle 5.5%, and the cube is what a chamfered cube should become.
 @pytest.mark.parametrize(
     ("name", "most", "growth"),
     [

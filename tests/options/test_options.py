@@ -304,7 +304,7 @@ def test_words_that_are_no_lengths_are_refused(word: str) -> None:
     for name in ("gap", "volume_tolerance"):
         with pytest.raises(OptionError, match=f"{name} is '2mm'; it has to be a number or a share"):
             Options.of({name: "2mm"})
-    with pytest.raises(OptionError, match="threshold is '2mm'; it has to be left out with threshold_abs"):
+    with pytest.raises(OptionError, match="threshold is '2mm' and threshold_abs is 1"):
         Options.of({"threshold": "2mm", "threshold_abs": 1.0})
 
 

@@ -64,9 +64,9 @@ class JobSpec:
         """
         checked = Options.of({"threads": 1, **options})
         if not isinstance(checked.first_policy, str):
-            raise OptionError("in a batch, policy has to be a name or a file: objects stay in their process.")
+            raise OptionError("in a batch, policy has to be a name or a file; an object stays in its process.")
         if checked.avoid:
-            raise OptionError("in a batch, avoid (--avoid) has to be left out: it is for a single mesh.")
+            raise OptionError("avoid (--avoid) is for a single mesh; leave it out of a batch.")
         make_policy(checked.first_policy)
         asked = OutputOptions(**written)
         ending, file_type = file_kind(asked.file_type, checked.preset)

@@ -231,7 +231,9 @@ class AddressStore:
             if isinstance(error, FileNotFoundError) and "absent" in otherwise:
                 return otherwise["absent"]
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
-            raise OutputError(f"cannot reach {path} ({reason}); check the address and your rights there.") from error
+            raise OutputError(
+                f"cannot reach {path} ({reason}); check the address and your permissions there."
+            ) from error
 
 
 ResultStore: TypeAlias = FolderStore | AddressStore

@@ -31,22 +31,28 @@ WRITTEN = ("density", "mass", "up", "one_mesh", "keep_input")
 class BatchOptions:
     """What is done to which meshes."""
 
-    output: str = option("", flags=("--output", "-o"), metavar="OUT", usual="")
-    """Where the results go: a folder, or an address that fsspec knows (s3://bucket/path). Required."""
-    glob: str = option("**", usual="")
-    """Only meshes that match: 'chair_*.obj' in any folder, 'furniture/*' by the whole path."""
-    fallback: bool = option(True, usual="fallback")
-    """Give a mesh that fails its convex hull."""
-    folders: bool = option(False)
-    """Write a folder for each mesh, with a file for each hull."""
-    redo: Redo = option("none", one_of=Redo)
-    """Which meshes to do again: none, those that failed (failed), or all."""
-    file_type: str | None = option(None, flags=("--format",), metavar="EXT", usual="what --preset says, or glb")
-    """The format of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot."""
-    threads: int = option(1, least=1)
-    """Threads for each mesh."""
-    dry_run: bool = option(False)
-    """List the meshes that would be decomposed, and write nothing."""
+    output: str = option(
+        "",
+        flags=("--output", "-o"),
+        metavar="OUT",
+        usual="",
+        help="Where the results go: a folder, or an address that fsspec knows (s3://bucket/path). Required.",
+    )
+    glob: str = option(
+        "**", usual="", help="Only meshes that match: 'chair_*.obj' in any folder, 'furniture/*' by the whole path."
+    )
+    fallback: bool = option(True, usual="fallback", help="Give a mesh that fails its convex hull.")
+    folders: bool = option(False, help="Write a folder for each mesh, with a file for each hull.")
+    redo: Redo = option("none", one_of=Redo, help="Which meshes to do again: none, those that failed (failed), or all.")
+    file_type: str | None = option(
+        None,
+        flags=("--format",),
+        metavar="EXT",
+        usual="what --preset says, or glb",
+        help="The format of each result: glb, obj, ply, stl, mjcf, urdf, sdf, usd, unreal or godot.",
+    )
+    threads: int = option(1, least=1, help="Threads for each mesh.")
+    dry_run: bool = option(False, help="List the meshes that would be decomposed, and write nothing.")
 
     def __post_init__(self) -> None:
         if self.output in ("", "-"):

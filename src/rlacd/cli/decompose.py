@@ -218,7 +218,7 @@ def _check_mesh(mesh: Path, wanted: OutputOptions, robots: dict[str, Any]) -> No
 def _check_robot(asked: OutputOptions, wanted: OutputOptions) -> None:
     """Reject options for single meshes."""
     if wanted.output == STDIO:
-        raise OptionError("a robot is several files, which do not fit into stdout: give -o a file name.")
+        raise OptionError("a robot is written as several files, which cannot go to stdout: give -o a file name.")
     for name in ("picture", "balls", "file_type", "density", "mass", "one_mesh", "scene"):
         if getattr(asked, name) is not None:
             spelled = "format" if name == "file_type" else name.replace("_", "-")

@@ -29,14 +29,18 @@ LIKE = "The options and the seed of an earlier run, from the file that --report 
 class PoolOptions:
     """Where `rlacd batch` and `rlacd train` work, and what each process may take."""
 
-    jobs: int | None = option(None, least=0, usual="all cores")
-    """Processes at a time."""
-    ray: str | None = option(None, metavar="ADDRESS")
-    """Use a Ray cluster: its address, auto, or local."""
-    limit: float = option(600.0, kind=number(0.1), metavar="SECONDS", usual="600")
-    """The longest that one mesh may take; after it the process is killed."""
-    memory: float = option(4.0, kind=number(0.0), metavar="GB", usual="4")
-    """Memory limit of a process; 0 means no limit."""
+    jobs: int | None = option(None, least=0, usual="all cores", help="Processes at a time.")
+    ray: str | None = option(None, metavar="ADDRESS", help="Use a Ray cluster: its address, auto, or local.")
+    limit: float = option(
+        600.0,
+        kind=number(0.1),
+        metavar="SECONDS",
+        usual="600",
+        help="The longest that one mesh may take; after it the process is killed.",
+    )
+    memory: float = option(
+        4.0, kind=number(0.0), metavar="GB", usual="4", help="Memory limit of a process; 0 means no limit."
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -100,10 +104,10 @@ def _of_report(path: Path) -> dict[str, Any]:
         report = json.loads(path.read_text(encoding="utf-8"))
         version, options = str(report.get("version", __version__)), dict(report["options"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise OptionError(f"--like {path} is no report of a decomposition as JSON ({type(error).__name__}).") from error
+        raise OptionError(f"--like {path} is not a JSON report of a decomposition ({type(error).__name__}).") from error
     if not re.fullmatch(r"\d{1,9}(\.\d{1,9}){2}", version) or _numbered(version) > _numbered(__version__):
         raise OptionError(
-            f"--like {path} says it is of rlacd {shown(version)}; this is {__version__}, so install that."
+            f"--like {path} was written by rlacd {shown(version)}, but this is {__version__}: install that version."
         )
     if unknown := [name for name in options if name not in OPTION_NAMES]:
         raise OptionError(f"--like {path} has an option that rlacd {__version__} does not know: {shown(unknown[0])}.")
@@ -135,5 +139,7 @@ def _number(word: str) -> float | None:
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
     values = [value for word in text.split(",") if (value := _number(word)) is not None]
     if not len(values) == len(text.split(",")) == count:
-        raise OptionError(f"{option} is {text!r}; it takes {count} numbers with commas: {'0,0,1,0'[: 2 * count - 1]}.")
+        raise OptionError(
+            f"{option} is {text!r}; it takes {count} numbers separated by commas: {'0,0,1,0'[: 2 * count - 1]}."
+        )
     return tuple(values)

@@ -56,7 +56,7 @@ def stdout_name(output: str, file_type: str | None) -> str:
         return output
     ending = ending_of(file_type or FOLDER_FORMAT)
     if MODEL_OF.get(ending) in WITH_MESHES:
-        raise OptionError(f"{file_type} is several files, which do not fit into stdout: give -o a file name.")
+        raise OptionError(f"{file_type} is written as several files, which cannot go to stdout: give -o a file name.")
     return f"hulls.{ending}"
 
 

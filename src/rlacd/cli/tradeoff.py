@@ -70,7 +70,7 @@ def _tradeoff(
     give(to_json(found.as_dict()) if as_json else f"{found}\n")
     points = found.total if isinstance(found, RobotTradeoff) else found.rows
     if found.pick is None and points:
-        say("no threshold tried leads to so few hulls; rlacd decompose --max-hulls finds the tightest.")
+        say("none of these thresholds gives so few hulls; rlacd decompose --max-hulls finds the tightest that does.")
     if picture is not None and points:
         with writing("picture", picture, quiet=bool(quiet)):
             found.save_picture(picture)

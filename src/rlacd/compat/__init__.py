@@ -1,4 +1,4 @@
-"""Drop-in replacements for other tools' functions and commands: CoACD, V-HACD, trimesh, PyBullet and obj2mjcf.
+"""Drop-in replacements for other tools' functions: CoACD (and its command), V-HACD, trimesh and PyBullet.
 
 Each module is named after the one it replaces, and imports nothing of it; ``rlacd.compat.vhacd`` is the package vhacdx.
 """

@@ -163,7 +163,7 @@ class Navigable(Criterion):
             pitch = max(radius / 2, (2 + 2 * radius) / MOST_CELLS)
             if pitch > radius / 2:
                 warnings.append(
-                    f"the radius, {50 * radius:.3g} % of the longest side, is small: balls are placed "
+                    f"the radius, {50 * radius:.3g}% of the longest side, is small: balls are placed "
                     f"{pitch / radius:.2g} radii apart, and free space between them may be missed"
                 )
             lengths, reachable = (radius, tolerance), space.reachable_only

@@ -120,7 +120,7 @@ class AddedVolume(Criterion):
         exceeding = [error for error in errors if error > self.tolerance]
         worst, tolerance = told_apart(100 * max(errors), 100 * self.tolerance)
         warning = (
-            f"{len(exceeding)} of {len(errors)} hulls add more than {tolerance} % of volume; the worst adds {worst} %."
+            f"{len(exceeding)} of {len(errors)} hulls add more than {tolerance}% of volume; the worst adds {worst}%."
         )
         found = measured(tuple(errors), max(errors))
         return CriterionSummary({"volume": found}, (warning,) if exceeding else ())

@@ -22,66 +22,66 @@ class TrainOptions:
     """
 
     # The decision process (3.1)
-    threshold: float = option(0.04, least=0.001, most=1)
-    """Concavity at which a component is finished (paper, 4.1: 4%)."""
-    volume_reward: float = option(1000.0, least=0)
-    """Weight of the reward for hull volume saved, lambda 1 (4.1)."""
-    finish_reward: float = option(1000.0, least=0)
-    """Weight of the reward for finishing, lambda 2 (4.1)."""
-    max_parts: int = option(512, least=2)
-    """Components at which an episode ends."""
-    rotate: bool = option(True)
-    """Rotate each solid about x, y or z by 0, 45, 90 or 180 degrees (4.3)."""
-    max_faces: int = option(2000, least=4)
-    """Skip meshes with more triangles than this."""
+    threshold: float = option(
+        0.04, least=0.001, most=1, help="Concavity at which a component is finished (paper, 4.1: 4%)."
+    )
+    volume_reward: float = option(1000.0, least=0, help="Weight of the reward for hull volume saved, lambda 1 (4.1).")
+    finish_reward: float = option(1000.0, least=0, help="Weight of the reward for finishing, lambda 2 (4.1).")
+    max_parts: int = option(512, least=2, help="Components at which an episode ends.")
+    rotate: bool = option(True, help="Rotate each solid about x, y or z by 0, 45, 90 or 180 degrees (4.3).")
+    max_faces: int = option(2000, least=4, help="Skip meshes with more triangles than this.")
 
     # Q-learning (3.3, 3.5, 4.1)
-    encoder: str = option("sweep", one_of=("sweep", "points"))
-    """What the network sees: sweep, of each plane what the sweep gives; or points, of a component the paper's encoder
-    of points (3.3), reduced and with random weights that are not learned, for the values of all planes at once."""
-    target: str = option("one-step", one_of=("one-step", "return"))
-    """What a plane is worth: one-step, its reward plus the values of the two sides (eq. 8); or return, the discounted
-    rewards of the whole episode below it, in units of the component's excess volume, learned by a network whose average
-    plays."""
-    env_steps: int = option(1_000_000, least=1)
-    """Cuts made, each followed by learning (4.1)."""
-    learning_starts: int = option(10_000, least=0)
-    """Random cuts at the start, without learning (4.1)."""
-    epsilon: float = option(0.2, least=0, most=1)
-    """Share of random cuts after those (4.1)."""
-    epsilon_decay: float = option(0.99, least=0, most=1)
-    """Factor applied to epsilon every 1000 cuts (4.1)."""
-    buffer_size: int = option(100_000, least=1)
-    """Transitions kept for learning (4.1)."""
-    batch_size: int = option(256, least=1)
-    """Transitions for each gradient step."""
-    train_frequency: int = option(1, least=1)
-    """Cuts between gradient steps."""
-    learning_rate: float = option(1e-4, least=0)
-    """Learning rate of Adam."""
-    target_frequency: int = option(1000, least=1)
-    """one-step: gradient steps between copies to the target network."""
+    encoder: str = option(
+        "sweep",
+        one_of=("sweep", "points"),
+        help="""What the network sees: sweep, of each plane what the sweep gives; or points, of a component the
+        paper's encoder of points (3.3), reduced and with random weights that are not learned, for the values of
+        all planes at once.""",
+    )
+    target: str = option(
+        "one-step",
+        one_of=("one-step", "return"),
+        help="""What a plane is worth: one-step, its reward plus the values of the two sides (eq. 8); or return,
+        the discounted rewards of the whole episode below it, in units of the component's excess volume, learned
+        by a network whose average plays.""",
+    )
+    env_steps: int = option(1_000_000, least=1, help="Cuts made, each followed by learning (4.1).")
+    learning_starts: int = option(10_000, least=0, help="Random cuts at the start, without learning (4.1).")
+    epsilon: float = option(0.2, least=0, most=1, help="Share of random cuts after those (4.1).")
+    epsilon_decay: float = option(0.99, least=0, most=1, help="Factor applied to epsilon every 1000 cuts (4.1).")
+    buffer_size: int = option(100_000, least=1, help="Transitions kept for learning (4.1).")
+    batch_size: int = option(256, least=1, help="Transitions for each gradient step.")
+    train_frequency: int = option(1, least=1, help="Cuts between gradient steps.")
+    learning_rate: float = option(1e-4, least=0, help="Learning rate of Adam.")
+    target_frequency: int = option(1000, least=1, help="one-step: gradient steps between copies to the target network.")
 
     # The run
-    seed: int = option(0, least=0, most=2**63 - 1)
-    """The same seed, meshes and options give the same weights on CPU."""
-    environments: int = option(4, least=1, most=4096)
-    """Episodes played at the same time: episode n begins once episode n - E has been learned from."""
-    threads: int = option(1, least=1, most=1024)
-    """Threads of the training process."""
-    device: str = option("auto", one_of=("auto", "cpu", "cuda"))
-    """cpu, cuda, or auto: a GPU, if there is one and the network values all planes at once; a small network that values
-    them one by one learns as fast on the CPU."""
-    log_every: int = option(500, least=1)
-    """Cuts between points of the curves."""
-    validate_every: int = option(10_000, least=1)
-    """Cuts between validations."""
-    validation: int = option(16, least=0)
-    """Meshes held out for validation, at most half; 0 validates on the first 16 training meshes."""
-    held_out: str = option("")
-    """A folder in that of the meshes, such as those of one maker, to validate with and not to learn from."""
-    checkpoint_seconds: float = option(300.0, least=0)
-    """Seconds between checkpoints."""
+    seed: int = option(
+        0, least=0, most=2**63 - 1, help="The same seed, meshes and options give the same weights on CPU."
+    )
+    environments: int = option(
+        4,
+        least=1,
+        most=4096,
+        help="Episodes played at the same time: episode n begins once episode n - E has been learned from.",
+    )
+    threads: int = option(1, least=1, most=1024, help="Threads of the training process.")
+    device: str = option(
+        "auto",
+        one_of=("auto", "cpu", "cuda"),
+        help="""cpu, cuda, or auto: a GPU, if there is one and the network values all planes at once; a small
+        network that values them one by one learns as fast on the CPU.""",
+    )
+    log_every: int = option(500, least=1, help="Cuts between points of the curves.")
+    validate_every: int = option(10_000, least=1, help="Cuts between validations.")
+    validation: int = option(
+        16, least=0, help="Meshes held out for validation, at most half; 0 validates on the first 16 training meshes."
+    )
+    held_out: str = option(
+        "", help="A folder in that of the meshes, such as those of one maker, to validate with and not to learn from."
+    )
+    checkpoint_seconds: float = option(300.0, least=0, help="Seconds between checkpoints.")
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -154,172 +154,292 @@ class Options:
     """
 
     criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = option(
-        None, TIGHT, _CRITERION, metavar="|".join(CRITERIA), usual="concavity; distance with a length as the threshold"
-    )
-    """When a hull is tight enough: distance: its surface and the mesh's lie at most --threshold apart; concavity:
-    also the volume it adds is small (CoACD's measure); volume: it adds at most --tolerance of volume, such as 1%; or
-    navigable: it stays out of the space that a ball of --radius can reach, and what no ball can reach may be filled.
+        None,
+        TIGHT,
+        _CRITERION,
+        metavar="|".join(CRITERIA),
+        usual="concavity; distance with a length as the threshold",
+        help="""When a hull is tight enough: distance: its surface and the mesh's lie at most --threshold apart;
+        concavity: also the volume it adds is small (CoACD's measure); volume: it adds at most --tolerance of
+        volume, such as 1%; or navigable: it stays out of the space that a ball of --radius can reach, and what
+        no ball can reach may be filled.
 
-    Navigable space is given as an `rlacd.NavigableSpace`.
-    """
+        Navigable space is given as an `rlacd.NavigableSpace`.""",
+    )
     threshold: float = option(
         0.05,
         TIGHT,
         number(*LENGTHS["threshold"], typed=str),
         flags=("--threshold", "-t"),
         metavar="NUMBER",
-    )
-    """The concavity or distance a hull may have, where the longest side of the mesh is 2, as in CoACD. Smaller is
-    tighter, with more hulls: 0.02 is fine, 0.2 coarse. Also a share of the longest side (2.5%) or, where the unit is
-    known, a length (5mm), which is a distance.
+        help="""The concavity or distance a hull may have, where the longest side of the mesh is 2, as in CoACD.
+        Smaller is tighter, with more hulls: 0.02 is fine, 0.2 coarse. Also a share of the longest side (2.5%)
+        or, where the unit is known, a length (5mm), which is a distance.
 
-    On the command line: for a robot by default 1.5% of its longest side, as a distance.
-    """
-    threshold_abs: float | None = option(None, TIGHT, LENGTH)
-    """The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a distance."""
+        On the command line: for a robot by default 1.5% of its longest side, as a distance.""",
+    )
+    threshold_abs: float | None = option(
+        None,
+        TIGHT,
+        LENGTH,
+        help="""The same as a length in the mesh's own unit, such as 2 for 2 mm in a file in millimetres: a
+        distance.""",
+    )
     volume_tolerance: float = option(
-        0.01, TIGHT, number(1e-4, 10.0, typed=str), flags=("--tolerance",), metavar="NUMBER"
+        0.01,
+        TIGHT,
+        number(1e-4, 10.0, typed=str),
+        flags=("--tolerance",),
+        metavar="NUMBER",
+        help="""With --criterion volume: the share of volume that a hull may add, such as 1%.
+
+        The default is that of V-HACD. Parts smaller than a thousandth of the whole's convex hull count as this
+        large.""",
     )
-    """With --criterion volume: the share of volume that a hull may add, such as 1%.
+    volume_of: VolumeOf = option(
+        "part",
+        TIGHT,
+        one_of=VolumeOf,
+        help="With --criterion volume: whether --tolerance is a share of each part's own volume or of the whole's.",
+    )
+    max_hulls: int | None = option(
+        None,
+        LIMITS,
+        least=1,
+        help="""At most this many hulls, even if the threshold must be exceeded; the report says by how much.
 
-    The default is that of V-HACD. Parts smaller than a thousandth of the whole's convex hull count as this large.
-    """
-    volume_of: VolumeOf = option("part", TIGHT, one_of=VolumeOf)
-    """With --criterion volume: whether --tolerance is a share of each part's own volume or of the whole's."""
-    max_hulls: int | None = option(None, LIMITS, least=1)
-    """At most this many hulls, even if the threshold must be exceeded; the report says by how much.
+        It has no effect if there are no more anyway; otherwise the decomposition with the least concavity among
+        those found under coarser thresholds is returned. Of limits with an effect, a larger one never leads to
+        a larger concavity.""",
+    )
+    max_vertices: int | None = option(
+        None,
+        LIMITS,
+        _CORNERS,
+        help="""At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to
+        twice the hulls, or exceeds the threshold and says so.
 
-    It has no effect if there are no more anyway; otherwise the decomposition with the least concavity among those
-    found under coarser thresholds is returned. Of limits with an effect, a larger one never leads to a larger
-    concavity.
-    """
-    max_vertices: int | None = option(None, LIMITS, _CORNERS)
-    """At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to twice the hulls,
-    or exceeds the threshold and says so.
-
-    A limited hull contains its part and sticks out by at most the threshold (by 0.05 with the criterion ``volume``);
-    concavity does not count the volume that a limit adds. A part without such a hull is cut on as `max_hulls`
-    allows, but never beyond twice the hulls it takes without limits, and a convex body stays one hull. Where that
-    does not do, a warning says how far hulls stick out.
-    """
-    max_faces: int | None = option(None, LIMITS, _CORNERS)
-    """At most this many triangles per hull; a low limit acts as a low limit on vertices."""
-    detail: DetailName = option(SIMPLE, LIMITS, one_of=DetailName)
-    """simple drops corners that add little, within the threshold, unless the solid fills the hull; full keeps all."""
+        A limited hull contains its part and sticks out by at most the threshold (by 0.05 with the criterion
+        ``volume``); concavity does not count the volume that a limit adds. A part without such a hull is cut on
+        as `max_hulls` allows, but never beyond twice the hulls it takes without limits, and a convex body stays
+        one hull. Where that does not do, a warning says how far hulls stick out.""",
+    )
+    max_faces: int | None = option(
+        None,
+        LIMITS,
+        _CORNERS,
+        help="At most this many triangles per hull; a low limit acts as a low limit on vertices.",
+    )
+    detail: DetailName = option(
+        SIMPLE,
+        LIMITS,
+        one_of=DetailName,
+        help="""simple drops corners that add little, within the threshold, unless the solid fills the hull;
+        full keeps all.""",
+    )
     primitives: bool | Sequence[PrimitiveKind] = option(
-        (), LIMITS, _PRIMITIVES, metavar="all|box,sphere,…", usual="none"
+        (),
+        LIMITS,
+        _PRIMITIVES,
+        metavar="all|box,sphere,…",
+        usual="none",
+        help="""Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such
+        to MJCF, URDF, SDF, USD and Unreal, else as meshes.
+
+        True allows all. A primitive contains the hull of its part, and is the simplest whose volume is within a
+        quarter of the least; its own hull is a convex polyhedron around it, and ``Decomposition.primitives``
+        describes it. A round one may reach below a side on which the input rests.""",
     )
-    """Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such to MJCF, URDF,
-    SDF, USD and Unreal, else as meshes.
+    overlap: float = option(
+        0.0,
+        LIMITS,
+        number(*LENGTHS["overlap"], typed=str),
+        metavar="NUMBER",
+        help="""Hulls that touch overlap by this, given as --threshold is (0.5%, 2mm), so that nothing thin
+        slips between them.
 
-    True allows all. A primitive contains the hull of its part, and is the simplest whose volume is within a quarter
-    of the least; its own hull is a convex polyhedron around it, and ``Decomposition.primitives`` describes it. A round
-    one may reach below a side on which the input rests.
-    """
-    overlap: float = option(0.0, LIMITS, number(*LENGTHS["overlap"], typed=str), metavar="NUMBER")
-    """Hulls that touch overlap by this, given as --threshold is (0.5%, 2mm), so that nothing thin slips between them.
+        One takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by
+        less, and a warning says at how many seams. With `per_node`, hulls of different nodes do not overlap.""",
+    )
+    overlap_abs: float | None = option(None, LIMITS, LENGTH, help="The same as a length in the mesh's own unit.")
+    keep_open: float | None = option(
+        None,
+        LIMITS,
+        _OPENNESS,
+        metavar="NUMBER",
+        usual="passages may close",
+        help="""Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in
+        radius, one of this share of its radius (0.9, 90%) still fits between the hulls; or the radius of a ball
+        that has to pass (2mm).
 
-    One takes in a layer of the other. The threshold still holds; where it leaves no room, hulls overlap by less, and
-    a warning says at how many seams. With `per_node`, hulls of different nodes do not overlap.
-    """
-    overlap_abs: float | None = option(None, LIMITS, LENGTH)
-    """The same as a length in the mesh's own unit."""
-    keep_open: float | None = option(None, LIMITS, _OPENNESS, metavar="NUMBER", usual="passages may close")
-    """Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in radius, one of this
-    share of its radius (0.9, 90%) still fits between the hulls; or the radius of a ball that has to pass (2mm).
+        It fits at the same place. A warning counts the passages not kept and says what is left;
+        ``report.passages`` lists them.""",
+    )
+    keep_open_abs: float | None = option(
+        None,
+        LIMITS,
+        LENGTH,
+        help="""The radius of that ball as a length in the mesh's own unit.
 
-    It fits at the same place. A warning counts the passages not kept and says what is left; ``report.passages``
-    lists them.
-    """
-    keep_open_abs: float | None = option(None, LIMITS, LENGTH)
-    """The radius of that ball as a length in the mesh's own unit.
+        It still passes wherever one 1% larger does.""",
+    )
+    avoid: Sequence[MeshLike] = option(
+        (),
+        LIMITS,
+        _AVOIDED,
+        metavar="FILE",
+        usual="nothing",
+        repeated=True,
+        help="""Meshes in the same frame and unit that no hull enters. Parts are cut finer there, down to a
+        hundredth of the threshold.
 
-    It still passes wherever one 1% larger does.
-    """
-    avoid: Sequence[MeshLike] = option((), LIMITS, _AVOIDED, metavar="FILE", usual="nothing", repeated=True)
-    """Meshes in the same frame and unit that no hull enters. Parts are cut finer there, down to a hundredth of the
-    threshold.
+        On the command line: a file; may be repeated.
 
-    On the command line: a file; may be repeated.
+        Where the input itself crosses them, or limits on the hulls leave no way, a warning says so.""",
+    )
+    merge: bool = option(
+        True, METHOD, usual="merge", help="Join hulls where one is tight enough, also across what lies between them."
+    )
+    policy: str | Policy | None = option(
+        None,
+        METHOD,
+        _POLICY,
+        metavar="NAME",
+        usual="greedy; learned with --no-merge",
+        help="""What chooses the next cut: navacd is the quickest, learned and rl-acd ask networks; FILE.npz is
+        your own.
 
-    Where the input itself crosses them, or limits on the hulls leave no way, a warning says so.
-    """
-    merge: bool = option(True, METHOD, usual="merge")
-    """Join hulls where one is tight enough, also across what lies between them."""
-    policy: str | Policy | None = option(None, METHOD, _POLICY, metavar="NAME", usual="greedy; learned with --no-merge")
-    """What chooses the next cut: navacd is the quickest, learned and rl-acd ask networks; FILE.npz is your own.
+        This holds for the first pass. So does any object with a method ``choose``: see `rlacd.Policy`.""",
+    )
+    resolution: int = option(
+        100,
+        METHOD,
+        least=RESOLUTIONS[0],
+        most=RESOLUTIONS[1],
+        help="Grid cells along the longest side, used to repair bodies that are not closed.",
+    )
+    openings: OpeningsName = option(
+        "auto",
+        METHOD,
+        one_of=OpeningsName,
+        help="""Bodies with openings: auto fills those that nothing can get into, or that have lost some faces,
+        and makes the others thin shells; small, the default for robots, also fills those whose openings are
+        small beside them; solid fills all that enclose a space; thin fills none.""",
+    )
+    keep_cavities: bool = option(
+        False,
+        METHOD,
+        help="""Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are
+        filled, as nothing can get in, and only the mass leaves them out.
 
-    This holds for the first pass. So does any object with a method ``choose``: see `rlacd.Policy`.
-    """
-    resolution: int = option(100, METHOD, least=RESOLUTIONS[0], most=RESOLUTIONS[1])
-    """Grid cells along the longest side, used to repair bodies that are not closed."""
-    openings: OpeningsName = option("auto", METHOD, one_of=OpeningsName)
-    """Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
-    others thin shells; small, the default for robots, also fills those whose openings are small beside them; solid
-    fills all that enclose a space; thin fills none."""
-    keep_cavities: bool = option(False, METHOD)
-    """Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are filled, as
-    nothing can get in, and only the mass leaves them out.
+        Closed cavities are those that an inner shell or closed bodies bound, and spaces that only narrow gaps
+        lead to.""",
+    )
+    gap: float = option(
+        0.03,
+        METHOD,
+        number(*GAPS, typed=str),
+        metavar="NUMBER",
+        help="""Openings that a ball of this radius cannot pass count as closed; given as --threshold is,
+        without a unit.""",
+    )
+    seed: int = option(
+        0,
+        RUN,
+        least=0,
+        most=2**63 - 1,
+        help="""The same seed, input and options give the same bytes; another seed finds other hulls.
 
-    Closed cavities are those that an inner shell or closed bodies bound, and spaces that only narrow gaps lead to.
-    """
-    gap: float = option(0.03, METHOD, number(*GAPS, typed=str), metavar="NUMBER")
-    """Openings that a ball of this radius cannot pass count as closed; given as --threshold is, without a unit."""
-    seed: int = option(0, RUN, least=0, most=2**63 - 1)
-    """The same seed, input and options give the same bytes; another seed finds other hulls.
+        Another seed starts from cuts by other planes: the best of several is often better than any one.""",
+    )
+    threads: int | None = option(
+        None, RUN, least=1, most=1024, usual="all cores", help="Threads to use; the result does not depend on it."
+    )
+    timeout: float | None = option(
+        None,
+        RUN,
+        _SECONDS,
+        metavar="SECONDS",
+        help="""Stop after this time and keep the result so far.
 
-    Another seed starts from cuts by other planes: the best of several is often better than any one.
-    """
-    threads: int | None = option(None, RUN, least=1, most=1024, usual="all cores")
-    """Threads to use; the result does not depend on it."""
-    timeout: float | None = option(None, RUN, _SECONDS, metavar="SECONDS")
-    """Stop after this time and keep the result so far.
+        It is at most 1 s and 10% late for inputs of up to a million triangles. The result always covers the
+        input, at worst with one hull for each body.""",
+    )
+    quality: QualityName | None = option(
+        None,
+        METHOD,
+        one_of=QualityName,
+        usual="balanced; fast with --no-merge",
+        help="""How long to search for fewer hulls: fast does not search, balanced takes two to three times as
+        long, best searches until --budget ends.
 
-    It is at most 1 s and 10% late for inputs of up to a million triangles. The result always covers the input, at
-    worst with one hull for each body.
-    """
-    quality: QualityName | None = option(None, METHOD, one_of=QualityName, usual="balanced; fast with --no-merge")
-    """How long to search for fewer hulls: fast does not search, balanced takes two to three times as long, best
-    searches until --budget ends.
+        ``fast`` is one pass of cuts; by distance and on navigable space, parts that can be divided among others
+        are then eliminated, unless the policy stands for a published method (``navacd``, ``greedy-SCORE``).
+        ``balanced`` limits the work of the search to a multiple of that of the pass. No level is worse than the
+        one before it: it finds fewer hulls, or equally many with no more volume before `detail` simplifies
+        them.""",
+    )
+    budget: float | None = option(
+        None,
+        METHOD,
+        _SECONDS,
+        usual="5 with --quality best",
+        metavar="SECONDS",
+        help="""How long the search may take.
 
-    ``fast`` is one pass of cuts; by distance and on navigable space, parts that can be divided among others are then
-    eliminated, unless the policy stands for a published method (``navacd``, ``greedy-SCORE``). ``balanced`` limits
-    the work of the search to a multiple of that of the pass. No level is worse than the one before it: it finds
-    fewer hulls, or equally many with no more volume before `detail` simplifies them.
-    """
-    budget: float | None = option(None, METHOD, _SECONDS, usual="5 with --quality best", metavar="SECONDS")
-    """How long the search may take.
+        It replaces the limits of the level; the result then depends on the speed of the machine. ``best`` takes
+        more than its 5 s if the search of ``balanced`` does.""",
+    )
+    search_steps: int | None = option(
+        None,
+        METHOD,
+        least=0,
+        help="""How many steps the search may take; unlike --budget, this gives the same bytes however busy the
+        machine is.
 
-    It replaces the limits of the level; the result then depends on the speed of the machine. ``best`` takes more
-    than its 5 s if the search of ``balanced`` does.
-    """
-    search_steps: int | None = option(None, METHOD, least=0)
-    """How many steps the search may take; unlike --budget, this gives the same bytes however busy the machine is.
+        It replaces the limits of the level: about 100 a second on one core.""",
+    )
+    preset: PresetName | None = option(
+        None,
+        LIMITS,
+        one_of=tuple(PRESETS),
+        metavar="ENGINE",
+        help="""The limits and the file format of an engine. Other options override it.
 
-    It replaces the limits of the level: about 100 a second on one core.
-    """
-    preset: PresetName | None = option(None, LIMITS, one_of=tuple(PRESETS), metavar="ENGINE")
-    """The limits and the file format of an engine. Other options override it.
+        Each limit applies unless `max_vertices` or `max_faces`, respectively, is given, and warnings say what
+        the engine will not accept; see `rlacd.PRESETS`.""",
+    )
+    per_node: bool = option(
+        False,
+        METHOD,
+        help="""Decompose each node of a scene separately, such as doors and drawers, which move.
 
-    Each limit applies unless `max_vertices` or `max_faces`, respectively, is given, and warnings say what the engine
-    will not accept; see `rlacd.PRESETS`.
-    """
-    per_node: bool = option(False, METHOD)
-    """Decompose each node of a scene separately, such as doors and drawers, which move.
+        The limits on hulls hold for each. Nodes that do not touch do not touch as hulls either, or a warning
+        names them (extra ``clear``). Every hull's ``metadata`` names its node, with or without this.""",
+    )
+    relative_to: RelativeTo = option(
+        "scene",
+        METHOD,
+        one_of=RelativeTo,
+        help="""What --threshold is relative to: with --per-node the whole scene or each node; of a robot all of
+        it (scene) or each mesh, whose criterion is then concavity.""",
+    )
+    unit: UnitName | None = option(
+        None,
+        METHOD,
+        one_of=UnitName,
+        usual="coordinates stay as they are",
+        help="The unit of the mesh, which is converted to metres; file takes what the file says.",
+    )
+    scale: float | None = option(
+        None,
+        METHOD,
+        _FACTOR,
+        usual="1",
+        help="""Multiply the mesh's coordinates by this.
 
-    The limits on hulls hold for each. Nodes that do not touch do not touch as hulls either, or a warning names them
-    (extra ``clear``). Every hull's ``metadata`` names its node, with or without this.
-    """
-    relative_to: RelativeTo = option("scene", METHOD, one_of=RelativeTo)
-    """What --threshold is relative to: with --per-node the whole scene or each node; of a robot all of it (scene) or
-    each mesh, whose criterion is then concavity."""
-    unit: UnitName | None = option(None, METHOD, one_of=UnitName, usual="coordinates stay as they are")
-    """The unit of the mesh, which is converted to metres; file takes what the file says."""
-    scale: float | None = option(None, METHOD, _FACTOR, usual="1")
-    """Multiply the mesh's coordinates by this.
-
-    A conversion by `unit` comes first.
-    """
+        A conversion by `unit` comes first.""",
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -1,6 +1,4 @@
-"""Options stated once: a dataclass whose fields carry their type, range and place on the command line.
-
-The docstring below a field says what it means: its first paragraph everywhere, others where `TYPED` says.
+"""Options stated once: a dataclass whose fields carry their meaning, type, range and place on the command line.
 
 Lengths: see `rlacd.options.lengths`.
 """
@@ -9,12 +7,9 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import linecache
 import math
 import numbers
 import os
-import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -25,7 +20,7 @@ LARGEST_INTEGER = 2**63 - 1
 """Bound of integers without another: what kernels and files can hold."""
 
 TYPED = "On the command line: "
-"""Begins the paragraph of a field's docstring that is for the command line only; those after it are for Python."""
+"""Begins a paragraph of an option's help that is for the command line only."""
 
 LONGEST_SHOWN = 80
 """Characters of a value that a message shows."""
@@ -154,7 +149,7 @@ class About:
 
 
 def option(
-    default: Any, panel: str | None = None, kind: Kind | None = None, *, keyword: bool = False, **about: Any
+    default: Any, panel: str | None = None, kind: Kind | None = None, *, help: str, keyword: bool = False, **about: Any
 ) -> Any:
     """Declare a field with what is known of it.
 
@@ -166,6 +161,9 @@ def option(
         The heading it stands under in the command's help.
     kind : Kind, optional
         By default that of the default value, within the bounds ``least`` and ``most`` or the words ``one_of``.
+    help : str
+        What it means. The first paragraph appears everywhere, those that begin with `TYPED` on the command line only,
+        and others in Python only.
     keyword : bool
         Whether it is given by its name only.
     **about
@@ -176,6 +174,10 @@ def option(
         about.setdefault("metavar", "|".join(get_args(bounds["one_of"]) or bounds["one_of"]))
     words = str(default).lower() if isinstance(default, bool) else str(default) or "none"
     about.setdefault("usual", "" if default is None else words)
+    first, *others = (" ".join(each.split()) for each in help.split("\n\n"))
+    typed = [each.removeprefix(TYPED) for each in others if each.startswith(TYPED)]
+    about["help"] = " ".join([first, *(each[0].upper() + each[1:] for each in typed)])
+    about["python_help"] = " ".join([first, *(each for each in others if not each.startswith(TYPED))])
     known = About(kind or _kind_of(default, **bounds), default is None, panel=panel, **about)
     return dataclasses.field(default=default, kw_only=keyword, metadata={"option": known})
 
@@ -191,7 +193,7 @@ def _kind_of(default: Any, **bounds: Any) -> Kind:
 
 
 def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[Stated]], type[Stated]]:
-    """Complete the fields of a dataclass by their names and the docstrings below them.
+    """Complete the fields of a dataclass by their names.
 
     Parameters
     ----------
@@ -202,34 +204,15 @@ def stated(panel: str | None = None, python: str = "{}") -> Callable[[type[State
     """
 
     def completed(options: type[Stated]) -> type[Stated]:
-        said = meanings(options)
         for field in dataclasses.fields(options):  # type: ignore[arg-type]
             known: About = field.metadata["option"]
             word = field.name.replace("_", "-")
-            first, *others = (" ".join(each.split()) for each in said.get(field.name, "").split("\n\n"))
-            typed = [each.removeprefix(TYPED) for each in others if each.startswith(TYPED)]
-            known.help = " ".join([first, *(each[0].upper() + each[1:] for each in typed)])
-            known.python_help = " ".join([first, *(each for each in others if not each.startswith(TYPED))])
             known.flags = known.flags or (f"--{word}/--no-{word}" if field.default is True else f"--{word}",)
             known.panel = known.panel or panel
             known.python = python.format(field.name) if known.python is None else known.python
         return options
 
     return completed
-
-
-_EXPLAINED = re.compile(r'^    (\w+): (?:.*\n)+?    """((?:.|\n)+?)"""$', re.MULTILINE)
-"""A field and the docstring below it, as the formatter leaves them; a parser takes a tenth of a small mesh's time."""
-
-
-def meanings(options: type) -> dict[str, str]:
-    """What fields of a class and its bases mean: the docstring below each; nothing without the source."""
-    found: dict[str, str] = {}
-    for kind in reversed(options.__mro__[:-1]):
-        text = "".join(linecache.getlines(getattr(sys.modules[kind.__module__], "__file__", None) or ""))
-        body = re.split(r"\n\S", text.partition(f"\nclass {kind.__name__}")[2], maxsplit=1)[0]
-        found |= {name: inspect.cleandoc(said) for name, said in _EXPLAINED.findall(body)}
-    return found
 
 
 def about(options: Any, name: str) -> About:

@@ -86,8 +86,8 @@ def read_lengths(given: Mapping[str, Any]) -> dict[str, Any]:
             lengths = ", a share such as 5%, or a length such as 5mm" if name in IN_METRES else " or a share such as 5%"
             raise OptionError(f"{name} is {shown(word)}; it has to be a number{lengths}.")
         if isinstance(value, Metres):
-            if taken.get(f"{name}_abs") is not None:
-                raise OptionError(f"{name} is {shown(word)}; it has to be left out with {name}_abs, a length too.")
+            if (length := taken.get(f"{name}_abs")) is not None:
+                raise OptionError(f"{name} is {shown(word)} and {name}_abs is {shown(length)}; give one of them.")
             del taken[name]
             taken[f"{name}_abs"] = value
         else:

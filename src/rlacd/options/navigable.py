@@ -73,27 +73,56 @@ class NavigableSpace:
         A value is of the wrong type or out of its range.
     """
 
-    radius: float | str | None = option(None, kind=_LENGTH, metavar="NUMBER", usual=f"{USUAL['radius']:g}")
-    """Radius of the ball, where the longest side of the mesh is 2; also a share of that side (2.5%) or a length (20cm).
-    """
-    tolerance: float | str | None = option(None, kind=_LENGTH, metavar="NUMBER", usual=f"{USUAL['tolerance']:g}")
-    """Space nearer to the surface than this may be filled, given as --radius is. With --criterion volume: the share of
-    volume that a hull may add, such as 1%."""
-    reachable_only: bool = option(True, keyword=True, flags=("--reachable-only/--everywhere",), usual="reachable-only")
-    """Count only what a ball can reach from outside, or every room."""
+    radius: float | str | None = option(
+        None,
+        kind=_LENGTH,
+        metavar="NUMBER",
+        usual=f"{USUAL['radius']:g}",
+        help="""Radius of the ball, where the longest side of the mesh is 2; also a share of that side (2.5%) or
+        a length (20cm).""",
+    )
+    tolerance: float | str | None = option(
+        None,
+        kind=_LENGTH,
+        metavar="NUMBER",
+        usual=f"{USUAL['tolerance']:g}",
+        help="""Space nearer to the surface than this may be filled, given as --radius is. With --criterion
+        volume: the share of volume that a hull may add, such as 1%.""",
+    )
+    reachable_only: bool = option(
+        True,
+        keyword=True,
+        flags=("--reachable-only/--everywhere",),
+        usual="reachable-only",
+        help="Count only what a ball can reach from outside, or every room.",
+    )
     seeds: tuple[Point, ...] | None = option(
-        None, kind=_SEEDS, keyword=True, flags=("--seed-point",), metavar="X,Y,Z", repeated=True, usual="outside"
+        None,
+        kind=_SEEDS,
+        keyword=True,
+        flags=("--seed-point",),
+        metavar="X,Y,Z",
+        repeated=True,
+        usual="outside",
+        help="A point from which balls start, instead of from outside, in the mesh's own unit; may be repeated.",
     )
-    """A point from which balls start, instead of from outside, in the mesh's own unit; may be repeated."""
     closed_planes: tuple[tuple[Point, float], ...] = option(
-        (), kind=_PLANES, keyword=True, flags=("--closed-plane",), metavar="X,Y,Z,D", repeated=True, usual="–"
+        (),
+        kind=_PLANES,
+        keyword=True,
+        flags=("--closed-plane",),
+        metavar="X,Y,Z,D",
+        repeated=True,
+        usual="–",
+        help="""A plane that balls do not cross, such as the ground 0,0,1,0: they stay on the side to which the
+        normal X,Y,Z points; D is the plane's distance from the origin; may be repeated.""",
     )
-    """A plane that balls do not cross, such as the ground 0,0,1,0: they stay on the side to which the normal X,Y,Z
-    points; D is the plane's distance from the origin; may be repeated."""
-    radius_abs: float | None = option(None, kind=LENGTH, keyword=True)
-    """The same as --radius, as a length in the mesh's own unit."""
-    tolerance_abs: float | None = option(None, kind=LENGTH, keyword=True)
-    """The same as --tolerance, as a length in the mesh's own unit."""
+    radius_abs: float | None = option(
+        None, kind=LENGTH, keyword=True, help="The same as --radius, as a length in the mesh's own unit."
+    )
+    tolerance_abs: float | None = option(
+        None, kind=LENGTH, keyword=True, help="The same as --tolerance, as a length in the mesh's own unit."
+    )
 
     def __post_init__(self) -> None:
         for name, value in ({name: None for name in USUAL} | read_lengths(vars(self))).items():
@@ -102,7 +131,7 @@ class NavigableSpace:
         for name, usual in USUAL.items():
             bare, length = getattr(self, name), getattr(self, f"{name}_abs")
             if bare is not None and length is not None:
-                raise OptionError(f"{name} is {bare!r}; it has to be left out with {name}_abs, its length.")
+                raise OptionError(f"{name} is {bare!r} and {name}_abs is {length!r}; give one of them.")
             if bare is None and length is None:
                 object.__setattr__(self, name, usual)
 

@@ -50,40 +50,61 @@ class RobotOptions:
         A value is of the wrong type or out of its range.
     """
 
-    per: Per = option("link", one_of=Per)
-    """What becomes hulls as one: all collision meshes of a link that share their contact properties, or each mesh.
+    per: Per = option(
+        "link",
+        one_of=Per,
+        help="""What becomes hulls as one: all collision meshes of a link that share their contact properties,
+        or each mesh.
 
-    Links that fixed joints connect stay apart; so do MJCF geoms with a name, and meshes that belong to no body.
-    """
-    links: Mapping[str, float | str] | None = option(
-        None, kind=_LINKS, flags=("--link",), metavar="REGEX=LENGTH", repeated=True
+        Links that fixed joints connect stay apart; so do MJCF geoms with a name, and meshes that belong to no
+        body.""",
     )
-    """Another distance for the links whose whole name matches a regular expression; the last that matches counts.
+    links: Mapping[str, float | str] | None = option(
+        None,
+        kind=_LINKS,
+        flags=("--link",),
+        metavar="REGEX=LENGTH",
+        repeated=True,
+        help="""Another distance for the links whose whole name matches a regular expression; the last that
+        matches counts.
 
-    On the command line: give 'finger.*=1mm', or a number in the robot's own unit; may be repeated.
+        On the command line: give 'finger.*=1mm', or a number in the robot's own unit; may be repeated.
 
-    ``{"finger.*": "1mm"}``, or a number in the robot's own unit, as `threshold_abs`.
-    """
-    from_visual: bool = option(False)
-    """Links without collision geometry get it from what they show: hulls of the meshes, and the same primitives.
+        ``{"finger.*": "1mm"}``, or a number in the robot's own unit, as `threshold_abs`.""",
+    )
+    from_visual: bool = option(
+        False,
+        help="""Links without collision geometry get it from what they show: hulls of the meshes, and the same
+        primitives.
 
-    What is shown stays. Of an MJCF model, these are bodies none of whose geoms collides.
-    """
-    samples: int = option(500, least=0, most=100_000)
-    """Joint positions, beside that at rest, at which links that do not touch are kept clear of each other. Needs the
-    extra rlacd[clear].
+        What is shown stays. Of an MJCF model, these are bodies none of whose geoms collides.""",
+    )
+    samples: int = option(
+        500,
+        least=0,
+        most=100_000,
+        help="""Joint positions, beside that at rest, at which links that do not touch are kept clear of each
+        other. Needs the extra rlacd[clear].
 
-    Where hulls of such links would touch, they are cut finer, or a warning names both. USD stages are looked at as they
-    stand.
-    """
-    exclude: str | Sequence[PairKind] = option((), kind=_KINDS, metavar="adjacent,always,…", usual="none")
-    """Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD: adjacent, always
-    or never in contact at these positions.
+        Where hulls of such links would touch, they are cut finer, or a warning names both. USD stages are
+        looked at as they stand.""",
+    )
+    exclude: str | Sequence[PairKind] = option(
+        (),
+        kind=_KINDS,
+        metavar="adjacent,always,…",
+        usual="none",
+        help="""Pairs of bodies whose contacts need not be found, as excludes in MJCF and filtered pairs in USD:
+        adjacent, always or never in contact at these positions.
 
-    Of bodies of a stage, only those that a joint connects are known.
-    """
-    srdf: str | os.PathLike[str] | None = option(None, kind=path_like(), metavar="FILE")
-    """Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact."""
+        Of bodies of a stage, only those that a joint connects are known.""",
+    )
+    srdf: str | os.PathLike[str] | None = option(
+        None,
+        kind=path_like(),
+        metavar="FILE",
+        help="Of a URDF, write the same as MoveIt's file: links that are adjacent, always or never in contact.",
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)

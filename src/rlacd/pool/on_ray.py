@@ -53,7 +53,7 @@ class RayPool(Pool):
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # disables usage reports
         ray = import_extra("ray", "a cluster", "fleet")
         if jobs is not None and address != LOCAL:
-            raise OptionError("--jobs belongs to one machine; a cluster knows how many processors it has.")
+            raise OptionError("--jobs is for one machine; Ray decides how many processes a cluster runs.")
         if jobs is not None and jobs < 1:
             raise OptionError(f"jobs is {jobs!r}; it has to be at least 1.")
         _require_answer(address)

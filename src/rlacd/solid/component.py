@@ -189,7 +189,7 @@ class Component(Part):
 
     @property
     def sides(self) -> int:
-        """Number of planes that its faces lie in, without the smallest, which hold 1 % of the area."""
+        """Number of planes that its faces lie in, without the smallest, which hold 1% of the area."""
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         areas = np.linalg.norm(normals, axis=1)

@@ -68,34 +68,12 @@ def draw_picture(
     samples: int = 16,
     up: str | None = None,
 ) -> Path:
-    """Draw the input, its hulls and the exploded hulls side by side, with one line of numbers.
+    """Draw the input, its hulls and the exploded hulls; `rlacd.Decomposition.save_picture` says what is given.
 
     Parameters
     ----------
-    decomposition : Result
-        What to draw.
-    path : path-like
-        A ``.png`` file.
-    width : int
-        Pixels, from 300 to 8,000.
     samples : int
         Light paths per pixel: more are slower and less grainy.
-    up : {"x", "y", "z"}, optional
-        The axis of the input that points up in the picture.
-
-    Returns
-    -------
-    pathlib.Path
-        Where it was written.
-
-    Raises
-    ------
-    MissingExtraError
-        The extra ``view`` is not installed.
-    OutputError
-        The place is not writable.
-    OptionError
-        The name does not end in ``.png``, or `width`, `samples` or `up` is out of range.
     """
     place = check_picture(path, up=up)
     write_file(place, picture_bytes(decomposition, width=width, samples=samples, up=up))

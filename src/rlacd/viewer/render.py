@@ -102,7 +102,7 @@ def _view(points: npt.NDArray[np.float64], aspect: float) -> npt.NDArray[np.floa
     right = np.cross([0.0, 0.0, 1.0], toward_eye)
     right /= np.linalg.norm(right)
     up = np.cross(toward_eye, right)
-    half = 0.92 * np.tan(np.deg2rad(FIELD_OF_VIEW) / 2.0)  # a margin of 8 %
+    half = 0.92 * np.tan(np.deg2rad(FIELD_OF_VIEW) / 2.0)  # a margin of 8%
     # A point is inside if |up . p| <= half * depth, depth = distance - toward_eye . p; likewise to the right.
     needed = np.maximum(np.abs(points @ up) / half, np.abs(points @ right) / (half * aspect)) + points @ toward_eye
     eye: npt.NDArray[np.float64] = toward_eye * needed.max()

@@ -33,36 +33,16 @@ def open_viewer(
 ) -> Iterator[ViewServer]:
     """Serve a page that shows a mesh and its hulls, until the block ends.
 
-    The first decomposition starts at once. The page is only reachable from this machine and needs no network.
+    `rlacd.view` says what is given and raised.
 
     Parameters
     ----------
-    mesh : path-like
-        Any file `rlacd.decompose` takes; it is read again for every decomposition, so that changes to it take effect.
     decompose : callable
         `rlacd.decompose`.
-    read : callable
-        Reads the file; `rlacd.io.robots.shown` has both functions for robots too.
     options : dict, optional
         Initial values of the page's controls, by their names.
-    up : {"x", "y", "z"}, optional
-        The axis of the mesh that points up; by default what the file or its format says, else a guess.
-    port : int, optional
-        Port to listen on; 8765, or any free one, by default.
-    threads : int, optional
-        Threads to use; all processors by default.
-
-    Yields
-    ------
-    ViewServer
-        Its session does the work.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be read or holds nothing usable.
-    OptionError
-        An option is out of range, or the port is in use.
+    read : callable
+        Reads the file; `rlacd.io.robots.viewed` has both functions for robots too.
     """
     check_up(up)
     controls = read_controls(options or {})

@@ -127,7 +127,7 @@ def _places(robot: Robot, done: Checked, motion: Motion) -> list[Place]:
         sample = what.offences[0].sample if what.offences else int(what.hulls.argmax())
         if what.depth or pair not in motion.adjacent:
             first, second = (motion.links[i] for i in pair)
-            share = f"at {100 * what.hulls.mean():.3g} % of the positions"
+            share = f"at {100 * what.hulls.mean():.3g}% of the positions"
             said = f"{first} and {second}: {share}, here {_deep(robot, what.depth)}"
             worst.append((-what.depth, said, motion.positions[sample].tolist()))
     rest = motion.positions[0].tolist()

@@ -44,9 +44,7 @@ def write_file(path: Path, data: bytes) -> None:
 def refuse_link(path: Path) -> None:
     """Raise OutputNameError if `path` is a link: what it leads to may be somebody else's, anywhere on the disk."""
     if path.is_symlink():
-        raise OutputNameError(
-            f"cannot write {path}: it is a link; remove it, or give the name of the file it leads to."
-        )
+        raise OutputNameError(f"cannot write {path}: it is a link; remove it, or name the file it points to.")
 
 
 @contextlib.contextmanager
