@@ -100,7 +100,7 @@ def test_no_module_imports_scipy() -> None:
 @pytest.mark.slow
 def test_meshes_of_every_format_need_no_scipy(tmp_path: Path) -> None:
     """trimesh uses it where it is installed; rlacd does not require it."""
-    chair = trimesh.creation.box().difference(trimesh.creation.icosphere(2, 0.6))
+    chair = trimesh.creation.box().difference(trimesh.creation.icosphere(1, 0.6))
     files = [tmp_path / f"chair.{kind}" for kind in ("obj", "stl", "ply", "off", "glb", "dae", "3mf")]
     for file in files:
         chair.export(file)
@@ -112,10 +112,10 @@ import sys
 sys.modules["scipy"] = None
 import rlacd
 for file in {[str(file) for file in files]}:
-    hulls = rlacd.decompose(file, primitives=True)
+    hulls = rlacd.decompose(file, primitives=True, quality="fast", threshold=0.2)
     hulls.save(file + ".glb")
-    assert len(hulls) > 3, file
-assert len(rlacd.decompose(file, criterion=rlacd.NavigableSpace())) > 0
+    assert len(hulls) > 1, file
+assert len(rlacd.decompose(file, criterion=rlacd.NavigableSpace(), quality="fast")) > 0
 assert sys.modules["scipy"] is None
 """
     subprocess.run([sys.executable, "-c", program], check=True)
