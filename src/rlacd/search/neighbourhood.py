@@ -197,9 +197,9 @@ class Neighbourhood:
                 self._stale.clear()
 
     def _begin(self) -> Apart[Exchange | None]:
-        """Begin trials, two for each thread: some take ten times as long as others. Returns the first."""
+        """Begin as many trials as there are threads, and one: more would be made in vain. Returns the first."""
         run = self._run
-        for one in islice(self._chosen, 2 * run.threads):
+        for one in islice(self._chosen, run.threads + 1):
             one.apart = one.apart or run.apart(one.exchange, one.units)
         first = self._chosen[0].apart
         assert first is not None
