@@ -98,9 +98,7 @@ def make_report(
         missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
-        if options.overlap > 0:
-            least = solid.frame.unit.words(options.overlap)
-            warnings += seams.shallow(least) if seams else ["There was no time to make hulls overlap."]
+        warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
         warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
         warnings += avoided.warnings_of(entered, _why_entered(run), solid.frame.told_in) if avoided and entered else []
@@ -155,6 +153,10 @@ def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     """How many parts are of each kind; those that stayed hulls last."""
     kinds = [None if part.hull.primitive is None else part.hull.primitive.kind for part in parts]
     return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
+
+
+def _shallow(seams: Seams | None, overlap: str) -> list[str]:
+    return ["There was no time to make hulls overlap."] if seams is None else seams.shallow(overlap)
 
 
 def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
