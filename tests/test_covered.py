@@ -153,16 +153,16 @@ def test_no_option_leaves_any_of_the_surface_outside_all_hulls(shape: str, seed:
 STAGES: dict[str, Callable[..., Any]] = {
     "rlacd.find_parts.cut_and_merge": lambda tree, *_, of: [(tree.root, of.pieces), (tree.root, of.parts)],
     "rlacd.proxy.model.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
-    "rlacd.limit.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
+    "rlacd.extras.limit.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
     "rlacd.find_parts.grow_cover": lambda parts, *_, of: [(parts[0].whole, of)],
     "rlacd.find_parts.eliminate_parts": lambda context, *_, of: [(context.root, of)],
-    "rlacd.limit.eliminate_parts": lambda context, *_, of: [(context.root, of)],
+    "rlacd.extras.limit.eliminate_parts": lambda context, *_, of: [(context.root, of)],
     "rlacd.find_parts.search": lambda context, *_, of: [(context.root, parts) for parts in of[0]],
     "rlacd.proxy.model.Transfer.__call__": lambda self, *_, of: [(self.solid, of[0])],
     "rlacd.find_parts.Model.transfer": lambda self, *_, of: [(self.solid, of)],
-    "rlacd.find_parts.cut_to_limits": lambda parts, limited, solid, *_, of: [(solid, of)],
-    "rlacd.find_parts.at_most": lambda most, decompositions, whole, *_, of: [(whole, of)],
-    "rlacd.finish.finish.overlap_parts": lambda parts, solid, *_, of: [(solid, of[0])],
+    "rlacd.extras.limit.cut_to_limits": lambda parts, limited, solid, *_, of: [(solid, of)],
+    "rlacd.extras.limit.at_most": lambda most, decompositions, whole, *_, of: [(whole, of)],
+    "rlacd.extras.finish.overlap.overlap_parts": lambda parts, solid, *_, of: [(solid, of[0])],
     "rlacd.finish.finish.cleaned_parts": lambda reached, *_, of: [(reached.root, of[0])],
 }
 """The functions of the stages, and the states that each leaves, with the solid that each is a state of."""
@@ -218,7 +218,7 @@ def test_a_state_that_misses_what_the_one_before_covers_is_not_the_result(
 ) -> None:
     mesh = spoon(0) if dense else table()
     monkeypatch.setattr("rlacd.proxy.model.DENSE", FEW)
-    monkeypatch.setattr("rlacd.find_parts.cut_to_limits", lambda parts, *_: parts[:1])
+    monkeypatch.setattr("rlacd.extras.limit.cut_to_limits", lambda parts, *_: parts[:1])
     result = rlacd.decompose(mesh, quality="fast", max_vertices=12, threads=1)
     assert outside(mesh, result.hulls) == 0
     assert max(len(hull.vertices) for hull in result) <= 12

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from fuzz.geometry import why_not_convex
 from rlacd import _native
-from rlacd.finish.primitives import outline
+from rlacd.extras.finish.primitives import outline
 from rlacd.solid.hull import Hull
 
 

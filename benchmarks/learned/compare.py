@@ -23,9 +23,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.tables import Ratio
-from rlacd.criteria import Concavity, Criterion, Navigable
+from rlacd.criteria import Concavity, Criterion
 from rlacd.cut import CutTree
 from rlacd.errors import OptionError, RlacdError
+from rlacd.extras.criteria.navigable import Navigable
 from rlacd.io.read.load import load_mesh
 from rlacd.merge import merge_parts
 from rlacd.options.navigable import NavigableSpace

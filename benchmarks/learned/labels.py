@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rlacd.criteria import Concavity, Criterion, Navigable
+from rlacd.criteria import Concavity, Criterion
 from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
+from rlacd.extras.criteria.navigable import Navigable
 from rlacd.io.read.load import load_mesh
 from rlacd.options.navigable import NavigableSpace
 from rlacd.planes.sweep import SLIVERS, Sweep, SweepCache

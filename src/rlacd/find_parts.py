@@ -14,7 +14,6 @@ from typing import NamedTuple
 from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
-from rlacd.limit import at_most, cut_to_limits
 from rlacd.merge import grow_cover, grown_parts, may_grow
 from rlacd.options import FAST, Options
 from rlacd.planes.sweep import SweepCache
@@ -96,8 +95,12 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     states, goal, found = decomposer.decompose(problem.goal)
     limited, most, parts = problem.limited(goal), options.max_hulls, states[-1]
     if most is not None and len(parts) > most:
+        from rlacd.extras.limit import at_most
+
         parts = at_most(most, decomposer.coarser(states, goal), root, limited, run)
     elif any(options.hull_limits):
+        from rlacd.extras.limit import cut_to_limits
+
         parts = cut_to_limits(parts, limited, root, options, run)
     before = tuple(state for state in states if most is None or len(state) <= most)
     return Reached(solid, options, goal, parts, found, root, before)
@@ -115,6 +118,8 @@ def find_parts_under(source: InputMesh, options: Options, factors: Sequence[floa
         for factor in factors:
             (*_, parts), goal, found = decomposer.decompose(problem.goal.scaled(factor))
             if any(options.hull_limits):
+                from rlacd.extras.limit import cut_to_limits
+
                 parts = cut_to_limits(parts, problem.limited(goal), problem.root, options, run)
             if run.stopped_by is not None:
                 break

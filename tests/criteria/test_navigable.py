@@ -20,8 +20,8 @@ import rlacd
 from fuzz.geometry import Polytope
 from rlacd import _native
 from rlacd.cli.main import app
-from rlacd.criteria.navigable import LEAST_RADIUS, Balls, Navigable, NavigableSpace
 from rlacd.errors import OptionError
+from rlacd.extras.criteria.navigable import LEAST_RADIUS, Balls, Navigable, NavigableSpace
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from rlacd.solid.component import Component, Part

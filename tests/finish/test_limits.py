@@ -19,8 +19,8 @@ import rlacd
 from fuzz.geometry import Polytope, why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
+from rlacd.extras.limit import few_enough
 from rlacd.finish.finish import limit_part
-from rlacd.limit import few_enough
 from rlacd.merge.unite import united_in_turn
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run, Work

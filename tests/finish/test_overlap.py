@@ -17,7 +17,7 @@ from rlacd import _native
 from rlacd.compat import coacd
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
-from rlacd.finish.overlap import overlap_parts
+from rlacd.extras.finish.overlap import overlap_parts
 from rlacd.io.write import save
 from rlacd.options import Options
 from rlacd.report import Overlap

@@ -16,7 +16,7 @@ from lxml import etree
 
 import rlacd
 from rlacd.errors import OptionError
-from rlacd.finish.primitives import fit_primitives, smallest_ball
+from rlacd.extras.finish.primitives import fit_primitives, smallest_ball
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.solid.hull import Hull
 from tests.hulls import assert_convex_hull

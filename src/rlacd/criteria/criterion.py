@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rlacd import _native
-from rlacd.criteria.avoided import Avoided
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
+
+if TYPE_CHECKING:
+    from rlacd.extras.criteria.avoided import Avoided
 
 
 @dataclass(frozen=True)

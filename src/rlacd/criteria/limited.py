@@ -6,15 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rlacd import _native
-from rlacd.criteria.avoided import FINEST_SHARE, Avoided
 from rlacd.criteria.concavity import Concavity, Distance
 from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.criteria.navigable import Intrusions, Navigable
-from rlacd.criteria.volume import AddedVolume
 from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
@@ -26,6 +24,10 @@ from rlacd.solid.passages import Density, passage_balls
 from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.resting import within_reach
 from rlacd.solid.solid import Solid
+
+if TYPE_CHECKING:
+    from rlacd.extras.criteria.avoided import Avoided
+    from rlacd.extras.criteria.navigable import Intrusions
 
 SPACING = 0.125
 """Distance between balls, and between the points from which they start, as a share of their radius: an edge that comes
@@ -59,14 +61,21 @@ def least_kept(options: Options, scale: float) -> float:
     return math.inf if options.keep_open is None else options.threshold
 
 
-CRITERIA: dict[str, type[Criterion]] = {
-    "concavity": Concavity,
-    "distance": Distance,
-    "volume": AddedVolume,
-    "navigable": Navigable,
-}
-"""The criteria by the names that options give them."""
+def _named(name: str) -> type[Criterion]:
+    """The criterion that options give this name."""
+    if name == "volume":
+        from rlacd.extras.criteria.volume import AddedVolume
 
+        return AddedVolume
+    if name == "navigable":
+        from rlacd.extras.criteria.navigable import Navigable
+
+        return Navigable
+    return Distance if name == "distance" else Concavity
+
+
+FINEST_SHARE = 0.01
+"""Parts whose hulls enter a mesh to avoid are cut down to this share of the threshold."""
 
 CLEARLY = 0.99
 """Share of the allowed distance that limits may use, since criteria are decided to 0.1% of it."""
@@ -111,10 +120,12 @@ class LimitedCriterion(Criterion):
 
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Criterion:
-        """Make the named criterion with its passages; tighter limits apply only after cutting (see `rlacd.limit`)."""
-        criterion = CRITERIA[options.criterion_name].prepare(options, solid, run)
+        """Make the named criterion with its passages; tighter limits apply only after cutting (`extras/limit.py`)."""
+        criterion = _named(options.criterion_name).prepare(options, solid, run)
         made = cls(criterion)
         if options.avoid:
+            from rlacd.extras.criteria.avoided import Avoided
+
             avoided = Avoided.of(options.avoid, solid, 1 if run is None else run.threads)
             made = replace(made, avoided=avoided, finest=Distance(FINEST_SHARE * options.threshold))
         if run is not None and (options.keep_open is not None or options.keep_open_abs is not None):
@@ -162,6 +173,8 @@ class LimitedCriterion(Criterion):
 
     @cached_property
     def _intrusions(self) -> Intrusions:
+        from rlacd.extras.criteria.navigable import Intrusions
+
         return Intrusions(self.kept)
 
     def is_met(self, part: Part) -> bool:

@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import trimesh
@@ -19,8 +19,6 @@ from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.criteria.limited import limited_part
 from rlacd.find_parts import Reached
-from rlacd.finish.overlap import Seams, overlap_parts
-from rlacd.finish.primitives import primitive_part
 from rlacd.finish.report import NEARLY, make_report
 from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
@@ -36,6 +34,9 @@ from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.resting import resting_sides, within_reach
 from rlacd.solid.solid import Solid
+
+if TYPE_CHECKING:
+    from rlacd.extras.finish.overlap import Seams
 
 LARGEST = float(np.finfo(np.float64).max)
 """The largest coordinate."""
@@ -138,9 +139,12 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
     slack = ROUNDING + 8 * reached.solid.frame.resolution
 
     def cleaned(part: Part) -> Part:
-        shaped = primitive_part(part, goal, options.primitive_kinds, limits, slack)
-        if shaped is not part:
-            return shaped
+        if kinds := options.primitive_kinds:
+            from rlacd.extras.finish.primitives import primitive_part
+
+            shaped = primitive_part(part, goal, kinds, limits, slack)
+            if shaped is not part:
+                return shaped
         share = SHARE_OF_DEVIATION if keeps(part.hull, limits) else 1.0  # limits make hulls reach farther
         near = within_reach(sides, part.hull, share * goal.outward_deviation)
         part = kept_within(part, near, goal)
@@ -150,6 +154,8 @@ def cleaned_parts(reached: Reached, run: Run) -> tuple[list[Part], Seams | None]
 
     parts, seams = reached.parts, None
     if options.overlap > 0 and root is not None:
+        from rlacd.extras.finish.overlap import overlap_parts
+
         parts, seams = overlap_parts(parts, root, goal, options.overlap)
     return run.map(cleaned, parts), seams
 

@@ -6,17 +6,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.avoided import FINEST_SHARE, warnings_of
+from rlacd.criteria.limited import FINEST_SHARE
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
-from rlacd.finish.overlap import Seams
 from rlacd.fit import RESOLVED
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
@@ -30,7 +29,6 @@ from rlacd.report import (
     Overlap,
     Point,
     Report,
-    ShortSeam,
     sizes_of,
 )
 from rlacd.run import Run
@@ -41,6 +39,9 @@ from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull, is_sliver
 from rlacd.solid.mass import joint_mass, mass_of
 from rlacd.solid.solid import Solid
+
+if TYPE_CHECKING:
+    from rlacd.extras.finish.overlap import Seams
 
 NEARLY = RESOLVED
 """No point of the input should lie farther outside the hulls than this."""
@@ -92,14 +93,15 @@ def make_report(
     distances = run.if_in_time(lambda: _distances(reached, parts, run), lambda: None) if has_surface else None
     with run.shielded():  # nothing below takes long
         weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
-        entered = None if criterion.avoided is None else criterion.avoided.found(parts, solid.frame.scale)
+        avoided = criterion.avoided
+        entered = None if avoided is None else avoided.found(parts, solid.frame.scale)
         missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
         warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
         warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
-        warnings += warnings_of(entered, _why_entered(run), solid.frame.told_in) if entered else []
+        warnings += avoided.warnings_of(entered, _why_entered(run), solid.frame.told_in) if avoided and entered else []
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return Report(
@@ -108,7 +110,7 @@ def make_report(
             stopped_by=run.stopped_by,
             **sizes_of(hulls),
             primitives=_primitives(parts) if options.primitives else None,
-            overlap=_overlap(seams, solid.frame) if options.overlap > 0 else None,
+            overlap=None if options.overlap == 0 else seams.told(solid.frame) if seams else Overlap(),
             **summary.entries,
             avoid=entered,
             hausdorff=_hausdorff(distances),
@@ -153,22 +155,8 @@ def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
 
 
-def _overlap(seams: Seams | None, frame: Frame) -> Overlap:
-    if seams is None:
-        return Overlap()
-    short = [ShortSeam(one.parts, _point(frame, one.place), one.depth / frame.scale) for one in seams.short]
-    return Overlap(seams.count, len(short), tuple(short))
-
-
 def _shallow(seams: Seams | None, overlap: str) -> list[str]:
-    if seams is None:
-        return ["There was no time to make hulls overlap."]
-    if not seams.short:
-        return []
-    return [
-        f"{len(seams.short)} of {seams.count} seams between hulls overlap by less than {overlap}: more would break "
-        "the criterion. A smaller overlap or a larger threshold helps."
-    ]
+    return ["There was no time to make hulls overlap."] if seams is None else seams.shallow(overlap)
 
 
 def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:

@@ -1,4 +1,4 @@
-"""The options of navigable space, each stated once; `rlacd.criteria.navigable` says what they mean to a solid."""
+"""The options of navigable space, each stated once; `extras/criteria/navigable.py` says what they mean to a solid."""
 
 from __future__ import annotations
 

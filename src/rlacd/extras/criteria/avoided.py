@@ -18,9 +18,6 @@ from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.solid import Solid
 
-FINEST_SHARE = 0.01
-"""Parts whose hulls enter a mesh to avoid are cut down to this share of the threshold."""
-
 SMALL = 0.02
 """Triangles that cross the solid are halved until their sides are at most this long, then left out."""
 
@@ -100,17 +97,17 @@ class Avoided:
         entered = (Entered(name, int(np.count_nonzero(own)), float(own.max()) / scale) for name, own in each)
         return Avoids(tuple(kept.name for kept in told if kept.is_crossed), tuple(entered))
 
-
-def warnings_of(found: Avoids, reason: str, unit: Unit) -> list[str]:
-    """A sentence for each obstacle that is entered all the same, with lengths in a unit; `reason` ends it."""
-    return [
-        *(f"The input itself crosses {name}, so hulls are not kept out of it there." for name in found.crossed),
-        *(
-            f"{one.hulls} hull{'s enter' if one.hulls > 1 else ' enters'} {one.name}, up to "
-            f"{unit.words(one.depth_abs)} deep: {reason}."
-            for one in found.entered
-        ),
-    ]
+    @staticmethod
+    def warnings_of(found: Avoids, reason: str, unit: Unit) -> list[str]:
+        """A sentence for each obstacle that is entered all the same, with lengths in a unit; `reason` ends it."""
+        return [
+            *(f"The input itself crosses {name}, so hulls are not kept out of it there." for name in found.crossed),
+            *(
+                f"{one.hulls} hull{'s enter' if one.hulls > 1 else ' enters'} {one.name}, up to "
+                f"{unit.words(one.depth_abs)} deep: {reason}."
+                for one in found.entered
+            ),
+        ]
 
 
 def _outside(triangles: FloatArray, surface: _native.Surface) -> tuple[FloatArray, bool]:

@@ -10,14 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from rlacd import _native
+from rlacd import _native, report
 from rlacd.criteria import Criterion
+from rlacd.report import Overlap, Point
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Part
+from rlacd.solid.frame import Frame
 from rlacd.solid.hull import TOLERANCE, Hull
 
 HELD = 0.7
@@ -44,6 +46,25 @@ class Seams:
     count: int
     short: tuple[ShortSeam, ...]
     """The seams that still overlap by less."""
+
+    def told(self, frame: Frame) -> Overlap:
+        """What the report says of them."""
+        short = [
+            report.ShortSeam(
+                one.parts, cast("Point", tuple(frame.to_input(one.place).tolist())), one.depth / frame.scale
+            )
+            for one in self.short
+        ]
+        return Overlap(self.count, len(short), tuple(short))
+
+    def shallow(self, overlap: str) -> list[str]:
+        """What to warn of; `overlap` is the one asked for, in words."""
+        if not self.short:
+            return []
+        return [
+            f"{len(self.short)} of {self.count} seams between hulls overlap by less than {overlap}: more would break "
+            "the criterion. A smaller overlap or a larger threshold helps."
+        ]
 
 
 class _Seam(NamedTuple):

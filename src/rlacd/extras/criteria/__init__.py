@@ -1,0 +1,1 @@
+"""Criteria that only options ask for: added volume, navigable space, meshes to avoid."""

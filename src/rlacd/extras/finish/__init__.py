@@ -1,0 +1,1 @@
+"""Hulls that only options ask for: primitives, and hulls that overlap."""
