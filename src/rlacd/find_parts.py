@@ -252,7 +252,8 @@ class _Decomposer:
 
         The given parts if they are fewer, or as many and smaller, or if no bodies are found.
         """
-        if self.model.proxy is not None or self.problem.root.sides > FEW_SIDES * len(parts) or not may_grow(goal):
+        has_few = len(parts) > 1 and self.problem.root.sides <= FEW_SIDES * len(parts)
+        if self.model.proxy is not None or not has_few or not may_grow(goal):
             return parts
         with self.run.limited(max(self.run.work.done, EXACT_WORK)):
             finer = goal.scaled(EXACT)
