@@ -20,6 +20,7 @@ from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy.model import Model
 from rlacd.repair.repair import repair
+from rlacd.repair.slits import without_slits
 from rlacd.report import SearchSummary
 from rlacd.run import Run
 from rlacd.search import SearchContext, at_least, cost, eliminate_parts, search
@@ -50,6 +51,12 @@ furniture of ten boards takes 0.22e6."""
 
 FEW_SIDES = 6
 """So many planes a part are few: those of a box, if no two boxes share one."""
+
+
+SLIT, EXTENT = 0.6, 2.0
+"""Slits are filled that are at most so wide, and at least so large in both other directions, in units of the threshold:
+all that is added lies within 0.3 of it, and what is shallower needs no cut. With an extent of 1, fillings of all kinds
+take 3 hulls in 840 less but give single meshes up to 7 more."""
 
 
 class Reached(NamedTuple):
@@ -155,8 +162,11 @@ class _Problem(NamedTuple):
     def of(cls, source: InputMesh, options: Options, run: Run) -> _Problem:
         with run.stage("repair"):
             solid = _repaired(source, options, run)
-        options = options.at_scale(solid.frame.scale)
-        goal = LimitedCriterion.prepare(options, solid, run)
+            options = options.at_scale(solid.frame.scale)
+            goal = LimitedCriterion.prepare(options, solid, run)
+            if _fills_slits(options, goal):
+                width = min(options.gap, SLIT * goal.outward_deviation)
+                solid = without_slits(solid, width, EXTENT * goal.outward_deviation)
         root = Component(solid.shape, run.threads)
         return cls(solid, options, goal, root, resting_sides(root) if any(options.hull_limits) else NO_SIDES)
 
@@ -247,7 +257,8 @@ class _Decomposer:
 
         The given parts if they are fewer, or as many and smaller, or if no bodies are found.
         """
-        if self.model.proxy is not None or self.problem.root.sides > FEW_SIDES * len(parts) or not may_grow(goal):
+        has_few = len(parts) > 1 and self.problem.root.sides <= FEW_SIDES * len(parts)
+        if self.model.proxy is not None or not has_few or not may_grow(goal):
             return parts
         with self.run.limited(max(self.run.work.done, EXACT_WORK)):
             finer = goal.scaled(EXACT)
@@ -323,6 +334,12 @@ def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
         threads=run.threads,
         keep_cavities=options.sees_cavities,
     )
+
+
+def _fills_slits(options: Options, goal: Criterion) -> bool:
+    """Whether what next to nothing gets into may become solid: not where balls or meshes have to."""
+    is_asked = options.openings == "thin" or options.keep_cavities or isinstance(goal, LimitedCriterion)
+    return not is_asked and may_grow(goal)
 
 
 def _scale(criterion: Criterion) -> float | None:

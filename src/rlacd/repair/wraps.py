@@ -7,7 +7,7 @@ from manifold3d import Manifold
 
 from rlacd import _native
 from rlacd._native import poll_stop
-from rlacd.repair.distance import SurfaceQuery, is_tangle, points_covering, spread_points, tangled_bodies
+from rlacd.repair.distance import MOST_POINTS, SurfaceQuery, is_tangle, points_covering, spread_points, tangled_bodies
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import hull_of_points, slab_of_faces, unite
@@ -145,6 +145,8 @@ def fill_slits(state: State) -> None:
         return
     query, gap = state.query(), state.wanted.gap
     points, on = spread_points(query.vertices, query.faces, DEFAULT_GAP)
+    every = -(-len(points) // MOST_POINTS)  # narrow faces have points at all their corners, however few are asked for
+    points, on = points[::every], on[::every]
     deep = state.reach.is_deep(points, _DEEP * gap)
     points, across = points[deep], face_normals(query.vertices, query.faces[on[deep]])
     is_on_cap = state.surface.distance(points) > 2 * HALF_THICKNESS
