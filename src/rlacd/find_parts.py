@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import NamedTuple
 
-from rlacd.criteria import Criterion, LimitedCriterion
+from rlacd.criteria import Criterion, Filled, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
 from rlacd.merge import grow_cover, grown_parts, may_grow
@@ -46,8 +46,8 @@ take a hundred."""
 
 
 EXACT, EXACT_WORK = 0.02, 0.25e6
-"""Share of the goal under which pieces are exact, and the work that may take, if cutting and merging took no more:
-furniture of ten boards takes 0.22e6."""
+"""Exact bodies are grown to a depth that is this share of a goal's, and this share of a hull may be empty; and the work
+that may take, if cutting and merging took no more: furniture of ten boards takes 0.22e6."""
 
 FEW_SIDES = 6
 """So many planes a part are few: those of a box, if no two boxes share one."""
@@ -253,17 +253,21 @@ class _Decomposer:
             return moved, goal, found
 
     def _exact(self, parts: list[Part], goal: Criterion) -> list[Part]:
-        """The convex bodies that a solid of few sides is made of, to which its pieces under a far finer goal grow back.
+        """The convex bodies that a solid of few sides is made of, to which its pieces, cut until the solid fills their
+        hulls, grow back.
 
-        The given parts if they are fewer, or as many and smaller, or if no bodies are found.
+        The given parts if they are fewer, or as many and smaller, or if no bodies are found that meet the goal.
         """
-        has_few = len(parts) > 1 and self.problem.root.sides <= FEW_SIDES * len(parts)
-        if self.model.proxy is not None or not has_few or not may_grow(goal):
+        few = self.problem.root.sides <= FEW_SIDES * len(parts)
+        if self.model.proxy is not None or len(parts) == 1 or not few or not may_grow(goal):
             return parts
-        with self.run.limited(max(self.run.work.done, EXACT_WORK)):
-            finer = goal.scaled(EXACT)
-            pieces, left = self.tree.cut_until(finer)
-            found = [] if left else grown_parts(pieces, len(parts), finer, self.run)
+        run, found = self.run, list[Part]()
+        with run.limited(max(run.work.done, EXACT_WORK)):
+            filled = Filled(EXACT * goal.outward_deviation, share=EXACT)
+            pieces, left = self.tree.cut_until(filled)
+            found = [] if left else grown_parts(pieces, len(parts), filled, run)
+            if not all(run.map(goal.is_met, found)):
+                return parts
         return min(parts, found or parts, key=cost)
 
     def coarser(self, free: list[list[Part]], goal: Criterion) -> Iterator[list[Part]]:

@@ -190,3 +190,18 @@ class Concavity(Distance):
     weight: ClassVar[float] = VOLUME_WEIGHT
     eliminates: ClassVar[bool] = False
     """A pass is cuts and merging, as in CoACD."""
+
+
+@dataclass(frozen=True)
+class Filled(Distance):
+    """The criterion "the solid fills all but a share of the hull", for pieces of exact bodies.
+
+    The threshold bounds which hulls are looked at; no length is certified, which takes far longer.
+    """
+
+    share: float = 0.0
+
+    def is_met(self, part: Part) -> bool:
+        """Whether the part, or else all that the solid fills of its hull, is large enough."""
+        least = (1 - self.share) * part.hull.volume
+        return least <= part.volume or least <= part.filled
