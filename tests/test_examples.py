@@ -262,8 +262,8 @@ def test_commands_have_the_options_that_pages_use(line: str) -> None:
         takewhile(lambda word: word not in {"|", ">", "&&", ";"}, shlex.split(line.replace("SEED", "1"), comments=True))
     )
     at: Any = app
-    if words[0] == "benchmarks.learned.compare":
-        assert import_module(words[0]).parser().parse_args(words[1:]).policies
+    if words[0].startswith("benchmarks.learned."):
+        assert import_module(words[0]).parser().parse_args(words[1:]).meshes
         return
     if words[0] == "benchmarks":
         _, name, *words = words

@@ -355,15 +355,20 @@ class Whole:
             print(f"  from {least} on, five folds: {self.says(self.least(folded, least), every)}")
 
 
-def main() -> None:
-    """Label, fit and report."""
+def parser() -> argparse.ArgumentParser:
+    """What the command takes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("meshes", type=Path)
     parser.add_argument("labels", type=Path)
     parser.add_argument("minutes", type=float)
     parser.add_argument("--held-out", default="kaykit_cc0")
     parser.add_argument("--out", type=Path)
-    args = parser.parse_args()
+    return parser
+
+
+def main() -> None:
+    """Label, fit and report."""
+    args = parser().parse_args()
     torch.set_num_threads(1)
     label(args.meshes, args.labels, args.minutes, args.held_out)
     whole = Whole.read(args.labels, args.held_out)
