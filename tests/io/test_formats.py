@@ -195,7 +195,7 @@ def test_a_link_is_refused_and_the_umask_kept(tmp_path: Path) -> None:
     real, link = tmp_path / "real" / "file.glb", tmp_path / "out.glb"
     real.write_bytes(b"precious")
     link.symlink_to(real)
-    with pytest.raises(OutputError, match="it is a link; remove it, or give the name of the file"):
+    with pytest.raises(OutputError, match="it is a link; remove it, or name the file it points to"):
         save_hulls(THREE, link)
     assert link.is_symlink()
     assert real.read_bytes() == b"precious"
