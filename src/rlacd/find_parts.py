@@ -45,9 +45,10 @@ PIECES_A_FACE = 4
 take a hundred."""
 
 
-EXACT, EXACT_WORK = 0.02, 0.25e6
-"""Exact bodies are grown to a depth that is this share of a goal's, and this share of a hull may be empty; and the work
-that may take, if cutting and merging took no more: furniture of ten boards takes 0.22e6."""
+EXACT, FLAW, EXACT_WORK = 0.02, 0.001, 0.25e6
+"""Exact bodies are grown to a depth that is the first share of a goal's, and the second share of a hull may be empty
+(with 0.005 a stool's seat takes in slices of its legs); and the work that may take, if cutting and merging took no
+more: furniture of ten boards takes 0.22e6."""
 
 FEW_SIDES = 6
 """So many planes a part are few: those of a box, if no two boxes share one."""
@@ -263,7 +264,7 @@ class _Decomposer:
             return parts
         run, found = self.run, list[Part]()
         with run.limited(max(run.work.done, EXACT_WORK)):
-            filled = Filled(EXACT * goal.outward_deviation, share=EXACT)
+            filled = Filled(EXACT * goal.outward_deviation, share=FLAW)
             pieces, left = self.tree.cut_until(filled)
             found = [] if left else grown_parts(pieces, len(parts), filled, run)
             if not all(run.map(goal.is_met, found)):
