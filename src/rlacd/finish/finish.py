@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -34,6 +35,7 @@ from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.resting import resting_sides, within_reach
 from rlacd.solid.solid import Solid
+from rlacd.solid.twins import Similarity
 
 if TYPE_CHECKING:
     from rlacd.extras.finish.overlap import Seams
@@ -83,6 +85,19 @@ def finish(reached: Reached, run: Run) -> Finished:
         return done
     again, _ = _finished(reached._replace(parts=grown), run)
     return again if run.stopped_by is None else done
+
+
+def finish_twin(reached: Reached, like: Finished, twin: Similarity, run: Run) -> Finished:
+    """Finish what was taken over from a mesh's twin with the finished hulls of that, if they meet the goal here."""
+    options, root = reached.options, reached.root
+    assert root is not None, "parts are taken over to a solid"
+    if not options.primitive_kinds and options.overlap == 0:
+        corners = [np.asarray(hull.vertices) for hull in like.hulls]
+        parts = twin.moved(corners, root, reached.solid.frame)
+        if parts is not None and run.if_in_time(lambda: all(run.map(reached.goal.is_met, parts)), lambda: False):
+            as_they_are = replace(options, detail="full")
+            return finish(reached._replace(parts=parts, options=as_they_are, before=(reached.parts,)), run)
+    return finish(reached, run)
 
 
 def _covering(reached: Reached, finished: Sequence[Part], run: Run) -> Reached | None:
