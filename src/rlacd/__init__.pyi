@@ -193,8 +193,9 @@ def decompose(
         or `max_faces`, respectively, is given, and warnings say what the engine will not accept; see `rlacd.PRESETS`.
     per_node : bool
         Decompose each node of a scene separately, such as doors and drawers, which move. The limits on hulls hold for
-        each. Nodes that do not touch do not touch as hulls either, or a warning names them (extra ``clear``). Every
-        hull's ``metadata`` names its node, with or without this. Default: false.
+        each. Nodes that are one mesh, moved, turned, mirrored or (with `relative_to` node) scaled, get the same hulls,
+        within the strictest tolerance among them. Nodes that do not touch do not touch as hulls either, or a warning
+        names them (extra ``clear``). Every hull's ``metadata`` names its node, with or without this. Default: false.
     relative_to : RelativeTo
         What `threshold` is relative to: with `per_node` the whole scene or each node; of a robot all of it (scene) or
         each mesh, whose criterion is then concavity. Default: scene.

@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
@@ -16,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import DecompositionWarning, MissingExtraError, OptionError
-from rlacd.find_parts import Reached, covered, find_parts
-from rlacd.finish.finish import Finished, finish, misses_some
+from rlacd.find_parts import Reached, covered, find_parts, find_parts_of_twin
+from rlacd.finish.finish import Finished, covers, finish, finish_twin, misses_some
 from rlacd.finish.report import joint_report, missed
 from rlacd.fit import Unit
 from rlacd.io.read.contents import USUAL, Fineness
@@ -37,6 +38,7 @@ from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.provenance import owners
 from rlacd.solid.topology import used_points
+from rlacd.solid.twins import Similarity, twins
 
 MeshLike: TypeAlias = (
     "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
@@ -191,11 +193,8 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     used = np.unique(source.node_of).tolist()
     meshes = [source.of_node(index) for index in used]
     each = [options.for_node(scale, Frame.of(mesh.vertices).scale) for mesh in meshes]
-    reached = []
-    for mesh, own in zip(meshes, each, strict=True):
-        reached.append(_whole(find_parts(mesh, own, run), mesh, own, run))
-    run.begin_finishing()
-    done = [finish(one, run) for one in reached]
+    of_one_size = options.relative_to == "scene" or options.threshold_abs is not None
+    done = _finished_nodes(meshes, each, run, of_one_size=of_one_size)
     names = [source.nodes[place].name for place in used]
     said = [] if run.stopped_by is not None else _clear_of_each_other(names, meshes, each, done, run, source.unit)
     bodies = 0
@@ -215,6 +214,33 @@ def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     told = (*source.warnings, *said)
     joint = replace(report, options=options.as_plain(), hausdorff=distances, warnings=told)
     return Finished([hull for one in done for hull in one.hulls], joint)
+
+
+def _finished_nodes(
+    meshes: Sequence[InputMesh], options: Sequence[Options], run: Run, *, of_one_size: bool
+) -> list[Finished]:
+    """Decompose and finish nodes; those that are one mesh in several places (of one size) take over what one reached.
+
+    With meshes to avoid, places differ in more than that.
+    """
+    numbers = range(len(meshes))
+    leaders = numbers if options[0].avoid else twins(meshes, of_one_size=of_one_size)
+    reached: dict[int, Reached] = {}
+    taken: dict[int, Similarity] = {}
+    for number in sorted(numbers, key=lambda number: leaders[number] != number):
+        mesh, own, leader = meshes[number], options[number], leaders[number]
+        twin = None if leader == number or run.stopped_by else Similarity.between(meshes[leader], mesh)
+        like = twin and find_parts_of_twin(mesh, own, reached[leader], twin, run)
+        if twin and like and run.if_in_time(partial(covers, like.parts, *like.solid.mesh, run), lambda: False):
+            reached[number], taken[number] = like, twin
+        else:
+            reached[number] = _whole(find_parts(mesh, own, run), mesh, own, run)
+    run.begin_finishing()
+    done: dict[int, Finished] = {}
+    for number, one in reached.items():
+        twin = taken.get(number)
+        done[number] = finish(one, run) if twin is None else finish_twin(one, done[leaders[number]], twin, run)
+    return [done[number] for number in numbers]
 
 
 def _clear_of_each_other(

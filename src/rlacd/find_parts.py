@@ -27,10 +27,12 @@ from rlacd.search import SearchContext, at_least, cost, eliminate_parts, search
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.cover import cover, slabs
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_SIDES
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.resting import resting_sides
 from rlacd.solid.solid import Solid
+from rlacd.solid.twins import Similarity
 
 COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
@@ -134,6 +136,26 @@ def find_parts_under(source: InputMesh, options: Options, factors: Sequence[floa
             yield Reached(problem.solid, options, goal, parts, found, problem.root)
             if len(parts) <= 1:
                 break
+
+
+def find_parts_of_twin(
+    source: InputMesh, options: Options, like: Reached, twin: Similarity, run: Run
+) -> Reached | None:
+    """Take over what was reached for a mesh's twin; None if its parts do not meet the goal here, or on a stop.
+
+    The mesh is repaired and the parts are tested, so that nothing is taken for granted but their number.
+    """
+    with run.until_stopped():
+        problem = _Problem.of(source, options, run)
+        solid, goal, frame = problem.solid, problem.goal, like.solid.frame
+        parts = twin.moved([frame.to_input(part.hull.vertices) for part in like.parts], problem.root, solid.frame)
+        if parts is None or (options.max_hulls is None and not all(run.map(goal.is_met, parts))):
+            return None
+        found, same = like.found, twin.factor * like.goal.outward_deviation / frame.scale
+        if found is not None and goal.outward_deviation / solid.frame.scale > (1 + ROUNDING) * same:
+            found = replace(found, lower_bound=1)  # it holds for a tolerance that is smaller
+        return Reached(solid, problem.options, goal, parts, found, problem.root)
+    return None
 
 
 class _Problem(NamedTuple):

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 import trimesh
@@ -34,12 +34,17 @@ from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.resting import resting_sides, within_reach
 from rlacd.solid.solid import Solid
+from rlacd.solid.twins import Similarity
 
 if TYPE_CHECKING:
     from rlacd.extras.finish.overlap import Seams
 
 LARGEST = float(np.finfo(np.float64).max)
 """The largest coordinate."""
+
+
+Clean: TypeAlias = "Callable[[Reached, Run], tuple[list[Part], Seams | None]]"
+"""What cleans parts."""
 
 
 class Finished(NamedTuple):
@@ -64,13 +69,14 @@ def covers(parts: Sequence[Part], vertices: FloatArray, faces: IntArray, run: Ru
     return union.under(vertices, faces, NEARLY, run.threads, COVERAGE_TOLERANCE)[0] <= COVERAGE_TOLERANCE
 
 
-def finish(reached: Reached, run: Run) -> Finished:
+def finish(reached: Reached, run: Run, clean: Clean | None = None) -> Finished:
     """Clean the parts, carry them to the input's unit, and measure them; repeat if hulls have to grow.
 
-    What a state covers, every later state covers: a state that misses some of the solid is not the result, the latest
-    one that misses nothing is.
+    `cleaned_parts` cleans them by default. What a state covers, every later state covers: a state that misses some of
+    the solid is not the result, the latest one that misses nothing is.
     """
-    done, parts = _finished(reached, run)
+    clean = clean or cleaned_parts
+    done, parts = _finished(reached, run, clean)
     under = done.report.hausdorff.missed
     if under is not None and under > COVERAGE_TOLERANCE:
         earlier = run.if_in_time(lambda: _covering(reached, parts, run), lambda: None)
@@ -81,8 +87,21 @@ def finish(reached: Reached, run: Run) -> Finished:
         grown = run.if_in_time(lambda: _taking_in(reached, parts, run), lambda: None)
     if grown is None:
         return done
-    again, _ = _finished(reached._replace(parts=grown), run)
+    again, _ = _finished(reached._replace(parts=grown), run, clean)
     return again if run.stopped_by is None else done
+
+
+def finish_twin(reached: Reached, like: Finished, twin: Similarity, run: Run) -> Finished:
+    """Finish what was taken over from a mesh's twin with the finished hulls of that, if they meet the goal here."""
+    options, root = reached.options, reached.root
+    assert root is not None, "parts are taken over to a solid"
+    if not options.primitive_kinds and options.overlap == 0:
+        corners = [np.asarray(hull.vertices) for hull in like.hulls]
+        parts = twin.moved(corners, root, reached.solid.frame)
+        if parts is not None and run.if_in_time(lambda: all(run.map(reached.goal.is_met, parts)), lambda: False):
+            cleaned = reached._replace(parts=parts, before=(reached.parts,))
+            return finish(cleaned, run, lambda reached, _: (reached.parts, None))
+    return finish(reached, run)
 
 
 def _covering(reached: Reached, finished: Sequence[Part], run: Run) -> Reached | None:
@@ -95,13 +114,13 @@ def _covering(reached: Reached, finished: Sequence[Part], run: Run) -> Reached |
     return None
 
 
-def _finished(reached: Reached, run: Run) -> tuple[Finished, list[Part]]:
+def _finished(reached: Reached, run: Run, clean: Clean) -> tuple[Finished, list[Part]]:
     """The result, and the cleaned parts."""
     solid, goal = reached.solid, reached.goal
     with run.stage("finish"):
         limits = reached.options.hull_limits
         parts, seams = run.if_in_time(
-            lambda: cleaned_parts(reached, run), lambda: ([limit_roughly(part, limits) for part in reached.parts], None)
+            lambda: clean(reached, run), lambda: ([limit_roughly(part, limits) for part in reached.parts], None)
         )
         with run.shielded():
             hulls = run.map(lambda part: in_input(part.hull, solid.frame, limits), parts)

@@ -414,8 +414,10 @@ class Options:
         METHOD,
         help="""Decompose each node of a scene separately, such as doors and drawers, which move.
 
-        The limits on hulls hold for each. Nodes that do not touch do not touch as hulls either, or a warning
-        names them (extra ``clear``). Every hull's ``metadata`` names its node, with or without this.""",
+        The limits on hulls hold for each. Nodes that are one mesh, moved, turned, mirrored or (with --relative-to
+        node) scaled, get the same hulls, within the strictest tolerance among them. Nodes that do not touch do not
+        touch as hulls either, or a warning names them (extra ``clear``). Every hull's ``metadata`` names its node, with
+        or without this.""",
     )
     relative_to: RelativeTo = option(
         "scene",
