@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import rlacd
+from rlacd import _native
 from rlacd.learn.options import TrainOptions
 from rlacd.options import Options
 
@@ -18,6 +19,7 @@ from rlacd.options import Options
 def test_help_explains_every_option_without_the_source(tmp_path: Path) -> None:
     packed = tmp_path / "rlacd"
     shutil.copytree(Path(rlacd.__file__).parent, packed, ignore=shutil.ignore_patterns("viewer", "__pycache__"))
+    shutil.copy(_native.__file__, packed)  # which an editable install keeps elsewhere
     assert compileall.compile_dir(packed, quiet=1, legacy=True, optimize=2)
     for source in packed.rglob("*.py"):
         source.unlink()
