@@ -94,3 +94,10 @@ def test_slits_stay_open_where_that_is_asked_for(options):
     result = rlacd.decompose(book(0.02), quality="fast", threads=1, **options)
     assert len(result) >= PAGES
     assert not any("slit" in said for said in result.report.warnings)
+
+
+@pytest.mark.parametrize(("gap", "slits"), [(2e-9, 0), (2e-3, 1)])
+def test_walls_that_lie_on_each_other_to_rounding_are_no_slit(gap, slits):
+    blocks = [box((-1, -0.5, -0.5), (1, 0.5, 0)), box((-1, -0.5, gap), (1, 0.5, 0.5))]
+    _, filled = repaired(trimesh.util.concatenate(blocks))
+    assert sum("filled" in said for said in filled.warnings) == slits

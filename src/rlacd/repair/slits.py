@@ -162,8 +162,8 @@ def _between(
         if region.area() < np.pi / 4 * extent**2:
             continue
         apart = across_at(np.concatenate(region.to_polygons()))
-        if apart.min() < -_HAIR or apart.max() > width or region.offset(-extent / 2).is_empty():
-            continue
+        if apart.min() < -_HAIR or not _HAIR < apart.max() <= width or region.offset(-extent / 2).is_empty():
+            continue  # walls on each other are no slit
 
         def raised(points: FloatArray) -> FloatArray:
             z = np.where(points[:, 2] > 0.5, across_at(points) + _HAIR, -_HAIR)
