@@ -13,9 +13,10 @@ from rlacd.repair.state import Piece, State
 from rlacd.repair.union import hull_of_points, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
 from rlacd.solid.arrays import BoolArray, Int64Array
-from rlacd.solid.component import DENSE
+from rlacd.solid.component import DENSE, concatenated
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
+from rlacd.solid.solid import surface_of
 
 _WRAP_ERROR = 4 * HALF_THICKNESS
 # Least share of the solid's volume of a void of an outer skin that is filled, and greatest of slits: voids in furniture
@@ -45,8 +46,9 @@ def keep_apart(state: State, sheets: Soup) -> bool:
     most, faces = _PAIRS_A_FACE * len(sheets.faces), sheets.faces.astype(np.int32)
     if state.parts or len(faces) > _CROWD or _native.crossings(sheets.vertices, faces, sheets.body, most)[0] <= most:
         return False
-    slabs = [hull_of_points(sheets.vertices[face]) for face in sheets.faces]
-    state.parts = [Piece(Manifold.compose(slabs), int(sheets.body.min()), is_slab=True)]
+    # As one mesh: manifold3d would unite what it composes.
+    slabs = concatenated([surface_of(hull_of_points(sheets.vertices[face])) for face in sheets.faces])
+    state.parts = [Piece(to_manifold(*slabs), int(sheets.body.min()), is_slab=True)]
     state.is_apart = True
     state.beyond[:] = HALF_THICKNESS
     state.warnings.append("The sheets cross too often to be united: each face is a slab of its own.")
