@@ -326,8 +326,9 @@ def test_warnings_in_python_name_the_robot_and_its_links_once(tmp_path: Path) ->
     urdf(tmp_path, "filename='bowl.stl'")
     with pytest.warns(rlacd.DecompositionWarning) as caught:
         done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", quality="fast", threads=1)
-    assert [str(one.message) for one in caught] == [f"r.urdf: {' '.join(done.warnings)}"]
-    assert caught[0].filename == __file__
+    (one,) = [one for one in caught if one.category is rlacd.DecompositionWarning]  # others' garbage may warn, too
+    assert str(one.message) == f"r.urdf: {' '.join(done.warnings)}"
+    assert one.filename == __file__
     assert any(warning.startswith("l: 1 open body became a thin shell") for warning in done.warnings)
 
 
