@@ -135,15 +135,6 @@ def test_same_bytes_for_any_number_of_threads_and_any_run(options: dict[str, Any
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("limit", [{"max_vertices": 24}, {"max_vertices": 32}, {"max_faces": 60}])
-def test_limits_hold_together_with_the_promises(limit: dict[str, int]) -> None:
-    result = rlacd.decompose(SHAPES["torus"](), **limit)
-    assert_keeps_promises(result, 0.05)
-    assert max(len(hull.vertices) for hull in result) <= limit.get("max_vertices", 10**9)
-    assert max(len(hull.faces) for hull in result) <= limit.get("max_faces", 10**9)
-
-
-@pytest.mark.slow
 @pytest.mark.promise("limits")
 def test_under_low_limits_parts_are_cut_on_while_hulls_are_left_and_a_warning_tells_where_none_are() -> None:
     given: dict[str, Any] = {"quality": "fast", "threads": 1, "threshold": 0.1}

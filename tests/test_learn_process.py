@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,15 +15,13 @@ import torch
 
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
-from rlacd.errors import RlacdError
 from rlacd.learn.dqn import Experience, ReplayBuffer, bellman_loss, dual_state_target
 from rlacd.learn.environment import CutEnv, Step, terminal_reward
 from rlacd.learn.episodes import Episode
-from rlacd.learn.meshes import list_meshes
 from rlacd.planes.sweep import paper_planes, sweep, valid_planes
 from rlacd.run import Run
 from rlacd.solid.component import Component, Plane
-from tests.learning import GreedyOverMask, greedy_plane, small_solids, write_meshes
+from tests.learning import GreedyOverMask, greedy_plane, small_solids
 from tests.test_sweep import SOLIDS
 
 CRITERION = Concavity(0.04)
@@ -107,16 +104,6 @@ def test_valid_planes_need_no_sweep_and_are_valid_by_it() -> None:
     assert differ < 0.1 * total
 
 
-def test_unreadable_meshes_are_left_out_and_counted(tmp_path: Path) -> None:
-    meshes = write_meshes(tmp_path / "meshes")
-    listed = list_meshes(meshes, max_faces=1000, validation=2, held_out="", seed=0)
-    assert listed.unreadable == 1
-    assert len(listed.training) == 3
-    assert len(listed.validation) == 2
-    assert "deeper/table.ply" in listed.training + listed.validation
-    assert list_meshes(meshes, max_faces=12, validation=0, held_out="", seed=0).training == ("box.ply",)
-
-
 def test_dual_state_target_by_hand() -> None:
     # Three cuts: both sides unfinished, nothing left, and one side in three pieces.
     target = dual_state_target(
@@ -195,8 +182,3 @@ def test_replay_gives_back_the_last_cuts_also_when_restored(capacity: int, episo
         assert batch["child_features"][mine, 0].tolist() == cut.features[left, 0].tolist()
         assert np.array_equal(batch["child_masks"][mine], cut.masks[left])
         assert batch["child_discounts"][mine] == pytest.approx(cut.discounts[left])
-
-
-def test_nothing_to_sample_is_reported() -> None:
-    with pytest.raises(RlacdError, match="nothing to learn from"):
-        ReplayBuffer(4).sample(1, np.random.default_rng(0))

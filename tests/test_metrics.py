@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import rlacd
-from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
 from tests.shapes import box, dense, from_manifold, point_to_triangles
@@ -74,14 +73,6 @@ def test_numbers_do_not_depend_on_the_unit_and_the_place() -> None:
 
     one, other = at(1, 0).as_plain(), at(1000, 10).as_plain()
     assert one == pytest.approx(other, abs=1e-3)
-
-
-def test_nothing_to_measure_is_an_error() -> None:
-    mesh = from_manifold(box(*SLAB))
-    solid = repair(load_mesh((mesh.vertices, mesh.faces)))
-    flat = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], dtype=np.float64)
-    with pytest.raises(OptionError, match="nothing to measure"):
-        measure(solid, [(flat, np.array([[0, 1, 2]], dtype=np.int32))])
 
 
 def test_invalid_hulls_are_counted() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -54,15 +53,6 @@ def test_balls_fall_onto_a_box_as_far_as_geometry_says() -> None:
     assert simulate._depths_in_mujoco(one, starts, 2, -1.0, 0.5) == pytest.approx(traced, abs=5e-5)
 
 
-def test_a_pile_comes_to_lie_in_the_bin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four boxes: each ends on at least four corners or on another."""
-    monkeypatch.setattr(simulate, "COPIES", 4)
-    box = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.1)), quality="fast", threads=1)
-    rate, contacts = simulate.pile_in_mujoco(box)
-    assert rate > 0
-    assert 12 <= contacts <= 48
-
-
 @pytest.mark.slow
 def test_the_command_writes_a_page_with_hulls_beside_primitives(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -87,14 +77,6 @@ def test_the_command_writes_a_page_with_hulls_beside_primitives(
     wrong = CliRunner().invoke(app, [*given, "--methods", "slow"])
     assert wrong.exit_code == 2
     assert "there is no method 'slow'" in wrong.output
-
-
-def test_a_missing_simulator_is_named_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    done = CliRunner().invoke(app, [str(tmp_path), "--out", str(tmp_path / "run")])
-    assert done.exit_code == 2
-    assert "pip install 'rlacd[sim]'" in done.output
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.nightly

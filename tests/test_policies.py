@@ -13,7 +13,6 @@ from typing import Any
 import manifold3d
 import numpy as np
 import pytest
-from benchmarks.learned.compare import policy_of
 from manifold3d import Manifold
 
 import rlacd
@@ -24,9 +23,9 @@ from rlacd.plain_json import to_json
 from rlacd.planes.candidates import reflex_edge_planes
 from rlacd.planes.sweep import distinct_planes, paper_planes, valid_planes
 from rlacd.policies import make_policy
-from rlacd.policies.greedy import Greedy, RandomShortlist, excess_norm, hull_sum, paper_planes_and_edges
-from rlacd.policies.learned import NAMES, PROMISING
-from rlacd.policies.network import KIND, QPolicy, load_network, parse_network
+from rlacd.policies.greedy import Greedy, RandomShortlist, excess_norm, hull_sum
+from rlacd.policies.learned import PROMISING
+from rlacd.policies.network import KIND, QPolicy, load_network
 from rlacd.policies.plane_features import FEATURES, PLANES, sweep_features
 from rlacd.solid.component import Component
 from tests.hulls import assert_same_hulls
@@ -90,17 +89,6 @@ def test_the_shipped_policy_takes_one_of_greedys_best_planes_and_ignores_what_wa
     assert policy.choose(rlacd.Component(hollow_table())) == chosen
 
 
-def test_the_comparison_takes_networks_of_a_folder(tmp_path: Path) -> None:
-    component, chosen = rlacd.Component(hollow_table()), {}
-    for sign in (1, -1):
-        for name in NAMES:
-            network = parse_network((files("rlacd.policies") / name).read_bytes())
-            network.layers[-1] = tuple(sign * array for array in network.layers[-1])
-            (tmp_path / name).write_bytes(network.to_bytes())
-        chosen[sign] = policy_of(f"learned:{tmp_path}", 0.01).choose(component)
-    assert chosen[1] == make_policy("learned", scale=0.01).choose(component) != chosen[-1]
-
-
 def test_readme_and_page_give_the_numbers_of_the_model_card() -> None:
     card = (files("rlacd.policies") / "learned.md").read_text(encoding="utf-8")
     row = re.search(r"\| concavity 5%[^|]*\| raw \| ((\S+) \(\S+ to \S+\))", card)
@@ -148,18 +136,6 @@ def test_answers_that_are_no_planes_are_refused(answer: Any) -> None:
 def test_what_cannot_choose_is_no_policy(given: Any) -> None:
     with pytest.raises(rlacd.OptionError, match="policy"):
         rlacd.decompose(table(), policy=given)
-
-
-@pytest.mark.parametrize("name", ["random-10+edges", "random-1+edges", "random-10"])
-def test_random_shortlists_cut_by_one_of_their_planes_whatever_was_cut_before(name: str) -> None:
-    root = component_of(table())
-    plane = make_policy(name).choose(root)
-    again = rlacd.Component((root.vertices, root.faces))
-    policy = make_policy(name)
-    policy.choose(root.cut(plane)[0])
-    assert policy.choose(again) == plane
-    known = (paper_planes_and_edges if "edges" in name else paper_planes)(root)
-    assert plane in [known.plane(i) for i in range(len(known))]
 
 
 def test_a_random_shortlist_of_all_planes_is_greedy_and_seeds_draw_different_ones() -> None:
@@ -231,12 +207,6 @@ def test_alone_the_greatest_value_decides_and_deployed_the_least_hulls_of_the_te
     assert sums[planes.index(chosen)] == pytest.approx(min(sums), rel=1e-9)
     if edges:
         assert make_policy(str(network), scale=0.05).choose(component) == chosen
-
-
-def test_decompose_takes_a_network(network: Path) -> None:
-    one, two = (rlacd.decompose(trimesh_of(chair()), policy=str(network), threads=n, quality="fast") for n in (1, 2))
-    assert one.report.concavity.max <= 0.05
-    assert_same_hulls(one, two)
 
 
 def compressed(content: bytes) -> bytes:

@@ -208,13 +208,6 @@ def test_a_hollow_counts_as_deep_as_it_lies() -> None:
     assert not Distance(0.099).is_met(both)
 
 
-def test_parts_out_of_reach_never_meet() -> None:
-    criterion = Concavity(0.05)
-    for gap in (0.08, 0.1001, 0.2):
-        pair = Component(box((-0.5, -0.5, -0.5), (0, 0.5, 0.5)) + box((gap, -0.5, -0.5), (0.5, 0.5, 0.5)))
-        assert gap <= criterion.reach or not criterion.is_met(pair)
-
-
 @pytest.mark.parametrize(("radius", "met"), [(0.166, True), (0.167, False)])
 def test_the_volume_that_a_hull_adds_counts(radius: float, met: bool) -> None:
     # 0.3 of the radius of a ball as large as what is cut from the box all around, far less deep than the threshold.

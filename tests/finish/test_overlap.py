@@ -18,10 +18,8 @@ from rlacd.compat import coacd
 from rlacd.criteria import Concavity
 from rlacd.errors import OptionError
 from rlacd.extras.finish.overlap import overlap_parts
-from rlacd.io.write import save
 from rlacd.options import Options
 from rlacd.report import Overlap
-from rlacd.result import Result
 from rlacd.solid.component import Component, Plane
 from tests.hulls import assert_convex_hull
 from tests.shapes import trimesh_of
@@ -179,51 +177,6 @@ def test_few_needles_slip_between_hulls_of_real_objects(corpus: Path, name: str,
     assert slips(flush.hulls, places, deep, overlap) > 0.9
     assert slips(result.hulls, places, deep, overlap) < least
     assert result.report.concavity.max <= 0.05
-
-
-FORCE = 100.0
-"""Newtons on each needle."""
-
-
-def pushed(path: Path, places: Array, way: Array, radius: float, far: float) -> Array:
-    """How far thin capsules go that MuJoCo pushes along their own lines at a fixed body, at most `far`."""
-    mujoco = pytest.importorskip("mujoco", reason="the extra sim is not installed")
-    spec = mujoco.MjSpec.from_file(str(path))
-    (body,) = spec.worldbody.bodies
-    for joint in body.joints:
-        spec.delete(joint)
-    spec.option.gravity, spec.option.timestep = (FORCE * way).tolist(), 0.001
-    for place in places:
-        needle = spec.worldbody.add_body(pos=(place - way * 2 * radius).tolist())
-        needle.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way.tolist(), damping=FORCE / 0.05)
-        needle.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            size=[radius, 0, 0],
-            fromto=[*(-0.2 * way), 0, 0, 0],
-            mass=1.0,
-            contype=2,
-            conaffinity=1,
-        )
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    for _ in range(round(1.5 * far / 0.05 / 0.001)):
-        mujoco.mj_step(model, data)
-    return np.minimum(np.array(data.qpos), far)
-
-
-@pytest.mark.parametrize("radius", [0.0002, 0.0005])
-def test_in_mujoco_a_needle_enters_the_seam_of_flush_hulls_only(tmp_path: Path, radius: float) -> None:
-    box, parts = halves(0.5)
-    whole = rlacd.decompose(trimesh.creation.box((0.2, 0.1, 0.05)), quality="fast", threads=1)
-    overlapping, _ = overlap_parts(parts, box, Concavity(0.05), OVERLAP)
-    goes = []
-    for name, some in (("flush", parts), ("overlapping", overlapping)):
-        hulls = [trimesh.Trimesh(0.1 * part.hull.vertices, part.hull.faces, process=False) for part in some]
-        path = save(Result(hulls, whole.report, whole.source), tmp_path / f"{name}.xml")
-        places = np.array([[x, y, 0.025] for x in (0.0, 1e-5) for y in (-0.04, 0.001, 0.013)])
-        goes.append(pushed(path, places, np.array([0.0, 0.0, -1.0]), radius, far=0.02))
-    assert goes[0].min() > 0.005, "needles slip between flush hulls"
-    assert goes[1].max() < 0.002, "none goes deeper than the contact yields"
 
 
 def test_coacd_extrudes_the_same_way() -> None:

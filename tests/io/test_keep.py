@@ -12,7 +12,6 @@ import trimesh
 
 import rlacd
 from rlacd.errors import OptionError
-from tests import godot
 from tests.assets import Json, Rig, png, read_glb, view_of
 from tests.hulls import assert_convex_hull
 
@@ -225,30 +224,6 @@ def test_files_outside_the_folder_stay_outside(tmp_path: Path) -> None:
     header, binary, _ = read_glb(result.save(tmp_path / "out.glb", file_type="unreal"))
     assert header["images"][0]["uri"] == "../secret.png"
     assert png() not in binary[len(Rig().binary) :]
-
-
-COUNT = """
-extends SceneTree
-func _count(node):
-	var count = 1 if node is StaticBody else 0
-	for child in node.get_children():
-		count += _count(child)
-	return count
-func _init():
-	var scene = load("res://cart.glb").instance()
-	print("bodies ", _count(scene), " wheel ", scene.find_node("Wheel", true, false) is MeshInstance)
-	print("end")
-	quit()
-"""
-
-
-@pytest.mark.nightly
-def test_godot_makes_a_static_body_of_every_hull(tmp_path: Path, apart: rlacd.Decomposition) -> None:
-    godot.project(tmp_path)
-    (tmp_path / "count.gd").write_text(COUNT)
-    apart.save(tmp_path / "cart.glb", file_type="godot")
-    godot.edit(tmp_path, until=".import/cart.glb-*.md5")
-    assert f"bodies {len(apart)} wheel True" in godot.play(tmp_path, "count.gd")
 
 
 @pytest.mark.parametrize("file_type", NAMES)

@@ -260,11 +260,6 @@ def test_nothing_is_fetched(tmp_path, monkeypatch):
         load_mesh("http://localhost:1/mesh.stl")
 
 
-def test_paths_in_a_scene_are_ignored():
-    scene = trimesh.Scene([BOX, trimesh.load_path(np.array([[0.0, 0, 0], [9, 9, 9]]))])
-    assert len(load_mesh(scene).faces) == 12
-
-
 def test_real_files_of_every_kind(corpus):
     files = sorted((corpus / "raw").iterdir())
     assert {f.suffix for f in files} >= {".glb", ".dae", ".obj", ".stl"}
@@ -323,6 +318,7 @@ def test_text_ply_is_read_whole_or_refused(kind: str, tail: bytes, tmp_path: Pat
         b"# K\xf6rper\n" + OBJ.encode(),
         OBJ.replace("\n", "\r").encode(),
         OBJ.replace("\n", "\r\n").replace("f ", "f \\\r\n", 3).encode(),
+        re.sub(r"(?m)^(v .*)$", r"\1 1 0 0", OBJ, count=3).encode(),
     ],
 )
 def test_an_obj_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path, content):
@@ -340,13 +336,6 @@ def test_what_an_obj_holds_beside_faces_is_told(tmp_path):
         f"{what} in box.obj were left out"
         for what in ("points and lines", "free-form curves and surfaces", "calls to other files")
     )
-
-
-def test_vertices_of_an_obj_may_have_more_numbers_than_others(tmp_path):
-    lines = OBJ.splitlines()
-    lines[:6] = [f"{line} 1 0 0" if i % 2 else f"{line} 1" for i, line in enumerate(lines[:6])]
-    (tmp_path / "box.obj").write_text("\n".join(lines))
-    np.testing.assert_array_equal(triangles(load_mesh(tmp_path / "box.obj")), triangles(BOX))
 
 
 def test_an_stl_is_read_whole_whatever_its_encoding_and_line_ends(tmp_path):

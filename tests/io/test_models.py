@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from lxml import etree
 
 import rlacd
 from rlacd.decomposition import Decomposition
-from rlacd.errors import MissingExtraError, OptionError, OutputError
+from rlacd.errors import OptionError, OutputError
 from rlacd.io.write import FORMATS, MODELS, save
 from tests.assets import read_glb
 from tests.hulls import assert_convex_hull, hull_of, random_hull
@@ -80,18 +79,6 @@ def test_bullet_reads_the_objects_of_one_mesh_as_hulls(tmp_path: Path, wooden: D
         assert gaps[1] < 0
     finally:
         bullet.disconnect(client)
-
-
-def test_yourdfpy_reads_urdf(tmp_path: Path, wooden: Decomposition) -> None:
-    yourdfpy = pytest.importorskip("yourdfpy", reason="the extra sim is not installed")
-    path = wooden.save(tmp_path / "table.urdf")
-    robot = yourdfpy.URDF.load(
-        str(path), load_collision_meshes=True, build_collision_scene_graph=True, force_collision_mesh=False
-    )
-    assert robot.validate(), robot.errors
-    assert len(robot.collision_scene.geometry) == len(wooden)
-    assert robot.collision_scene.bounds == pytest.approx(wooden.source.bounds, abs=1e-9)
-    assert robot.scene.bounds == pytest.approx(wooden.source.bounds, abs=1e-9)
 
 
 @pytest.mark.parametrize("density", [8.0, 7850.0])
@@ -268,16 +255,6 @@ def test_same_decomposition_same_bytes(tmp_path: Path, wooden: Decomposition, en
 
 
 # --- mistakes ---------------------------------------------------------------------------------------------------------
-
-
-def test_usd_without_its_extra_is_one_sentence_before_any_work(
-    tmp_path: Path, wooden: Decomposition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pxr", None)
-    monkeypatch.setitem(sys.modules, "pxr.UsdPhysics", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'rlacd\[usd\]'"):
-        wooden.save(tmp_path / "table.usd")
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -537,12 +537,3 @@ def test_going_elsewhere_says_which_files_will_be_missed(ear: Path, tmp_path: Pa
     done = rlacd.rewrite_robot(ear, tmp_path / "far" / "out.urdf", threads=1)
     (warning,) = done.warnings
     assert "meshes/table.stl" in warning
-
-
-def test_a_robot_of_primitives_is_copied(tmp_path: Path) -> None:
-    text = "<robot name='r'><link name='l'/></robot>"
-    (tmp_path / "r.urdf").write_text(text)
-    run = CliRunner().invoke(app, ["decompose", str(tmp_path / "r.urdf"), "-o", str(tmp_path / "out.urdf")])
-    assert run.exit_code == 0, run.output
-    assert "no collision mesh" in run.stderr
-    assert (tmp_path / "out.urdf").read_text() == text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from rlacd.errors import OptionError
 from rlacd.pool import Shared, WorkerDiedError
 from tests.pool.test_pool import ask
-from tests.test_learn_train import assert_same_run, curves, meshes, run
+from tests.test_learn_train import meshes
 
 ray = pytest.importorskip("ray", reason="the extra fleet is not installed")
 
@@ -49,29 +48,3 @@ def test_requests_over_ray_are_as_those_here(cluster: Cluster) -> None:
         with pytest.raises(OptionError, match="that is too much; ask for less"):
             pool.submit(ask("refuse")).result()
     assert ray.is_initialized(), "a cluster that somebody else started goes on"
-
-
-@pytest.mark.nightly
-def test_a_node_dies_in_the_middle_of_training_and_the_weights_are_the_same(
-    cluster: Cluster, meshes: Path, tmp_path: Path
-) -> None:
-    changes = {"environments": 4}
-    run(meshes, tmp_path / "here", **changes)
-    doomed = cluster.add_node(num_cpus=1)
-    cluster.wait_for_nodes()
-    lines: list[str] = []
-
-    def kill_at_second_line(line: str) -> None:
-        lines.append(line)
-        if len(lines) == 2:
-            cluster.remove_node(doomed, allow_graceful=False)
-
-    with RayPool("auto") as pool:
-        run(meshes, tmp_path / "ray", pool=pool, say=kill_at_second_line, **changes)
-    assert len(lines) > 4
-    deadline = time.monotonic() + 120
-    while all(node["Alive"] for node in ray.nodes()) and time.monotonic() < deadline:
-        time.sleep(0.5)  # it is gone, but not yet missed
-    assert sorted(node["Alive"] for node in ray.nodes()) == [False, True]
-    assert not any("ended_lost" in point for point in curves(tmp_path / "ray"))
-    assert_same_run(tmp_path / "here", tmp_path / "ray")

@@ -20,16 +20,7 @@ from rlacd.plain_json import to_json
 from rlacd.viewer.robot import RobotResult
 from rlacd.viewer.scene import scene
 from rlacd.viewer.server import ViewServer
-from tests.view.test_pages_in_browser import (
-    Watched,
-    browser,
-    change,
-    driver,
-    open_page,
-    pixels,
-    settle,
-    wait_for_run,
-)
+from tests.view.test_pages_in_browser import Watched, browser, change, driver, open_page, pixels, settle, watched
 from tests.view.viewing import ask, open_viewer
 
 pytest.importorskip("coal", reason="the extra clear is not installed")
@@ -81,12 +72,8 @@ def press(robots: Path) -> Iterator[ViewServer]:
 
 @pytest.fixture
 def seen(press: ViewServer, browser: Any) -> Iterator[Watched]:
-    with open_page(browser) as watched:
-        watched.page.goto(press.address)
-        wait_for_run(watched.page, 1)
-        yield watched
-        assert watched.complaints == []
-        assert watched.outside(press.address) == []
+    with watched(browser, press) as seen:
+        yield seen
 
 
 MATRICES = """async ([robot, scale, rows]) => {
