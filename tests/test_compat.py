@@ -127,13 +127,6 @@ def test_the_command_writes_a_hull_an_object_and_says_what_has_no_effect(
         assert says in capsys.readouterr().err
 
 
-def test_run_coacd_takes_a_trimesh() -> None:
-    mesh = table()
-    given = mesh, our_coacd.Mesh(mesh.vertices, mesh.faces)
-    one, two = (our_coacd.run_coacd(each, threshold=0.1) for each in given)
-    assert all(np.array_equal(a, b) for (a, _), (b, _) in zip(one, two, strict=True))
-
-
 # --- V-HACD and trimesh -----------------------------------------------------------------------------------------------
 
 

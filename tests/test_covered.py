@@ -13,6 +13,7 @@ import pytest
 import trimesh
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from manifold3d import Manifold, OpType
 
 import rlacd
 from rlacd.criteria import Concavity
@@ -23,6 +24,7 @@ from rlacd.proxy.model import Transfer
 from rlacd.proxy.simplify import simplify
 from rlacd.run import Run
 from rlacd.solid.component import Component, Part
+from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull
 from tests.shapes import block, component_of, table, trimesh_of
@@ -168,6 +170,22 @@ STAGES: dict[str, Callable[..., Any]] = {
 """The functions of the stages, and the states that each leaves, with the solid that each is a state of."""
 
 
+def watch(patch: pytest.MonkeyPatch, stages: dict[str, Callable[..., Any]], look: Callable[[str, Any], object]) -> None:
+    """Have every state that a stage leaves looked at, with the name of the stage."""
+
+    def watched(path: str, stage: Callable[..., Any]) -> Callable[..., Any]:
+        def run(*arguments: Any, **named: Any) -> Any:
+            result = stage(*arguments, **named)
+            for state in stages[path](*arguments, of=result):
+                look(path, state)
+            return result
+
+        return run
+
+    for path in stages:
+        patch.setattr(path, watched(path, pkgutil.resolve_name(path)))
+
+
 def is_covered(root: Component, parts: Sequence[Part]) -> bool:
     with Run(1) as run, run.shielded():
         return covers(parts, root.vertices, root.faces, run)
@@ -177,18 +195,8 @@ def is_covered(root: Component, parts: Sequence[Part]) -> bool:
 def left(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[bool]]:
     """Whether each state that a stage leaves covers its solid, by the stage."""
     found: dict[str, list[bool]] = {}
-
-    def watched(path: str, stage: Callable[..., Any], states: Callable[..., Any]) -> Callable[..., Any]:
-        def run(*arguments: Any, **named: Any) -> Any:
-            result = stage(*arguments, **named)
-            found.setdefault(path, []).extend(is_covered(*state) for state in states(*arguments, of=result))
-            return result
-
-        return run
-
     monkeypatch.setattr("rlacd.proxy.model.DENSE", FEW)
-    for path, states in STAGES.items():
-        monkeypatch.setattr(path, watched(path, pkgutil.resolve_name(path), states))
+    watch(monkeypatch, STAGES, lambda path, state: found.setdefault(path, []).append(is_covered(*state)))
     return found
 
 
@@ -251,3 +259,52 @@ def test_a_transfer_without_time_leaves_hulls_that_cover_the_solid() -> None:
         parts, _ = Transfer(solid, proxy, Concavity(0.05), policy, run)([proxy.component])
     assert is_covered(solid, parts)
     assert all(part.whole is solid for part in parts)
+
+
+# --- the pieces of all parts are a partition of the solid -------------------------------------------------------------
+
+
+PIECES: dict[str, Callable[..., Any]] = {
+    **dict.fromkeys(
+        ["rlacd.find_parts.cut_and_merge", "rlacd.search.levels.cut_and_merge"], lambda *_, of: [of.pieces, of.parts]
+    ),
+    **dict.fromkeys(["rlacd.find_parts.grow_cover", "rlacd.find_parts.eliminate_parts"], lambda *_, of: [of]),
+    "rlacd.find_parts.search": lambda *_, of: of[0],
+}
+
+SLIVERS = 1e-5
+"""Share of the volume that may be lost as slivers."""
+
+TOUCHING = 1e-8
+"""How far a corner of a piece may lie outside its part's hull, by rounding."""
+
+
+def assert_partition(parts: Sequence[Part]) -> None:
+    whole = parts[0].whole
+    assert all(part.whole is whole for part in parts), "pieces of one solid"
+    volume = sum(piece.volume for part in parts for piece in part.members)
+    assert (1 - SLIVERS) * whole.volume <= volume <= (1 + 1e-6) * whole.volume
+    for part in parts:
+        corners = np.concatenate([piece.vertices[np.unique(piece.faces)] for piece in part.members])
+        assert hull_union([part.hull], 1).distance(corners, 1).max() <= TOUCHING
+
+
+def hash_sign() -> trimesh.Trimesh:
+    """Four bars that cross: hulls overlap there, pieces do not."""
+    bars = [block(2, 0.2, 0.2, (0, y, 0)) for y in (-0.5, 0.5)] + [block(0.2, 2, 0.2, (x, 0, 0)) for x in (-0.5, 0.5)]
+    return trimesh_of(Manifold.batch_boolean(bars, OpType.Add))
+
+
+def ring() -> trimesh.Trimesh:
+    return trimesh.creation.torus(1.0, 0.2, major_sections=24, minor_sections=12)
+
+
+@pytest.mark.parametrize("asked", [{"quality": "fast"}, {}, {"criterion": "distance"}, {"criterion": "volume"}])
+@pytest.mark.parametrize("mesh", [table(), hash_sign(), ring()], ids=["table", "crossing", "ring"])
+def test_pieces_of_the_parts_lie_in_their_hulls_and_are_a_partition_after_each_stage(
+    mesh: trimesh.Trimesh, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = set[str]()
+    watch(monkeypatch, PIECES, lambda path, parts: (assert_partition(parts), seen.add(path)))
+    rlacd.decompose(mesh, threads=1, **asked)
+    assert "rlacd.find_parts.cut_and_merge" in seen

@@ -48,15 +48,6 @@ def test_promises_hold_on_known_shapes(shape: str, threshold: float) -> None:
     assert_keeps_promises(result, threshold)
 
 
-@pytest.mark.promise("convex-input")
-def test_convex_input_is_one_hull_exactly() -> None:
-    ball = trimesh.creation.icosphere(3)
-    result = rlacd.decompose(ball, detail="full")
-    assert len(result) == 1
-    assert sorted(result.hulls[0].vertices.tolist()) == sorted(ball.vertices.tolist())
-    assert result.report.concavity.max < 1e-6
-
-
 @pytest.mark.slow
 @pytest.mark.promise("convex-input", "dense")
 def test_dense_convex_input_is_one_hull_that_is_simple_only_as_the_threshold_allows() -> None:

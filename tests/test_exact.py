@@ -50,6 +50,7 @@ def test_furniture_comes_apart_into_its_boards(name: str, threshold: float) -> N
     [trimesh.creation.icosphere(3), trimesh.creation.cylinder(1, 3, sections=48), trimesh.creation.cone(1, 2)],
     ids=["ball", "cylinder", "cone"],
 )
+@pytest.mark.promise("convex-input")
 def test_a_convex_mesh_comes_back_with_its_own_corners(mesh: trimesh.Trimesh) -> None:
     (hull,) = rlacd.decompose(mesh).hulls
     extreme = mesh.vertices[ConvexHull(mesh.vertices).vertices]

@@ -89,6 +89,33 @@ def test_a_process_reads_its_file_with_the_libraries_that_trimesh_was_loaded_wit
     modules_after(f"{used}; import importlib.metadata, lxml.etree, networkx; networkx.Graph()")
 
 
+EXTRAS = """
+import sys, trimesh, rlacd
+corner = trimesh.util.concatenate([trimesh.creation.box((2, 1, 1)), trimesh.creation.box((1, 1, 2))])
+done = rlacd.decompose(corner, threads=1, **{options})
+assert len(done.hulls) > 1
+print(*(name for name in sys.modules if name.startswith("rlacd.extras.")))
+"""
+
+
+def extras_of(options: dict[str, object]) -> list[str]:
+    """The modules of extras that a fresh process has imported after a run with these options."""
+    run = [sys.executable, "-c", EXTRAS.format(options=options)]
+    return subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()
+
+
+@pytest.mark.parametrize("options", [{"quality": "fast"}, {}], ids=str)
+def test_a_default_run_imports_no_extras(options: dict[str, object]) -> None:
+    assert extras_of(options) == []
+
+
+def test_an_option_imports_its_own_extra() -> None:
+    assert extras_of({"criterion": "volume", "quality": "fast"}) == [
+        "rlacd.extras.criteria",
+        "rlacd.extras.criteria.volume",
+    ]
+
+
 def test_no_module_imports_scipy() -> None:
     """It is installed for the tests, so nothing else would notice."""
     files = list(Path(rlacd.__file__).parent.rglob("*.py"))

@@ -18,11 +18,9 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-from click.testing import CliRunner
 
-from rlacd.cli.main import app
 from rlacd.errors import OptionError, TrainingError, WeightsError
-from rlacd.learn.meshes import Solids, list_once
+from rlacd.learn.meshes import list_once
 from rlacd.learn.options import TRAIN_PRESETS, TrainOptions
 from rlacd.policies import make_policy
 from rlacd.policies.network import KIND, load_network
@@ -244,18 +242,6 @@ def sees_points(meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     return run(meshes, tmp_path / "points", encoder="points", env_steps=60)
 
 
-def test_every_command_takes_a_policy_that_sees_points(meshes: Path, sees_points: Path, tmp_path: Path) -> None:
-    mesh, policy = str(meshes / "cross.ply"), str(sees_points)
-    (tmp_path / "one").mkdir()
-    shutil.copy(mesh, tmp_path / "one")
-    for words in (
-        ["decompose", mesh, "-o", str(tmp_path / "out.obj"), "--policy", policy],
-        ["batch", str(tmp_path / "one"), "-o", str(tmp_path / "out"), "--policy", policy],
-    ):
-        done = CliRunner().invoke(app, [*words, "--quality", "fast"])
-        assert done.exit_code == 0, done.output
-
-
 def test_a_policy_sees_points_as_its_network_did_in_training(sees_points: Path) -> None:
     from rlacd.learn.train import load_policy
     from rlacd.policies.points import PointEncoder
@@ -324,18 +310,6 @@ def test_an_episode_that_no_worker_can_play_is_reported_and_left_out(meshes: Pat
 def test_when_no_process_can_play_that_is_one_clear_error(meshes: Path, tmp_path: Path) -> None:
     with pytest.raises(TrainingError, match=r"10 episodes in a row were lost.*--memory"):
         run(meshes, tmp_path / "run", pool=Doomed(range(5, 10**6)), validation=0)
-
-
-@pytest.mark.slow
-def test_solids_without_anything_to_cut_are_one_clear_error(
-    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("rlacd.learn.rollouts.SOLIDS_TRIED", 100)
-    for path in meshes.rglob("*.ply"):
-        if path.stem not in ("box", "broken"):
-            path.unlink()
-    with pytest.raises(TrainingError, match="none of 100 solids drawn from 1 meshes needs a cut"):
-        run(meshes, tmp_path / "run", validation=0)
 
 
 @pytest.mark.slow
@@ -415,13 +389,3 @@ def test_another_folder_of_meshes_is_refused_at_once_and_does_no_harm(meshes: Pa
     run(meshes, tmp_path / "run", resume=True)
     run(meshes, tmp_path / "whole")
     assert weights(tmp_path / "run") == weights(tmp_path / "whole")
-
-
-def test_a_mesh_that_cannot_be_read_in_mid_run_is_told_and_tried_again(meshes: Path, tmp_path: Path) -> None:
-    said: list[str] = []
-    solids = Solids(meshes, tmp_path / "solids", said.append)
-    (meshes / "cross.ply").rename(tmp_path / "away.ply")
-    assert solids.get("cross.ply") is None
-    assert [line.partition(":")[0] for line in said] == ["cross.ply is left out this time"]
-    (tmp_path / "away.ply").rename(meshes / "cross.ply")
-    assert solids.get("cross.ply") is not None

@@ -25,6 +25,7 @@ from rlacd.policies import make_policy
 from rlacd.repair.repair import repair
 from rlacd.run import Run
 from rlacd.search.divide import Exchange, divide
+from rlacd.search.levels import search
 from rlacd.search.neighbourhood import Neighbourhood, SearchContext, cost
 from rlacd.solid.component import Component, Part, Plane, reunite
 from tests.hulls import assert_same_hulls
@@ -87,15 +88,24 @@ def test_the_state_of_a_search_is_always_feasible() -> None:
     with Run(1) as run:
         parts = first_pass(root, run)
         state = Neighbourhood(SearchContext(root, CRITERION), parts, run)
-        last = cost(parts)
         for steps in range(3, 15, 3):
             state.improve(steps)
-            assert cost(state.parts) <= last
-            last = cost(state.parts)
             assert all(CRITERION.is_met(part) for part in state.parts)
             assert sum(own.volume for part in state.parts for own in part.members) == pytest.approx(
                 root.volume, rel=1e-6
             )
+
+
+def test_a_search_is_never_worse_than_its_start_and_one_of_more_steps_than_one_of_fewer() -> None:
+    root = Component(crossed())
+    with Run(1) as run:
+        parts = before = first_pass(root, run)
+        for steps in (0, 4, 12):
+            states, account = search(SearchContext(root, CRITERION, seed=3), parts, run, "best", steps=steps)
+            assert cost(states[-1]) <= cost(before)
+            before = states[-1]
+            assert account.parts == len(before) <= account.first_pass == len(parts)
+            assert account.steps <= steps
 
 
 def check(exchange: Exchange, part: Part, around: Sequence[Part], criterion: Criterion) -> None:

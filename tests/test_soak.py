@@ -17,13 +17,12 @@ import trimesh
 import fuzz.light
 from fuzz.cases import case_of, file_of, minimised, try_case
 from fuzz.faults import Fault, Run, complaints, left_behind
-from fuzz.light import LightTrials, WarmTrials, wrong_in
+from fuzz.light import LightTrials, WarmTrials
 from fuzz.mutations import Seed
 from fuzz.recipes import Shape
 from fuzz.seeds import seeds_from
 from fuzz.soak import totals
 from fuzz.trials import Laboratory, Trial
-from rlacd.solid.input_mesh import InputMesh
 
 CASES = sorted((Path(__file__).parent / "cases").glob("*.json"))
 
@@ -124,19 +123,6 @@ def test_a_file_is_read_or_refused_for_a_reason(light: LightTrials) -> None:
     assert f"| read | {ends.total()} | 0 | {ends['loaded']} | {ends['refused']} |" in totals(rows)
 
 
-def test_limits_and_dense_shapes_are_among_the_draws(light: LightTrials) -> None:
-    dense, options = light.shape(fuzz.light.DENSE)
-    assert len(dense.faces) > 10_000
-    assert is_limited(options)
-    balls = [light.shape(fuzz.light.BALLS * number) for number in range(1, 20)]
-    assert sum(is_limited(options) for _, options in balls) > 10
-    assert all(len(shape.faces) < 2000 for shape, _ in balls)
-
-
-def is_limited(options: dict[str, object]) -> bool:
-    return bool({"max_vertices", "max_faces", "max_hulls", "preset"} & {*options})
-
-
 def test_a_small_shape_is_decomposed_and_judged(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:
     number = first_of(light, "small")
     trial = light.trial(number)
@@ -167,16 +153,6 @@ def test_what_is_no_sentence_or_opens_another_file_is_a_failure(
     trial = light.reread(Trial(0, 0, "read"), "obj", Seed(b"v 0 0 0"))
     assert trial.end == end
     assert (f"it opened '{opened}'" in trial.said) == bool(opened)
-
-
-def test_a_mesh_that_is_none_is_seen() -> None:
-    points, face = np.zeros((3, 3)), np.array([[0, 1, 2]])
-    good = InputMesh(points, face, "m", ())
-    assert wrong_in(good) == []
-    assert wrong_in(replace(good, vertices=points + np.nan))
-    assert wrong_in(replace(good, faces=face + 1))
-    assert wrong_in(replace(good, faces=face.astype(np.int32)))
-    assert wrong_in(replace(good, node_of=np.array([0])))
 
 
 def test_a_failure_is_made_small(light: LightTrials, monkeypatch: pytest.MonkeyPatch) -> None:

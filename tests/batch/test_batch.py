@@ -145,7 +145,6 @@ def test_no_name_stops_a_batch_and_no_file_of_others_is_replaced(tmp_path: Path)
 
 URDF = """<robot name="r"><link name="l"><collision><geometry><mesh filename="meshes/l.obj"/></geometry></collision>
 </link></robot>"""
-WEIGHT = "<inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial>"
 MJCF = """<mujoco><asset><mesh name="m" file="meshes/l.obj"/></asset>
 <worldbody><body><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
 

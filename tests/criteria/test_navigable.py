@@ -157,21 +157,6 @@ def test_a_door_lets_in_what_is_narrower(turn: int, wall: float, share: float) -
     assert inside_house(nav, home, turn).any() == (share > 1)
 
 
-@pytest.mark.parametrize("turn", range(2))
-@pytest.mark.parametrize("share", [0.97, 1.03])
-def test_a_winding_passage_is_followed(turn: int, share: float) -> None:
-    """Three legs at right angles through a thick wall, hardly wider than the ball."""
-    half = share * 0.1
-    legs = [
-        box((0.6, -half, -half), (0.9 + half, half, half)),
-        box((0.9 - half, -half, -half), (0.9 + half, 0.4 + half, half)),
-        box((0.9 - half, 0.4 - half, -half), (2, 0.4 + half, half)),
-    ]
-    home = turned(house(None, 0.6) - manifold3d.Manifold.batch_boolean(legs, manifold3d.OpType.Add), turn)
-    nav = Navigable.of(NavigableSpace(radius_abs=0.1, tolerance_abs=0.01), solid_of(home))
-    assert inside_house(nav, home, turn).any() == (share > 1)
-
-
 def test_a_sealed_house_is_one_part_and_its_inside_counts_when_asked_for() -> None:
     home = house(None)
     shut = prepare(home)
@@ -252,12 +237,6 @@ def test_what_no_ball_is_near_is_one_hull(solid: Any, radius: float, says: str) 
     assert says in "".join(nav.warnings)
     assert bool(nav.warnings) == bool(says)
     assert nav.is_met(Component(solid_of(solid).manifold))
-
-
-def test_a_radius_too_small_for_the_grid_is_reported() -> None:
-    nav = prepare(box((-1, -0.2, -0.2), (1, 0.2, 0.2)) - box((-0.5, -0.1, 0), (0.5, 0.1, 1)), 0.004, 0.004)
-    assert len(nav.balls) > 0
-    assert any("is small" in warning for warning in nav.warnings)
 
 
 def test_what_was_open_is_reported() -> None:

@@ -1,10 +1,9 @@
-"""The report: one file that holds everything, fetches nothing, and cannot be taken over by a mesh's name."""
+"""The report: one file that holds everything and fetches nothing; its heat map agrees with the certified distance."""
 
 from __future__ import annotations
 
 import base64
 import gzip
-import itertools
 import json
 import re
 import sys
@@ -23,7 +22,7 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
 from rlacd.plain_json import to_json
 from rlacd.report import Hausdorff
-from rlacd.viewer.page import MODULES
+from rlacd.viewer.heat import FINEST, INNER, HeatMesh, frame_of, heat_map
 from rlacd.viewer.report import report_page, save_report_page
 from rlacd.viewer.scene import scene
 from tests.hulls import hull_of
@@ -72,14 +71,6 @@ def test_the_scene_lies_about_the_origin_and_knows_its_up(result: Decomposition)
         assert corners.min(axis=0) == pytest.approx([-1.0, -0.2, -0.5], abs=1e-6)
 
 
-def test_hulls_that_touch_have_other_colours() -> None:
-    places = np.array(list(itertools.product(range(3), repeat=3)), dtype=float)
-    boxes = [hull_of(trimesh.creation.box().vertices + place) for place in places]
-    colors = [part["color"] for part in scene(Decomposition.of(boxes, trimesh.util.concatenate(boxes)), "z")["parts"]]
-    for (here, one), (there, other) in itertools.combinations(zip(places, colors, strict=True), 2):
-        assert one != other or np.abs(here - there).max() > 1
-
-
 @pytest.mark.promise("no-network")
 def test_nothing_is_fetched(result: Decomposition) -> None:
     page = html.fromstring(report_page(result, picture=False))
@@ -88,15 +79,6 @@ def test_nothing_is_fetched(result: Decomposition) -> None:
     assert "connect-src 'none'" in policy
     assert "http" not in policy
     assert all(address.startswith("data:") for address in page.xpath("//@src | //@href | //@action"))
-
-
-def test_every_script_is_inside(result: Decomposition) -> None:
-    page = html.fromstring(report_page(result, picture=False))
-    (table,), (main,) = (page.xpath(f"//script[@type='{kind}']/text()") for kind in ("importmap", "module"))
-    imports = json.loads(table)["imports"]
-    scripts = [base64.b64decode(address.split(",")[1]).decode() for address in imports.values()]
-    wanted = {name for text in [*scripts, main] for name in re.findall(r'from "(.*?)"', text)}
-    assert wanted == set(imports) == {f"page/{name}" for name in MODULES}
 
 
 @pytest.mark.parametrize(
@@ -171,3 +153,53 @@ def test_a_report_as_json_is_what_the_result_says(result: rlacd.Decomposition, t
     for name in ("a.json", "b.JSON"):
         written = json.loads(result.save_report(tmp_path / name).read_text(encoding="utf-8"))
         assert written == json.loads(json.dumps(result.report.as_dict()))
+
+
+# --- the heat map -----------------------------------------------------------------------------------------------------
+
+
+MEASURED_WITHIN = 2e-3  # width of the interval that the report's distance comes from
+
+
+def box(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> trimesh.Trimesh:
+    return trimesh.creation.box(bounds=[lower, upper])
+
+
+def hottest(heat: list[HeatMesh]) -> float:
+    return max(float(part.distance.max()) for part in heat)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("threshold", [0.05, 0.3, 2.0])
+@pytest.mark.parametrize("place", [(0.0, 1.0), (1e5, 1e-2), (-3.0, 1e4)])
+def test_the_hottest_spot_is_as_far_as_the_report_says(threshold: float, place: tuple[float, float]) -> None:
+    mesh = elbow()
+    mesh.apply_scale(place[1])
+    mesh.apply_translation([place[0], 0, -place[0]])
+    result = rlacd.decompose(mesh, threshold=threshold)
+    over = result.report.hausdorff.added
+    # Distance is 1-Lipschitz: the farthest point of a triangle lies within an edge of a corner.
+    assert over - FINEST - MEASURED_WITHIN <= hottest(heat_map(result)) <= over + MEASURED_WITHIN
+
+
+def test_one_hull_of_an_elbow_is_hot_where_it_bridges_the_corner() -> None:
+    mesh = elbow()
+    result = rlacd.decompose(mesh, threshold=2.0, detail="full")
+    (part,) = heat_map(result)
+    frame = frame_of(result)
+    # The bridge runs from the tip (2, ., 0.4) to (0.4, ., 2); its middle, (1.2, ., 1.2), is 0.8 away from either beam.
+    middle = frame.to_frame([[1.2, 0.2, 1.2]])[0]
+    nearest = np.linalg.norm(part.vertices - middle, axis=1).argmin()
+    assert part.distance[nearest] == pytest.approx(0.8 * frame.scale, abs=2 * FINEST)
+    ground = part.vertices[:, 2] < frame.to_frame([[0, 0, 1e-9]])[0, 2]
+    assert part.distance[ground].max() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_perfect_fit_is_cold_and_inner_walls_are_marked() -> None:
+    halves = [box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (2, 1, 1))]
+    result = Decomposition.of([hull_of(half.vertices) for half in halves], box((0, 0, 0), (2, 1, 1)))
+    for part in heat_map(result):
+        wall = np.isclose(part.vertices[:, 0], 0.0)
+        assert wall.any()
+        assert (part.distance[wall] == INNER).all()
+        assert np.abs(part.distance[~wall]).max() < 1e-12

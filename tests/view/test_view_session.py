@@ -121,15 +121,6 @@ def test_an_error_is_reported_and_what_there_was_stays(
     until(session, "idle", run=2, error=False)
 
 
-def test_quiet_is_reported_and_closing_releases_every_waiter(work: Work) -> None:
-    session = Session(work)
-    changes = session.changes(patience=0.01)
-    assert next(changes) == SessionState()
-    assert next(changes) is None
-    session.close()
-    assert [state.state for state in changes if state is not None] == ["closed"]
-
-
 def test_a_draft_is_shown_until_better_hulls_come(session: Session, work: Work) -> None:
     session.decompose({"quality": "fast"}, {"quality": "best"})
     work.go_on(3)
