@@ -1,7 +1,8 @@
-"""`rlacd batch` over Ray: a real cluster of two nodes on this machine, one of which is killed."""
+"""The pool and `rlacd batch` over Ray: a real cluster of two nodes on this machine, one of which is killed."""
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -13,10 +14,11 @@ import pytest
 
 from rlacd.batch import Batch, JobSpec
 from rlacd.errors import OptionError
-from rlacd.pool import ProcessLimits
+from rlacd.pool import ProcessLimits, Shared, WorkerDiedError
 from rlacd.pool.local import LocalPool
 from tests.batch.test_batch import TIMES, rows
 from tests.batch.trouble import make_trouble, tree, write_ell
+from tests.pool.test_pool import ask
 
 ray = pytest.importorskip("ray", reason="the extra fleet is not installed")
 
@@ -48,6 +50,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         patience = {"RAY_worker_register_timeout_seconds": "300"}  # a machine may be busy
         for name, value in {**trouble, **patience, "TROUBLE_SLOW": "2"}.items():
             patch.setenv(name, value)
+        patch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]), prepend=os.pathsep)
         cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
         ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
         yield cluster
@@ -62,6 +65,23 @@ def _dies(node: Any) -> bool:
             return True
         time.sleep(0.5)
     return False
+
+
+@pytest.mark.slow
+def test_requests_over_ray_are_as_those_here(cluster: Cluster) -> None:
+    shared = {"network": Shared({"weights": b"1234"})}
+    with RayPool("auto") as pool:
+        assert pool.room == 2
+        asked = [pool.submit(ask(number=n, blobs={"a": b"x" * n}, shared=shared)) for n in range(6)]
+        for number, answer in enumerate(future.result() for future in asked):
+            assert (answer.values["echo"]["number"], answer.blobs["a"]) == (number, b"x" * number)
+            assert answer.values["shared"] == {"network": {"weights": 4}}
+        with pytest.raises(WorkerDiedError) as died:
+            pool.submit(ask("die", tries=2)).result()
+        assert (died.value.reason, died.value.last_words) == ("its process died of SIGKILL", "last words")
+        with pytest.raises(OptionError, match="that is too much; ask for less"):
+            pool.submit(ask("refuse")).result()
+    assert ray.is_initialized(), "a cluster that somebody else started goes on"
 
 
 @pytest.mark.nightly
