@@ -144,6 +144,10 @@ def test_a_random_shortlist_of_all_planes_is_greedy_and_seeds_draw_different_one
         planes = [RandomShortlist(150, reflex_edges=edges).choose(root), make_policy(greedy).choose(root)]
         sums = [sum(side.hull.volume for side in root.cut(plane) if side is not None) for plane in planes]
         assert sums[0] == pytest.approx(sums[1], rel=1e-9)
+    policy = make_policy("random-10+edges")
+    first = policy.choose(root)
+    policy.choose(root.cut(first)[0])
+    assert policy.choose(rlacd.Component((root.vertices, root.faces))) == first, "whatever was cut before"
     assert len({RandomShortlist(1, reflex_edges=0, seed=seed).choose(root) for seed in range(8)}) > 1
 
 

@@ -181,6 +181,22 @@ def test_meshes_of_a_rigid_body_become_one_solid_where_they_collide_alike(tmp_pa
     assert mass == pytest.approx(3 * TABLE_VOLUME * np.prod(SCALE) * 0.01**3 * 1000, rel=1e-5)
 
 
+def test_a_hollow_mesh_keeps_its_mass(tmp_path: Path) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "in.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    outer, inner = (trimesh.creation.box((side,) * 3) for side in (2, 1.9))
+    inner.invert()
+    hollow = trimesh.util.concatenate([outer, inner])
+    prim = add_mesh(stage, "/box", hollow.vertices, hollow.faces).GetPrim()
+    UsdPhysics.RigidBodyAPI.Apply(prim)
+    UsdPhysics.CollisionAPI.Apply(prim)
+    stage.Save()
+    done = rlacd.rewrite_robot(tmp_path / "in.usda", tmp_path / "out.usda", threads=1)
+    mass = UsdPhysics.MassAPI(Usd.Stage.Open(str(done.path)).GetPrimAtPath("/box")).GetMassAttr().Get()
+    assert mass == pytest.approx(1000 * hollow.volume, rel=1e-5)
+    assert any("1 closed cavity" in warning for warning in done.warnings)
+
+
 def test_instances_that_collide_are_opened_and_each_gets_the_hulls(tmp_path: Path) -> None:
     write_stage(tmp_path / "part.usda")
     stage = Usd.Stage.CreateNew(str(tmp_path / "scene.usda"))
