@@ -100,7 +100,7 @@ def test_a_search_is_never_worse_than_its_start_and_one_of_more_steps_than_one_o
     root = Component(crossed())
     with Run(1) as run:
         parts = before = first_pass(root, run)
-        for steps in (0, 4, 12):
+        for steps in (0, 6, 20):
             states, account = search(SearchContext(root, CRITERION, seed=3), parts, run, "best", steps=steps)
             assert cost(states[-1]) <= cost(before)
             before = states[-1]

@@ -21,7 +21,9 @@ from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.extras.limit import few_enough
 from rlacd.finish.finish import limit_part
+from rlacd.merge.unite import united_in_turn
 from rlacd.options.presets import HullLimits
+from rlacd.run import Run, Work
 from rlacd.solid.component import Component
 from rlacd.solid.hull import NO_LIMITS, Hull, limit_hull
 from tests.hulls import assert_same_hulls
@@ -250,6 +252,20 @@ def test_a_larger_number_leaves_no_decomposition_out_that_a_smaller_one_unites(
     assert all(any(one is other for other in of_more) for one in of_few)
     assert of_few[-1] is decompositions[-1]
     assert [parts for parts in decompositions if len(parts) <= few] == [parts for parts in of_few if len(parts) <= few]
+
+
+def test_parts_are_united_one_by_one_until_one_is_left_or_the_work_is_spent() -> None:
+    boxes = [Component(Manifold.cube((1, 1, 1)).translate((3 * i, 0, 0))) for i in range(5)]
+
+    def united(work: float) -> list[tuple[int, float, float]]:
+        states = united_in_turn(boxes, Concavity(0.05), Work(work), Run(1))
+        return [(len(parts), sum(part.volume for part in parts), worst) for parts, worst in states]
+
+    every = united(1e9)
+    assert [count for count, _, _ in every] == [5, 4, 3, 2, 1]
+    assert [volume for _, volume, _ in every] == pytest.approx([5] * 5)
+    assert every[0][2] < 0.05 < every[1][2] < every[-1][2]
+    assert [count for count, _, _ in united(0)] == [5]
 
 
 def test_coarser_thresholds_are_tried_where_the_finest_has_used_up_its_account(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -272,6 +272,18 @@ def test_a_file_of_somebody_else_in_the_folder_is_never_replaced(tmp_path: Path,
     assert (tmp_path / "precious").read_text() == "precious"
 
 
+def test_a_folder_is_locked_before_anything_in_it_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def there() -> dict[str, bytes]:
+        return {path.name: path.read_bytes() for path in tmp_path.glob("chair*")}
+
+    fcntl, seen = pytest.importorskip("fcntl"), []
+    save_hulls(THREE, tmp_path, stem="chair")
+    before = there()
+    monkeypatch.setattr(fcntl, "flock", lambda _, how: seen.append((how, there())))
+    save_hulls(THREE[:1], tmp_path, stem="chair")
+    assert seen == [(fcntl.LOCK_EX, before)]
+
+
 AT_ONCE = """
 import sys, pathlib, trimesh
 from tests.hulls import save_hulls
