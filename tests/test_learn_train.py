@@ -313,6 +313,18 @@ def test_when_no_process_can_play_that_is_one_clear_error(meshes: Path, tmp_path
 
 
 @pytest.mark.slow
+def test_solids_without_anything_to_cut_are_one_clear_error(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rlacd.learn.rollouts.SOLIDS_TRIED", 100)
+    for path in meshes.rglob("*.ply"):
+        if path.stem not in ("box", "broken"):
+            path.unlink()
+    with pytest.raises(TrainingError, match="none of 100 solids drawn from 1 meshes needs a cut"):
+        run(meshes, tmp_path / "run", validation=0)
+
+
+@pytest.mark.slow
 def test_a_run_ends_with_a_policy_that_decomposes_and_a_verdict(meshes: Path, tmp_path: Path) -> None:
     said: list[str] = []
     path = run(meshes, tmp_path / "run", say=said.append)

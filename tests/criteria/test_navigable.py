@@ -239,6 +239,12 @@ def test_what_no_ball_is_near_is_one_hull(solid: Any, radius: float, says: str) 
     assert nav.is_met(Component(solid_of(solid).manifold))
 
 
+def test_a_radius_too_small_for_the_grid_is_reported() -> None:
+    nav = prepare(box((-1, -0.2, -0.2), (1, 0.2, 0.2)) - box((-0.5, -0.1, 0), (0.5, 0.1, 1)), 0.004, 0.004)
+    assert len(nav.balls) > 0
+    assert any("is small" in warning for warning in nav.warnings)
+
+
 def test_what_was_open_is_reported() -> None:
     cube = trimesh.creation.box()
     cup = trimesh.Trimesh(cube.vertices, cube.faces[cube.face_normals[:, 2] < 0.5])

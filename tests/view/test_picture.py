@@ -77,6 +77,13 @@ def test_up_turns_the_picture(tmp_path: Path, usual: Path) -> None:
         assert np.abs(a - b).mean() > 2.0
 
 
+def test_a_single_point_like_hull_and_a_sheet_as_input_can_be_drawn(tmp_path: Path) -> None:
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
+    slab = hull_of(trimesh.creation.box((1.0, 1.0, 1e-6)).vertices)
+    path = Decomposition.of([slab], sheet).save_picture(tmp_path / "sheet.png", width=WIDTH)
+    assert pixels(path).min() < 200
+
+
 def test_bad_places_and_options_are_refused_before_drawing(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match=r"must end in \.png"):
         check_picture(tmp_path / "out.jpg")
