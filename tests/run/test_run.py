@@ -146,7 +146,7 @@ def grate() -> trimesh.Trimesh:
 
 @pytest.mark.parametrize(
     "shape",
-    [pytest.param(grate, marks=pytest.mark.slow), pytest.param(lambda: sponge(2), marks=pytest.mark.slow), crossing],
+    [*(pytest.param(shape, marks=pytest.mark.nightly) for shape in (grate, lambda: sponge(2))), crossing],
 )
 @pytest.mark.promise("bounded")
 def test_the_default_stays_within_its_account(shape: Callable[[], Any]) -> None:
