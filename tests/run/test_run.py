@@ -136,7 +136,7 @@ def test_an_allowance_is_part_of_the_account(most: float, units: float, prices: 
 
 
 def crossing() -> Any:
-    return screws(60, sides=6)
+    return screws(40, sides=6)
 
 
 def grate() -> trimesh.Trimesh:
