@@ -324,19 +324,19 @@ class _Decomposer:
         """
         options, run, found, states = self.problem.options, self.run, None, [parts]
         policy, root = options.first_policy, self.model.component
-        context = SearchContext(root, goal, options.seed)
+        context = SearchContext(root, goal, options.seed, run.work.done)
         assert options.quality is not None, "filled in by the options"
         most = math.inf if options.max_hulls is None else TIMES_TOO_MANY * options.max_hulls + TOO_MANY
         goes_on = options.merge and policy not in AS_PUBLISHED
-        if goes_on and run.stopped_by is None:
-            with run.stage("merge"):
-                states = [parts := self._exact(parts, goal)]
-        if run.stopped_by is not None:
-            return states, None
         with run.until_stopped():
+            if goes_on and run.stopped_by is None:
+                with run.stage("merge"):
+                    states = [parts := self._exact(parts, goal)]
+            if run.stopped_by is not None:
+                return states, None
             if options.quality == FAST or len(parts) > most or self.problem.solid.is_apart:
                 if goes_on:
-                    with run.stage("merge"), run.limited(run.work.done):
+                    with run.stage("merge"), run.limited(context.first_pass):
                         states = [parts := grow_cover(parts, goal, run)]
                 if goes_on and goal.eliminates and run.stopped_by is None:
                     with run.stage("search"):

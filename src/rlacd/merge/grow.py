@@ -16,7 +16,7 @@ from rlacd import _native
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.unite import merge_parts
 from rlacd.run import Run, work
-from rlacd.solid.arrays import BoolArray, FloatArray, heights
+from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, heights
 from rlacd.solid.component import DENSE, Component, Part, Plane, is_thin
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
@@ -97,7 +97,7 @@ def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[in
     volumes = np.repeat(
         [piece.volume / len(some) for some, piece in zip(points, pieces, strict=True)], [*map(len, points)]
     )
-    held = [np.flatnonzero(_heights(np.concatenate(points), spaces).max(axis=1) <= TOLERANCE) for spaces in grown]
+    held = [_held(np.concatenate(points), spaces) for spaces in grown]
     gains = np.array([volumes[own].sum() for own in held])
     chosen = list[int]()
     while gains.max() > 0:
@@ -108,6 +108,14 @@ def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[in
             gains = np.array([volumes[own].sum() if old > 0 else 0.0 for own, old in zip(held, gains, strict=True)])
         gains[best] = 0
     return chosen
+
+
+def _held(points: FloatArray, spaces: FloatArray) -> IntArray:
+    """Numbers of the points [N, 3] in all half-spaces [P, 4]; few of them are left after the first planes."""
+    held = np.arange(len(points))
+    for space in spaces:
+        held = held[_heights(points[held], space[None])[:, 0] <= TOLERANCE]
+    return held
 
 
 def _taken(

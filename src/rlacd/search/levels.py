@@ -65,7 +65,6 @@ def search(
     parts : sequence of Part
         A decomposition of the solid.
     run : Run
-        The work it has done so far counts as the first pass.
     quality : "balanced" or "best"
     seconds : float, optional
         Wall time of the search, in place of that bound.
@@ -79,13 +78,13 @@ def search(
         seed and the steps, and on time only if `seconds` or the run ends the search.
     summary : SearchSummary
     """
-    begin, first_pass = time.perf_counter(), run.work.done
+    begin, done = time.perf_counter(), run.work.done
     allowed, bounded = math.inf, seconds is None and steps is None
     if seconds is None:
-        allowed = min(max(TIMES_FIRST_PASS * first_pass, LEAST_WORK), MOST_WORK)
+        allowed = min(max(TIMES_FIRST_PASS * context.first_pass, LEAST_WORK), MOST_WORK)
         if steps is not None:
-            allowed = TIMES_FIRST_PASS * first_pass + MOST_WORK + WORK_OF_A_STEP * steps
-    state = _Search(context, list(parts), run, first_pass)
+            allowed = TIMES_FIRST_PASS * context.first_pass + MOST_WORK + WORK_OF_A_STEP * steps
+    state = _Search(context, list(parts), run)
     most = math.inf if steps is None else steps
     with run.limited(allowed, math.inf if seconds is None else seconds):
         state.go_on(most)
@@ -102,7 +101,7 @@ def search(
         starts=state.starts,
         steps=state.steps,
         accepted=state.accepted,
-        work=run.work.done - first_pass,
+        work=run.work.done - done,
         allowed=None if math.isinf(allowed) else math.floor(allowed),
         lower_bound=context.enough(),
     )
@@ -130,8 +129,6 @@ class _Search:
     parts : list of Part
         The first start.
     run : Run
-    first_pass : int
-        The work of the first pass.
 
     Attributes
     ----------
@@ -143,13 +140,12 @@ class _Search:
         Starts searched from, trials made and trials accepted.
     """
 
-    def __init__(self, context: SearchContext, parts: list[Part], run: Run, first_pass: int) -> None:
+    def __init__(self, context: SearchContext, parts: list[Part], run: Run) -> None:
         self.early = self.best = parts
         self.gained = 0.0
         self.starts = self.steps = self.accepted = 0
         self._context = context
         self._run = run
-        self._first_pass = first_pass
         self._most = HOPELESS * len(parts)
         self._passes = 1
         self._state: Neighbourhood | None = None
@@ -192,7 +188,7 @@ class _Search:
     def _improve(self, state: Neighbourhood, most: float) -> None:
         """Search from a start until it saves nothing any more."""
         steps, accepted = state.steps, state.accepted
-        state.improve(most - self.steps + steps, PATIENCE * self._first_pass)
+        state.improve(most - self.steps + steps, PATIENCE * self._context.first_pass)
         self.steps += state.steps - steps
         self.accepted += state.accepted - accepted
         self._note(state)
@@ -206,7 +202,7 @@ class _Search:
     def _begun(self, parts: list[Part]) -> Neighbourhood:
         """Offer each part of a start to those around."""
         run, context = self._run, self._context
-        with run.limited(self._first_pass):
+        with run.limited(self._context.first_pass):
             parts = grow_cover(parts, context.criterion, run)
         if self._state is None:
             self.early = parts
@@ -219,13 +215,13 @@ class _Search:
 
     def _begin_pass(self) -> None:
         """Begin the next pass beside what goes on, if enough work is left for both."""
-        most = ANOTHER_PASS * self._first_pass
+        most = ANOTHER_PASS * self._context.first_pass
         if not self._next and self._run.work.left >= 2 * most:
             self._next = [self._run.apart(partial(self._pass, self._passes), most)]
 
     def _another_pass(self) -> list[Part] | None:
         """The parts of the next pass; None if it takes too much work."""
-        run, most = self._run, ANOTHER_PASS * self._first_pass
+        run, most = self._run, ANOTHER_PASS * self._context.first_pass
         if run.work.left < most:
             return None
         other = self._next.pop() if self._next else run.apart(partial(self._pass, self._passes), most)

@@ -39,6 +39,8 @@ class SearchContext:
     criterion : Criterion
         Every new part meets it.
     seed : int
+    first_pass : int
+        The work of cutting and merging, which bounds that of the search.
     enough : callable
         Returns a lower bound on the number of parts, at which the search ends; may wait for it.
     """
@@ -46,6 +48,7 @@ class SearchContext:
     root: Component
     criterion: Criterion
     seed: int = 0
+    first_pass: int = 0
     enough: Callable[[], int] = lambda: 1
 
 
