@@ -37,7 +37,7 @@ from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.provenance import owners
-from rlacd.solid.topology import used_points
+from rlacd.solid.topology import compacted
 from rlacd.solid.twins import Similarity, twins
 
 MeshLike: TypeAlias = (
@@ -187,7 +187,7 @@ def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> R
 
 def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
     """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
-    frame = Frame.of(used_points(source.vertices, source.faces), source.unit)
+    frame = Frame.of(compacted(source.vertices, source.faces)[0], source.unit)
     scale = frame.scale
     assert source.node_of is not None
     used = np.unique(source.node_of).tolist()

@@ -21,6 +21,7 @@ from rlacd.extras.finish.overlap import overlap_parts
 from rlacd.options import Options
 from rlacd.report import Overlap
 from rlacd.solid.component import Component, Plane
+from rlacd.solid.frame import Frame
 from tests.hulls import assert_convex_hull
 from tests.shapes import trimesh_of
 
@@ -102,6 +103,9 @@ def test_the_threshold_holds_and_each_hull_contains_its_own() -> None:
     assert sum(hull.volume for hull in result) > sum(hull.volume for hull in flush)
 
 
+FRAME = Frame(np.zeros(3), 1.0)
+
+
 def halves(height: float = 1.0) -> tuple[Component, list[Component]]:
     """A box two units wide, cut in its middle."""
     box = Component(Manifold.cube((2.0, 1.0, height), center=True))
@@ -112,8 +116,8 @@ def halves(height: float = 1.0) -> tuple[Component, list[Component]]:
 @pytest.mark.parametrize("overlap", [0.001, 0.02, 0.3])
 def test_two_halves_of_a_box_overlap_by_exactly_that_much(overlap: float) -> None:
     box, parts = halves()
-    grown, seams = overlap_parts(parts, box, Concavity(0.05), overlap)
-    assert (seams.count, seams.short) == (1, ())
+    grown, seams = overlap_parts(parts, box, Concavity(0.05), overlap, FRAME)
+    assert (seams.seams, seams.short) == (1, 0)
     reach = grown[0].hull.box[1, 0] - grown[1].hull.box[0, 0]
     assert reach == pytest.approx(overlap, abs=1e-9)
     assert sum(part.hull.volume for part in grown) == pytest.approx(2.0 + overlap, abs=1e-9)
@@ -124,8 +128,9 @@ def test_parts_that_do_not_touch_or_share_only_an_edge_stay_as_they_are() -> Non
     for apart in ((1.5, 0.0, 0.0), (1.0, 1.0, 0.0)):
         second = first.translate(apart)
         parts = [Component(first), Component(second)]
-        grown, seams = overlap_parts(parts, Component(first + second.translate((1e-3, 0, 0))), Concavity(0.05), 0.1)
-        assert seams.count == 0
+        whole = Component(first + second.translate((1e-3, 0, 0)))
+        grown, seams = overlap_parts(parts, whole, Concavity(0.05), 0.1, FRAME)
+        assert seams.seams == 0
         assert all(before is after for before, after in zip(parts, grown, strict=True))
 
 

@@ -14,7 +14,7 @@ from fuzz.geometry import Polytope, distance_to_union
 from rlacd import _native
 from rlacd.errors import OptionError
 from rlacd.options import Options
-from rlacd.solid.passages import Density, passage_balls
+from rlacd.solid.passages import passage_balls
 from tests.shapes import Closed, Floats, box, from_manifold, point_to_triangles, trimesh_of
 
 
@@ -79,7 +79,7 @@ HOLES = [(0.3, -0.5, 0.0), (0.12, 0.3, 0.3), (0.06, 0.7, -0.3)]
 def found_in(solid: Manifold, least: float = 0.01) -> tuple[Closed, Floats, Floats]:
     closed = from_manifold(solid)
     surface = _native.Surface(closed.vertices, closed.faces)
-    balls = passage_balls((closed.vertices, closed.faces), surface, (least, 1.0), Density(2000, 0.25), 1)
+    balls = passage_balls((closed.vertices, closed.faces), surface, (least, 1.0), 2000, 0.25, 1)
     return closed, balls.centres, balls.radii
 
 

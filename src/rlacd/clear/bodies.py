@@ -17,7 +17,7 @@ from rlacd.errors import RlacdError, import_extra
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray, dots
 from rlacd.solid.hull import Hull
 from rlacd.solid.poses import moved
-from rlacd.solid.topology import used_points
+from rlacd.solid.topology import compacted
 
 MOST_NEAR = 4_000_000
 """Pairs of boxes that come near each other along the x axis, over all samples; robots of a hundred links have fewer."""
@@ -51,7 +51,7 @@ class Surface:
     @cached_property
     def used(self) -> FloatArray:
         """The corners of its triangles; without any, all points."""
-        return used_points(self.vertices, self.faces) if len(self.faces) else self.vertices
+        return compacted(self.vertices, self.faces)[0]
 
     @cached_property
     def box(self) -> FloatArray:

@@ -115,7 +115,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
 
     mesh = load_mesh(path)
     solid = repair(mesh)
-    used = compacted(mesh.vertices, mesh.faces)[0] if len(mesh.faces) else mesh.vertices
+    used = compacted(mesh.vertices, mesh.faces)[0]
     return {
         "file": os.fspath(path),
         "name": mesh.name,

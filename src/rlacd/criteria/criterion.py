@@ -55,7 +55,7 @@ class Criterion(Protocol):
 
     def credit(self, part: Part) -> float:
         """Volume credited to a part; a pair costs |CH| - the credits of both, and the cheapest merges first."""
-        return part.piece_hulls
+        return sum(piece.hull.volume for piece in part.members) if part.members else part.hull.volume
 
     def volume_error(self, volume: float, hull_volume: float) -> float:
         """The error that the volumes of a part and its hull alone give it."""

@@ -20,7 +20,7 @@ from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, keeps, limit_hull
-from rlacd.solid.passages import Density, passage_balls
+from rlacd.solid.passages import passage_balls
 from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.resting import within_reach
 from rlacd.solid.solid import Solid
@@ -50,7 +50,7 @@ def _passages(criterion: Criterion, options: Options, solid: Solid, run: Run) ->
     starts = int(np.clip(dense, FEWEST_STARTS, MOST_STARTS))
     with run.stage("space"):
         surface = _native.Surface(*solid.mesh, run.threads)
-        free = passage_balls(solid.mesh, surface, (least, most), Density(starts, SPACING), run.threads)
+        free = passage_balls(solid.mesh, surface, (least, most), starts, SPACING, run.threads)
     return free, Balls(free.centres, np.minimum(share * free.radii + ball, free.radii))
 
 

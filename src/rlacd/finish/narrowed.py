@@ -18,7 +18,7 @@ from rlacd.solid.arrays import BoolArray, FloatArray, dots
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.hull import Hull
-from rlacd.solid.passages import FACES, Density, passage_balls
+from rlacd.solid.passages import FACES, passage_balls
 from rlacd.solid.primitive import Balls
 
 NARROWEST = 8 * HALF_THICKNESS
@@ -30,7 +30,7 @@ LEAST_LOSS = 0.1
 MOSTLY = 1 / 2
 """A passage wider than the tolerance is warned of if less than this share of its radius is left."""
 
-DENSITY = Density(600, 0.5)
+STARTS, SPACING = 600, 0.5
 
 MOST_BALLS = 600
 """Most balls looked at: the wide ones that lose most come first."""
@@ -69,7 +69,7 @@ def narrowed(reached: Reached, hulls: Sequence[Hull], over: float, run: Run) -> 
     def lose(balls: Balls) -> BoolArray:
         return union.distance(balls.centres, threads) < (1 - LEAST_LOSS) * balls.radii
 
-    balls = passage_balls(solid, surface, (NARROWEST, most), DENSITY, threads, lose)
+    balls = passage_balls(solid, surface, (NARROWEST, most), STARTS, SPACING, threads, lose)
     is_every = len(solid[1]) <= FACES and len(balls) <= MOST_BALLS
     left = union.distance(balls.centres, threads)
     left = np.where(left > ROUNDING * balls.radii, left, 0.0)

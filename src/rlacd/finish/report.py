@@ -6,17 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
-from numpy.typing import ArrayLike
 
 from rlacd import _native
 from rlacd.criteria.limited import FINEST_SHARE
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
-from rlacd.fit import RESOLVED
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
@@ -24,7 +22,6 @@ from rlacd.report import (
     COVERAGE_TOLERANCE,
     Avoids,
     Hausdorff,
-    Hole,
     NodeHulls,
     Overlap,
     Point,
@@ -34,17 +31,11 @@ from rlacd.report import (
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
-from rlacd.solid.distance import Place, hull_distances, hull_union
+from rlacd.solid.distance import hull_distances, hull_union
 from rlacd.solid.frame import Frame
 from rlacd.solid.hull import Hull, is_sliver
 from rlacd.solid.mass import joint_mass, mass_of
 from rlacd.solid.solid import Solid
-
-if TYPE_CHECKING:
-    from rlacd.extras.finish.overlap import Seams
-
-NEARLY = RESOLVED
-"""No point of the input should lie farther outside the hulls than this."""
 
 MOST_HOLES = 1000
 """Most holes that a report lists."""
@@ -69,7 +60,7 @@ class _Distances(NamedTuple):
 
 
 def make_report(
-    reached: Reached, parts: Sequence[Part], hulls: Sequence[trimesh.Trimesh], seams: Seams | None, run: Run
+    reached: Reached, parts: Sequence[Part], hulls: Sequence[trimesh.Trimesh], seams: Overlap | None, run: Run
 ) -> Report:
     """Measure a finished decomposition; of the input as a whole, such as its name, it says nothing.
 
@@ -82,7 +73,7 @@ def make_report(
         The cleaned parts.
     hulls : sequence of trimesh.Trimesh
         The hulls of the parts, in the input's unit.
-    seams : Seams or None
+    seams : Overlap or None
         The seams, if hulls were to overlap.
     """
     solid, options, criterion = reached.solid, reached.options, reached.goal
@@ -110,26 +101,22 @@ def make_report(
             stopped_by=run.stopped_by,
             **sizes_of(hulls),
             primitives=_primitives(parts) if options.primitives else None,
-            overlap=None if options.overlap == 0 else seams.told(solid.frame) if seams else Overlap(),
+            overlap=None if options.overlap == 0 else seams or Overlap(),
             **summary.entries,
             avoid=entered,
-            hausdorff=_hausdorff(distances),
+            hausdorff=Hausdorff(distances.over, max(distances.under, distances.left_out.distance))
+            if distances
+            else Hausdorff(),
             passages=distances and distances.narrowed.passages,
             scale=solid.frame.scale,
             mass=mass_of(*concatenated(weighed), solid.frame),
             repair=solid.bodies,
-            holes=_holes(solid),
+            holes=solid.holes[:MOST_HOLES],
             search=reached.found,
             lower_bound=None if reached.found is None else min(reached.found.lower_bound, len(hulls)),
             warnings=tuple(warnings),
             unit=solid.frame.told_in,
         )
-
-
-def _hausdorff(distances: _Distances | None) -> Hausdorff:
-    if distances is None:
-        return Hausdorff()
-    return Hausdorff(distances.over, max(distances.under, distances.left_out.distance))
 
 
 def _why_entered(run: Run) -> str:
@@ -139,24 +126,22 @@ def _why_entered(run: Run) -> str:
     return f"parts within {FINEST_SHARE:.0%} of the threshold, and those that limits leave no way, are cut no further"
 
 
-def _holes(solid: Solid) -> tuple[Hole, ...]:
-    frame, most = solid.frame, solid.holes[:MOST_HOLES]
-    return tuple(Hole(one.body, _point(frame, one.at), one.width / frame.scale, one.is_closed) for one in most)
-
-
-def _point(frame: Frame, place: ArrayLike) -> Point:
-    x, y, z = frame.to_input(np.asarray(place)).tolist()
-    return x, y, z
-
-
 def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     """How many parts are of each kind; those that stayed hulls last."""
     kinds = [None if part.hull.primitive is None else part.hull.primitive.kind for part in parts]
     return {kind: kinds.count(kind) for kind in PRIMITIVE_KINDS} | {"hull": kinds.count(None)}
 
 
-def _shallow(seams: Seams | None, overlap: str) -> list[str]:
-    return ["There was no time to make hulls overlap."] if seams is None else seams.shallow(overlap)
+def _shallow(seams: Overlap | None, overlap: str) -> list[str]:
+    """What to warn of seams; `overlap` is the one asked for, in words."""
+    if seams is None:
+        return ["There was no time to make hulls overlap."]
+    if not seams.short:
+        return []
+    return [
+        f"{seams.short} of {seams.seams} seams between hulls overlap by less than {overlap}: more would break "
+        "the criterion. A smaller overlap or a larger threshold helps."
+    ]
 
 
 def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
@@ -264,7 +249,7 @@ def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
     hulls = [part.hull for part in parts]
     found = hull_distances(hulls, *solid.surface, threads=run.threads, surface=surface)
 
-    def place(point: Place) -> str:
+    def place(point: Point) -> str:
         if solid.body_of is None or len(solid.bodies) == 1:
             return solid.frame.place(point)
         _, (face,) = surface.closest(np.array([point]))

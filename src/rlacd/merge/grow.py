@@ -11,12 +11,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion
 from rlacd.merge.unite import merge_parts
 from rlacd.run import Run, work
-from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, heights
+from rlacd.solid.arrays import BoolArray, FloatArray, heights
 from rlacd.solid.component import DENSE, Component, Part, Plane, is_thin
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
@@ -110,7 +111,7 @@ def _chosen(pieces: Sequence[Component], grown: Sequence[FloatArray]) -> list[in
     return chosen
 
 
-def _held(points: FloatArray, spaces: FloatArray) -> IntArray:
+def _held(points: FloatArray, spaces: FloatArray) -> NDArray[np.intp]:
     """Numbers of the points [N, 3] in all half-spaces [P, 4]; few of them are left after the first planes."""
     held = np.arange(len(points))
     for space in spaces:

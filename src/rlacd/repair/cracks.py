@@ -53,8 +53,6 @@ def weld_free_vertices(vertices: FloatArray, faces: Int64Array, ends: Int64Array
     represented by its first vertex.
     """
     counts, near = points_within(vertices[ends], vertices[ends], np.full(len(ends), tolerance))
-    if len(near) == len(ends):  # each is near itself only
-        return faces
     _, label = components(len(ends), np.repeat(np.arange(len(ends)), counts), near.astype(np.int64))
     _, first = np.unique(label, return_index=True)
     target = np.arange(len(vertices))
@@ -74,8 +72,6 @@ def split_at_free_vertices(vertices: FloatArray, faces: Int64Array, tolerance: f
     face, corner = np.divmod(halfedge[np.unique(halfedge // 3, return_index=True)[1]], 3)
     a, b, c = (faces[face, (corner + i) % 3] for i in range(3))
     edge, vertex = _on_edges(vertices, np.stack([a, b, c], axis=1), np.unique(edges.vertices[is_free]), tolerance)
-    if len(edge) == 0:
-        return faces, np.arange(len(faces))
     split = np.unique(edge)
     # The corners along each split edge: a, the inserted vertices, b; every consecutive pair forms a face with c.
     chain_edge = np.concatenate([split, edge, split])
@@ -84,9 +80,7 @@ def split_at_free_vertices(vertices: FloatArray, faces: Int64Array, tolerance: f
     pair = np.flatnonzero(chain_edge[1:] == chain_edge[:-1])
     pieces = np.stack([chain_vertex[pair], chain_vertex[pair + 1], c[chain_edge[pair]]], axis=1)
     whole = np.delete(np.arange(len(faces)), face[split])
-    new = np.concatenate([faces[whole], pieces])
-    good = nondegenerate(new)
-    return new[good], np.concatenate([whole, face[chain_edge[pair]]])[good]
+    return np.concatenate([faces[whole], pieces]), np.concatenate([whole, face[chain_edge[pair]]])
 
 
 def _on_edges(

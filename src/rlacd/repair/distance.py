@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 
 from rlacd import _native
-from rlacd._native import Surface, poll_stop
+from rlacd._native import Surface, face_areas, poll_stop, spread_points
 from rlacd.repair.soup import face_normals
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
-from rlacd.solid.component import DENSE
+from rlacd.solid.component import DENSE, THIN
 from rlacd.solid.distance import PLACES
-from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.topology import first_of_doubled
 
 MOST_POINTS = 160_000
@@ -23,35 +21,30 @@ MOST_POINTS = 160_000
 class SurfaceQuery:
     """Nearest points and winding numbers of a triangle soup.
 
-    Built on first use: most inputs never need it.
+    Attributes
+    ----------
+    index : Surface
+        What answers, ready for other queries.
     """
 
     def __init__(self, vertices: FloatArray, faces: Int64Array, threads: int | None = None) -> None:
         self.vertices = vertices
         self.faces = faces
         self.threads = threads
-
-    @cached_property
-    def _surface(self) -> Surface:
-        return Surface(self.vertices, self.faces.astype(np.int32), self.threads or 0)
-
-    @property
-    def index(self) -> Surface | None:
-        """The index that answered the queries so far; None before the first."""
-        return self.__dict__.get("_surface")
+        self.index = Surface(vertices, faces.astype(np.int32), threads or 0)
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Return the distance ``[N]`` of each point to the faces."""
-        return self._surface.distance(points, threads=self.threads or 0)
+        return self.index.distance(points, threads=self.threads or 0)
 
     def closest(self, points: FloatArray) -> tuple[FloatArray, Int64Array]:
         """Return the closest point ``[N, 3]`` of the faces and the face ``[N]`` it lies on."""
-        found, face = self._surface.closest(points, threads=self.threads or 0)
+        found, face = self.index.closest(points, threads=self.threads or 0)
         return found, face.astype(np.int64)
 
     def winding(self, points: FloatArray, *, is_closed: bool = False) -> FloatArray:
         """Return ``[N]`` how many times the faces wind around each point: a whole number if they are closed."""
-        return self._surface.winding(points, threads=self.threads or 0, is_closed=is_closed)
+        return self.index.winding(points, threads=self.threads or 0, is_closed=is_closed)
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Return ``[N]`` whether the faces, a closed outward surface, wind around each point."""
@@ -74,18 +67,9 @@ def points_covering(vertices: FloatArray, faces: Int64Array, spacing: float) -> 
     return np.concatenate([vertices[shared], points]), np.concatenate([first[shared], large[on]])
 
 
-def spread_points(vertices: FloatArray, faces: Int64Array, spacing: float) -> tuple[FloatArray, Int64Array]:
-    """Lay a grid over every face so that no point of a face is farther than `spacing` from a grid point.
-
-    Returns the points ``[N, 3]``, corners included, and the face ``[N]`` each lies on.
-    """
-    points, face = _native.spread_points(vertices, faces, spacing)
-    return points, face.astype(np.int64)
-
-
-def affordable(spacing: float, area: float) -> float:
-    """Widen a spacing of points on an area so that there are no more than about `MOST_POINTS`."""
-    return max(spacing, math.sqrt(area / MOST_POINTS))
+def affordable(spacing: float, vertices: FloatArray, faces: Int64Array) -> float:
+    """Widen a spacing of points on faces so that there are no more than about `MOST_POINTS`."""
+    return max(spacing, math.sqrt(float(face_areas(vertices, faces).sum()) / MOST_POINTS))
 
 
 def shared_faces(
@@ -98,9 +82,6 @@ def shared_faces(
     is_alone = first_of_doubled(both, len(places)) & first_of_doubled(both[::-1], len(places))[::-1]
     return ~is_alone[: len(faces)], ~is_alone[len(faces) :]
 
-
-BESIDE = HALF_THICKNESS / 5
-"""Distance from a face at which the winding number is evaluated."""
 
 TANGLED = 0.02
 """A surface with a larger share inside out is a tangle. Of 600 meshes made by people, all have up to 0.012 but for one
@@ -126,6 +107,6 @@ def tangled_bodies(solid: SurfaceQuery, vertices: FloatArray, faces: Int64Array,
 def _inside_out(solid: SurfaceQuery, count: int) -> tuple[FloatArray, BoolArray]:
     """Points ``[N, 3]`` spread evenly over a closed surface, and whether it is inside out there."""
     points, on = _native.sample_surface(solid.vertices, solid.faces.astype(np.int32), count, 0)
-    step = BESIDE * face_normals(solid.vertices, solid.faces[on].astype(np.int64))
+    step = THIN * face_normals(solid.vertices, solid.faces[on].astype(np.int64))
     beside = (solid.winding(points + way * step, is_closed=True) for way in (1, -1))
     return points, np.minimum(*beside) < 0

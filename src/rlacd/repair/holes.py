@@ -16,17 +16,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from rlacd._native import components, face_areas, long_normals, poll_stop, signed_tetrahedra
+from rlacd._native import components, face_areas, long_normals, poll_stop, signed_tetrahedra, spread_points
 from rlacd.repair.cracks import MOST_FREE_EDGES
-from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle, spread_points
+from rlacd.repair.distance import SurfaceQuery, affordable, is_tangle
 from rlacd.repair.rims import Rims, caps_of, rims_of
 from rlacd.repair.soup import FLAPS, Soup
 from rlacd.repair.state import State
+from rlacd.report import Hole
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots, length
 from rlacd.solid.frame import HALF_THICKNESS
 from rlacd.solid.hull import Hull
-from rlacd.solid.solid import Hole
-from rlacd.solid.topology import first_of_doubled, marked, used_points
+from rlacd.solid.topology import compacted, first_of_doubled, marked
 
 HOLE, HOLE_SHARE = 0.1, 0.02
 """A body is closed if its caps lead at most this far away from the surface and have at most this share of its area: a
@@ -82,7 +82,7 @@ class _Caps:
     def _depths(self) -> FloatArray:
         """Return ``[3, H]``, see the attributes."""
         gap, vertices, wanted = self._gap, self._soup.vertices, self._state.wanted
-        spacing = affordable(gap / 2, float(face_areas(vertices, self._faces).sum()))
+        spacing = affordable(gap / 2, vertices, self._faces)
         points, on = spread_points(vertices, self._faces, spacing)
         distance = self._state.surface.distance(points)
         is_reached = is_far = distance > gap
@@ -98,10 +98,8 @@ class _Caps:
     def _classify(self, lengths: Int64Array) -> None:
         """Tell holes that missing faces left from mouths, and from ends of tubes, given the lengths of their loops."""
         soup, rims, own, smooth = self._soup, self._rims, self.body, self.is_smooth
-        signed, tiny = (
-            np.where(rims.inverted, -1, 1) * signed_tetrahedra(soup.vertices, soup.faces),
-            np.finfo(float).tiny,
-        )
+        tiny = np.finfo(float).tiny
+        signed = np.where(rims.inverted, -1, 1) * signed_tetrahedra(soup.vertices, soup.faces)
         of_caps = np.bincount(own[self._hole_of], signed_tetrahedra(soup.vertices, self._faces), self._bodies)
         self._volume = np.abs(np.bincount(self._body, signed, self._bodies) + of_caps)  # that all caps would close in
         body_area = np.maximum(self._area[own], tiny)
@@ -128,8 +126,10 @@ class _Caps:
         corners = self._soup.vertices[self._rims.loops[hole]]
         middles = (corners + np.roll(corners, -1, axis=0)) / 2
         poll_stop()
-        query = SurfaceQuery(self._soup.vertices, others)
-        return len(others) > 0 and bool((query.distance(np.concatenate([corners, middles])) <= self._gap).all())
+        if len(others) == 0:
+            return False
+        distance = SurfaceQuery(self._soup.vertices, others).distance(np.concatenate([corners, middles]))
+        return bool((distance <= self._gap).all())
 
     def leading_away(self, depth: FloatArray) -> BoolArray:
         """Return ``[bodies]`` the bodies with a cap that leads farther away from the surface, ``[H]``, than it may."""
@@ -142,7 +142,7 @@ class _Caps:
     def _covered(self, holes: Int64Array) -> FloatArray:
         """Areas of the caps of holes, as shares of the shadows of their bodies' hulls along the caps' normals."""
         soup, tiny = self._soup, float(np.finfo(float).tiny)
-        hulls = {one: Hull.of(used_points(soup.vertices, soup.faces[self._body == one])) for one in self.body[holes]}
+        hulls = {one: Hull.of(compacted(soup.vertices, soup.faces[self._body == one])[0]) for one in self.body[holes]}
         shares = []
         for hole in holes.tolist():
             cap = long_normals(soup.vertices, self._faces[self._hole_of == hole])  # twice as long as areas
@@ -174,19 +174,20 @@ class _Caps:
         return has_inside
 
     def described(self, chosen: BoolArray) -> list[Hole]:
-        """The holes of chosen bodies ``[bodies]``, and those of bodies to which caps would give an inside."""
-        said = chosen | (self._volume > self._gap * self._area)  # less is a leaf or cloth
-        holes = np.flatnonzero(said[self.body]).tolist()
-        return [self._described(hole, bool(chosen[self.body[hole]])) for hole in holes]
+        """The holes of chosen bodies ``[bodies]``, and those of bodies to which caps would give an inside.
 
-    def _described(self, hole: int, is_closed: bool) -> Hole:
-        """The hole as the report lists it."""
-        corners = self._soup.vertices[self._rims.loops[hole]]
-        centre = corners.mean(axis=0)
-        width = 2 * float(np.linalg.norm(corners - centre, axis=1).max())
-        x, y, z = centre.tolist()
-        depth = float(self.reached[hole]) if is_closed else 0.0
-        return Hole(int(self.body[hole]), (x, y, z), width, is_closed, bool(self.is_smooth[hole]), depth)
+        First those where more of the body may be missing: a smooth cap is likely right.
+        """
+        said = chosen | (self._volume > self._gap * self._area)  # less is a leaf or cloth
+        frame, found = self._state.frame, []
+        for hole in np.flatnonzero(said[self.body]).tolist():
+            corners = self._soup.vertices[self._rims.loops[hole]]
+            width = 2 * float(np.linalg.norm(corners - corners.mean(axis=0), axis=1).max())
+            x, y, z = frame.to_input(corners.mean(axis=0)).tolist()
+            body = int(self.body[hole])
+            listed = Hole(body, (x, y, z), width / frame.scale, bool(chosen[body]))
+            found.append(((0.0 if self.is_smooth[hole] else width, width), listed))
+        return [listed for _, listed in sorted(found, key=lambda one: one[0], reverse=True)]
 
 
 def close_holes(state: State) -> None:
@@ -206,6 +207,7 @@ def close_holes(state: State) -> None:
     state.note(np.flatnonzero(useful[caps.joined]), "capped")
     state.by_hidden_caps |= useful & caps.leading_away(caps.hidden)
     state.holes = caps.described(useful)
+    state.deepest_cap = float(caps.reached.max(where=useful[caps.body], initial=0.0))
     state.soup = closed if (useful == chosen).all() else caps.added(useful)
 
 

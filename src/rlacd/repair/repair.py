@@ -132,7 +132,7 @@ def repair(
         The run ended before the repair; `rlacd.solid.cover` takes next to no time.
     """
     poll_stop()
-    points, corners = compacted(mesh.vertices, mesh.faces) if len(mesh.faces) else (mesh.vertices, mesh.faces)
+    points, corners = compacted(mesh.vertices, mesh.faces)
     if len(points) == 0:
         raise EmptyMeshError("the mesh has no points, so there is nothing to decompose: check the file or its export")
     frame = Frame.of(points, mesh.unit)
@@ -141,8 +141,6 @@ def repair(
     solid = _repaired(mesh, (frame.to_frame(points), corners), frame, wanted, threads)
     vertices, faces = solid.surface
     is_left = np.full(len(vertices), len(faces) > 0) & ~marked(faces, len(vertices))
-    if len(mesh.specks) == 0 and not is_left.any():
-        return solid
     return replace(solid, left_out=np.concatenate([vertices[is_left], frame.to_frame(mesh.specks)]))
 
 
@@ -151,7 +149,6 @@ def _repaired(
 ) -> Solid:
     """Repair the vertices and faces of a mesh in its frame."""
     points, corners = soup
-    poll_stop()
     welded_vertices, welded_faces, is_sliver = _native.weld(points, corners)
     taken = one_body(welded_vertices, welded_faces)
     if taken is not None and not (len(corners) <= DENSE and is_tangle(query_of(taken[0], threads))):

@@ -19,9 +19,7 @@ import numpy as np
 from rlacd._native import angles, components, least_bent, long_normals, poll_stop, principal_axes_of_points
 from rlacd.repair.soup import Soup, across, face_normals
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots, heights
-from rlacd.solid.topology import marked, nondegenerate
-
-_NEXT = np.array([1, 2, 0])
+from rlacd.solid.topology import NEXT, marked, nondegenerate
 
 
 @dataclass(frozen=True)
@@ -50,8 +48,7 @@ def rims_of(soup: Soup) -> Rims:
     """Find the loops around the holes of a soup."""
     mate = _mates(soup)
     poll_stop()
-    label = _sides(soup, mate)
-    inverted = label[0::2] > label[1::2]
+    inverted = _inverted(soup, mate)
     poll_stop()
     weighted = long_normals(soup.vertices, soup.faces)
     weighted[inverted] *= -1
@@ -59,10 +56,7 @@ def rims_of(soup: Soup) -> Rims:
     # Where each free halfedge begins and ends, seen from outside.
     corners, swap = soup.faces.ravel(), inverted[rim // 3]
     begin, end = np.where(swap, _following(rim), rim), np.where(swap, rim, _following(rim))
-    sums = [np.bincount(corners, np.repeat(weighted[:, k], 3), len(soup.vertices)) for k in range(3)]
-    follower = _followers(
-        soup.vertices, np.asarray(np.stack(sums, axis=1)), corners, _fans(soup.faces, mate), begin, end
-    )
+    follower = _followers(soup, weighted, _fans(soup.faces, mate), begin, end)
     # Most edges around a hole are free, and not all of one face: a loop of edges that touch other bodies bounds none.
     face, free = rim // 3, soup.edges.face_count[soup.edges.of_halfedge[rim]] == 1
     loops = [loop for loop in _cycles(follower) if np.ptp(face[loop]) > 0 and 2 * free[loop].sum() > len(loop) > 2]
@@ -72,19 +66,19 @@ def rims_of(soup: Soup) -> Rims:
 
 def _following(halfedge: Int64Array) -> Int64Array:
     """Return ``[N]`` the next halfedges around the same faces."""
-    return np.asarray(halfedge - halfedge % 3 + _NEXT[halfedge % 3])
+    return np.asarray(halfedge - halfedge % 3 + NEXT[halfedge % 3])
 
 
-def _sides(soup: Soup, mate: Int64Array) -> Int64Array:
-    """Return ``[2F]`` the component that the front and the back of every face belong to, joined across mates."""
+def _inverted(soup: Soup, mate: Int64Array) -> BoolArray:
+    """Return ``[F]`` whether a face is wound the other way than its patch: sides are joined across mates."""
     mated = np.flatnonzero(mate >= 0)
-    forward = (soup.faces < soup.faces[:, _NEXT]).ravel()
+    forward = (soup.faces < soup.faces[:, NEXT]).ravel()
     # Mates wound alike run along their edge in opposite directions; then fronts continue fronts.
     turned = forward[mated] == forward[mate[mated]]
     front, other = 2 * (mated // 3), 2 * (mate[mated] // 3)
-    return components(
-        2 * len(soup.faces), np.concatenate([front, front + 1]), np.concatenate([other + turned, other + 1 - turned])
-    )[1]
+    fronts, backs = np.concatenate([front, front + 1]), np.concatenate([other + turned, other + 1 - turned])
+    _, label = components(2 * len(soup.faces), fronts, backs)
+    return np.asarray(label[0::2] > label[1::2])
 
 
 def _fans(faces: Int64Array, mate: Int64Array) -> Int64Array:
@@ -131,26 +125,22 @@ def _matched(one: Int64Array, other: Int64Array, cost: FloatArray, count: int) -
     return np.array(match, dtype=np.int64)
 
 
-def _followers(
-    vertices: FloatArray,
-    normals: FloatArray,
-    corners: Int64Array,
-    fan: Int64Array,
-    begin: Int64Array,
-    end: Int64Array,
-) -> Int64Array:
+def _followers(soup: Soup, normals: FloatArray, fan: Int64Array, begin: Int64Array, end: Int64Array) -> Int64Array:
     """Return ``[N]`` the free edge that continues each at its end, -1 for none.
 
     Seen from outside, going counter-clockwise around a vertex, a fan is followed by a hole, then the next fan.
     Edges run from corner to corner ``[3F]``, each of which has a vertex and a fan.
     """
+    vertices, corners = soup.vertices, soup.faces.ravel()
+    sums = [np.bincount(corners, np.repeat(normals[:, k], 3), len(vertices)) for k in range(3)]
+    axes: FloatArray = np.stack(sums, axis=1, dtype=np.float64)
     tail, head, count = corners[begin], corners[end], len(begin)
     leaving = np.argsort(tail, kind="stable")
     first, last = (np.searchsorted(tail[leaving], head, side=side) for side in ("left", "right"))
     poll_stop()
     come, go = _in_ranges(first, last - first)
     go = leaving[go]
-    turn = _turns(vertices[tail[come]], vertices[head[come]], vertices[head[go]], normals[head[come]])
+    turn = _turns(vertices[tail[come]], vertices[head[come]], vertices[head[go]], axes[head[come]])
     turn[fan[end[come]] == fan[begin[go]]] += 2 * np.pi  # all the way around
     match = _matched(come, count + go, turn, 2 * count)[:count]
     return np.asarray(np.where(match < 0, -1, match - count))
@@ -198,14 +188,16 @@ def caps_of(soup: Soup, rims: Rims) -> tuple[Int64Array, Int64Array, FloatArray]
     caps, smooth = [], []
     for loop, beside in zip(rims.loops, rims.beside, strict=True):
         poll_stop()
-        taken = None
+        points = soup.vertices[loop]
         if len(loop) <= _EXACT_LOOP:
             chord = np.sort(np.stack(np.broadcast_arrays(loop[:, None], loop), axis=2), axis=2) @ weights
             is_used = [one in used for one in chord.ravel().tolist()]
             taken = np.reshape(is_used, chord.shape) | (loop[:, None] == loop)
-        triangles = cap(soup.vertices[loop], rims.normals[beside], taken)
+            triangles = least_bent(points, rims.normals[beside], taken)[:, ::-1].astype(np.int64)
+        else:
+            triangles = _by_ears(points)
         caps.append(loop[triangles])
-        smooth.append(_smooth_share(soup.vertices[loop], rims.normals[beside], triangles))
+        smooth.append(_smooth_share(points, rims.normals[beside], triangles))
         used.update((np.sort(caps[-1][:, [[0, 1], [1, 2], [2, 0]]], axis=2) @ weights).ravel().tolist())
     owner = np.repeat(np.arange(len(caps)), [len(some) for some in caps])
     faces = np.concatenate(caps)
@@ -223,26 +215,8 @@ def _smooth_share(points: FloatArray, beside: FloatArray, triangles: Int64Array)
     return float(lengths[is_smooth].sum() / lengths.sum())
 
 
-def cap(points: FloatArray, beside: FloatArray, taken: BoolArray | None = None) -> Int64Array:
-    """Triangulate a closed loop of points; a loop may visit a place twice.
-
-    Parameters
-    ----------
-    points
-        ``[N, 3]``.
-    beside
-        ``[N, 3]``, the unit normal of the face on the other side of the edge from each point to the next. It runs along
-        that edge in the order of the loop.
-    taken
-        ``[N, N]``, pairs of points that must not get an edge, because one exists already or because they are equal.
-
-    Returns
-    -------
-    Int64Array
-        ``[N - 2, 3]`` corners, all of them points of the loop, oriented against the loop to match the adjacent faces.
-    """
-    if len(points) <= _EXACT_LOOP:
-        return least_bent(points, beside, taken)[:, ::-1].astype(np.int64)
+def _by_ears(points: FloatArray) -> Int64Array:
+    """Triangulate a long loop, oriented against it; it may visit a place twice."""
     flat = heights(points - points.mean(axis=0), principal_axes_of_points(points)[:2])
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(points)], dtype=np.uint32)).reshape(-1, 3)
     if len(ears) != len(points) - 2:  # the loop's projection crosses itself: no plane fits

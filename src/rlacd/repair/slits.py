@@ -118,8 +118,7 @@ class _Walls(NamedTuple):
         large = np.flatnonzero(flat & (size >= 2 * area))
         normals: FloatArray = total[large] / size[large, None]
         corners: list[FloatArray] = [vertices[faces[order[begin[wall] : begin[wall + 1]]]] for wall in large]
-        firsts: FloatArray = np.array([own[0, 0] for own in corners]).reshape(-1, 3)
-        offsets = dots(firsts, normals)
+        offsets = dots(np.array([own[0, 0] for own in corners]).reshape(-1, 3), normals)
         boxes = np.array([(own.min(axis=(0, 1)), own.max(axis=(0, 1))) for own in corners]).reshape(-1, 2, 3)
         return cls(corners, normals, offsets, boxes)
 

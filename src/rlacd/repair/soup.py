@@ -10,7 +10,7 @@ import numpy as np
 from rlacd._native import components, face_areas, long_normals, poll_stop
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.hull import TOLERANCE
-from rlacd.solid.topology import NO_AREA, Edges, Sides, has_marked, is_balanced, marked, sides_of
+from rlacd.solid.topology import NO_AREA, Edges, Sides, is_balanced, marked, sides_of
 
 FLAT = TOLERANCE
 """A closed body with less volume per area is flat: there is nothing to cut."""
@@ -30,20 +30,16 @@ _FOLD = 0.94
 
 @dataclass(frozen=True)
 class Soup:
-    """Faces during repair; `body` ``[F]`` is the body of each, by numbers that stay the same throughout.
-
-    `known_edges` are those of the faces, if known.
-    """
+    """Faces during repair; `body` ``[F]`` is the body of each, by numbers that stay the same throughout."""
 
     vertices: FloatArray
     faces: Int64Array
     body: Int64Array
-    known_edges: Edges | None = None
 
     @cached_property
     def edges(self) -> Edges:
         """Which faces meet at which edge."""
-        return self.known_edges or Edges.of(self.faces, len(self.vertices))
+        return Edges.of(self.faces, len(self.vertices))
 
     @cached_property
     def sides(self) -> Sides:
@@ -76,7 +72,7 @@ class Soup:
 
     def at_edges(self, marked: BoolArray) -> BoolArray:
         """Return ``[F]`` whether a face has a marked edge, given ``[E]`` marks."""
-        return has_marked(marked, self.edges.of_halfedge.reshape(-1, 3))
+        return np.asarray(marked[self.edges.of_halfedge].reshape(-1, 3).any(axis=1))
 
     @cached_property
     def body_of_side(self) -> Int64Array:

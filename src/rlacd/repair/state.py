@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -10,17 +9,17 @@ import numpy as np
 from manifold3d import Manifold
 
 from rlacd import _native
-from rlacd._native import face_areas, poll_stop, signed_tetrahedra
+from rlacd._native import poll_stop, signed_tetrahedra
 from rlacd.repair.cracks import close_cracks
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
 from rlacd.repair.soup import Soup
-from rlacd.repair.union import Walls, cavities_in, emptied, hollowed, to_arrays, unite, unite_and_fill
+from rlacd.repair.union import Walls, cavities_in, emptied, filled, hollowed, to_arrays, unite, united
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
-from rlacd.report import BodyRepair
+from rlacd.report import BodyRepair, Hole
 from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.mass import mass_of
-from rlacd.solid.solid import Hole, Shape, Solid
+from rlacd.solid.solid import Shape, Solid
 from rlacd.solid.topology import Edges, bodies_of, marked
 
 OUTCOMES = ("closed", "reoriented", "outer skin", "welded", "capped", "slab", "wrapped", "hull")
@@ -36,8 +35,7 @@ _NAMED = 5
 _CREVICES = 1e-3
 
 
-@dataclass(frozen=True)
-class Wanted:
+class Wanted(NamedTuple):
     """What the caller wants of a repair; see `rlacd.repair.repair.repair`.
 
     Attributes
@@ -107,6 +105,9 @@ class State:
     is_apart : bool
         Whether the sheets were not united.
     holes : list of Hole
+    deepest_cap : float
+        How far caps lead away from the surface where something can reach them, if that is more than they may without a
+        word; else 0.
     warnings : list of str
     """
 
@@ -120,20 +121,21 @@ class State:
         self.step = np.zeros(self.bodies, dtype=np.int64)
         self.beyond, self.lost = np.zeros((2, self.bodies))
         self.note(body[(faces != surface.faces[origin]).any(axis=1)], "welded")
-        self.soup = Soup(surface.vertices, faces, body, known_edges=edges)
+        self.soup = Soup(surface.vertices, faces, body)
         self.parts: list[Piece] = []
         self.solid = Manifold()
         self.cavity_walls: Walls | None = None
         self.by_hidden_caps, self.is_tangled = np.zeros((2, self.bodies), dtype=bool)
         self.is_apart = False
         self.holes: list[Hole] = []
+        self.deepest_cap = 0.0
         self.warnings: list[str] = []
         self._asked: tuple[Manifold, SurfaceQuery] | None = None
 
     @cached_property
     def reach(self) -> Reach:
         """Where the ball can go."""
-        return Reach(self.surface.vertices, self.surface.faces, self.wanted.gap, self.wanted.cells)
+        return Reach(self.surface, self.wanted.gap, self.wanted.cells)
 
     def query(self) -> SurfaceQuery:
         """Queries of the solid as it is now."""
@@ -173,12 +175,12 @@ class State:
         if self.wanted.keep_cavities:
             self.solid = unite([*bounded, *rest], keep_cavities=True)
             return
-        self.solid, self.cavity_walls = unite_and_fill([part.shape for part in self.parts])
+        self.solid, self.cavity_walls = filled(united([part.shape for part in self.parts]))
         if bounded is not closed or (rest and self.cavity_walls):
-            filled, self.cavity_walls = unite_and_fill(bounded)
+            bare, self.cavity_walls = filled(united(bounded))
             if bounded is not closed:
                 whole = unite(closed) if rest else self.solid
-                if whole.volume() - filled.volume() > _CREVICES * whole.volume():
+                if whole.volume() - bare.volume() > _CREVICES * whole.volume():
                     self.cavity_walls = emptied(whole, bounded)
 
     def of_bodies(self, marked: BoolArray) -> Soup:
@@ -223,16 +225,14 @@ class State:
 
     def _warn_of_holes(self) -> None:
         """Say which holes were closed though that is a guess, and where bodies stayed open."""
-        self.holes.sort(key=lambda hole: hole.doubt, reverse=True)
-        if any(hole.depth for hole in self.holes):
-            depth = max(hole.depth for hole in self.holes)
+        if self.deepest_cap > 0:
             self.warnings.append(
-                f"Holes were closed although the caps lead up to {self.frame.unit.words(depth)} away from the surface, "
-                f"at {self._places([hole for hole in self.holes if hole.is_closed])}."
+                f"Holes were closed although the caps lead up to {self.frame.unit.words(self.deepest_cap)} away from "
+                f"the surface, at {self._places([hole for hole in self.holes if hole.closed])}."
             )
         is_thin = self.has("slab")
         is_thin[[part.body for part in self.parts if not part.is_slab]] = False  # only fins of it are
-        openings = [hole for hole in self.holes if not hole.is_closed and is_thin[hole.body]]
+        openings = [hole for hole in self.holes if not hole.closed and is_thin[hole.body]]
         shells = len({hole.body for hole in openings})
         if shells:
             became = "1 open body became a thin shell" if shells == 1 else f"{shells} open bodies became thin shells"
@@ -242,7 +242,10 @@ class State:
 
     def _places(self, holes: list[Hole]) -> str:
         """Where holes are, the most doubtful first."""
-        some = [self.frame.place(hole.at, hole.body if self.bodies > 1 else None) for hole in holes[:_NAMED]]
+        some = [
+            self.frame.place(self.frame.to_frame(hole.at_abs), hole.body if self.bodies > 1 else None)
+            for hole in holes[:_NAMED]
+        ]
         return "; ".join(some) + (f"; and {len(holes) - _NAMED} more, see `holes`" if len(holes) > _NAMED else "")
 
 
@@ -254,16 +257,14 @@ def measure(state: State) -> Int64Array:
     kept, taken_over = shared_faces(solid.vertices, solid.faces, surface.vertices, surface.faces)
     poll_stop()
     own = solid.faces[~kept]
-    points, _ = points_covering(
-        solid.vertices, own, affordable(DEFAULT_GAP, float(face_areas(solid.vertices, own).sum()))
-    )
+    points, _ = points_covering(solid.vertices, own, affordable(DEFAULT_GAP, solid.vertices, own))
     closest, face = surface.closest(points)
     np.maximum.at(state.beyond, state.body_of_input[face], np.linalg.norm(points - closest, axis=1))
 
     is_replaced = (state.step[state.body_of_input] >= OUTCOMES.index("outer skin")) & ~taken_over
     replaced = np.flatnonzero(is_replaced | state.is_gone)
     faces = surface.faces[replaced]
-    spacing = affordable(DEFAULT_GAP, float(face_areas(surface.vertices, faces).sum()))
+    spacing = affordable(DEFAULT_GAP, surface.vertices, faces)
     points, on = points_covering(surface.vertices, faces, spacing)
     distance = solid.distance(points)
     lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)  # the middle of a slab is half as far from its surface

@@ -78,32 +78,15 @@ def slab_of_faces(vertices: FloatArray, faces: Int64Array) -> Manifold:
 
 
 def unite(solids: Sequence[Shape], *, keep_cavities: bool = False) -> Manifold:
-    """Unite solids and fill the cavities nothing can reach; see `unite_and_fill`."""
-    united = _all_united([solid if isinstance(solid, Manifold) else to_manifold(*solid) for solid in solids])
+    """Unite solids and fill the cavities nothing can reach; see `filled`."""
+    whole = united([solid if isinstance(solid, Manifold) else to_manifold(*solid) for solid in solids])
     # More cavity than solid means shells that came out inside out, not cavities.
-    return united if keep_cavities and united.volume() > 0 else _filled(united)[0]
-
-
-def unite_and_fill(solids: Sequence[Manifold]) -> tuple[Manifold, Walls | None]:
-    """Unite solids and fill the cavities that nothing can reach.
-
-    Returns
-    -------
-    tuple
-        The solid, and the faces dropped to fill cavities as they were wound: with those of the solid, the surface
-        before. None if there were no cavities.
-
-    Raises
-    ------
-    CrossingsError
-        They cross each other too often.
-    """
-    return _filled(_all_united(solids))
+    return whole if keep_cavities and whole.volume() > 0 else filled(whole)[0]
 
 
 def emptied(whole: Manifold, bounded: Sequence[Manifold]) -> Walls:
     """Walls of what is solid only in the whole, also where it opens to the outside, at a wall without thickness."""
-    vertices, faces = surface_of(whole - _all_united(bounded))
+    vertices, faces = surface_of(whole - united(bounded))
     return vertices, np.ascontiguousarray(faces[:, ::-1])
 
 
@@ -114,11 +97,12 @@ def cavities_in(walls: Walls) -> int:
     return int((shells[1] <= 0).sum())
 
 
-def _all_united(solids: Sequence[Manifold]) -> Manifold:
+def united(solids: Sequence[Manifold]) -> Manifold:
+    """The union of solids, with its cavities; raises `CrossingsError` if they cross each other too often."""
     some = [solid for solid in solids if not solid.is_empty()]
     if not some:
         return Manifold()
-    return Manifold.compose(some) if len(some) > MOST_UNITED else _united(some)
+    return Manifold.compose(some) if len(some) > MOST_UNITED else _by_size(some)
 
 
 def hollowed(solids: list[Manifold], inward: list[bool]) -> list[Manifold]:
@@ -172,7 +156,7 @@ def _point_in(solid: Manifold) -> FloatArray:
     return np.asarray(vertices[faces[largest]].mean(axis=0) + _HAIR * down)
 
 
-def _filled(solid: Manifold) -> tuple[Manifold, Walls | None]:
+def filled(solid: Manifold) -> tuple[Manifold, Walls | None]:
     """Fill the cavities: drop the shells that bound them, and what stands in them.
 
     manifold3d's own decomposition takes time in proportion to the number of shells times that of the faces, and noise
@@ -202,7 +186,7 @@ def _filled(solid: Manifold) -> tuple[Manifold, Walls | None]:
     return to_manifold(*compacted(vertices, faces[is_kept])), compacted(vertices, faces[~is_kept])
 
 
-def _united(solids: list[Manifold]) -> Manifold:
+def _by_size(solids: list[Manifold]) -> Manifold:
     """Unite solids, always those with the fewest triangles first: what is large takes part in few booleans.
 
     manifold3d cannot be interrupted: how long a union takes is known by its crossings before it is begun.

@@ -10,15 +10,20 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from manifold3d import Manifold
 
 from rlacd import _native
 from rlacd._native import label_cells, nearest_labels, poll_stop
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
-from rlacd.solid.frame import ROUNDING
+from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
+from rlacd.solid.manifold import to_manifold
 
 DEFAULT_GAP = 0.03
 """Default radius of the ball, and greatest distance of a cap from the input's surface, in the frame."""
+
+FILLING_ERROR = 4 * HALF_THICKNESS
+"""How far simplifying may move what fills a room."""
 
 
 class Reach:
@@ -26,8 +31,7 @@ class Reach:
 
     Parameters
     ----------
-    vertices, faces
-        Of the surface.
+    surface
     radius
         Of the ball.
     resolution
@@ -45,10 +49,10 @@ class Reach:
         ``[X, Y, Z]``, label of each void: connected cells where the ball fits but which it cannot enter; 0 elsewhere.
     """
 
-    def __init__(self, vertices: FloatArray, faces: Int64Array, radius: float, resolution: int) -> None:
-        self.pitch, self.radius = 2.0 / resolution, radius
+    def __init__(self, surface: SurfaceQuery, radius: float, resolution: int) -> None:
+        self._surface, self.pitch, self.radius = surface, 2.0 / resolution, radius
         margin = int(np.ceil(radius / self.pitch)) + 3
-        marked = _native.mark_cells(vertices, faces.astype(np.int64), self.pitch / 2, self.pitch, margin)
+        marked = _native.mark_cells(surface.vertices, surface.faces, self.pitch / 2, self.pitch, margin)
         self.origin, occupied = marked[0], np.frombuffer(marked[1], dtype=bool).reshape(marked[2])
         poll_stop()
         label = label_cells(~_grown(occupied, radius / self.pitch)).reshape(occupied.shape)
@@ -72,10 +76,6 @@ class Reach:
         outside: Int64Array = cells[some][~solid.inside(self.origin + at[some] * self.pitch)]
         return outside
 
-    def volumes(self, voids: Int64Array) -> FloatArray:
-        """Return the volume of each of `voids`, as far as the ball's centre can be there."""
-        return np.asarray(np.bincount(self.void.ravel())[voids] * self.pitch**3)
-
     def is_deep(self, points: FloatArray, depth: float) -> BoolArray:
         """Return ``[N]`` whether points lie at least `depth` from the cells that the ball can reach."""
         reached = self.reached.astype(self.void.dtype)
@@ -98,28 +98,27 @@ class Reach:
         mark[tuple(self._cells(points).T)] = True
         return _grown(mark, self.radius / self.pitch) & ~self.reached
 
-    def wrap(
-        self, cells: BoolArray, surface: SurfaceQuery, thickness: float, solid: SurfaceQuery | None = None
-    ) -> tuple[FloatArray, Int64Array]:
-        """Return the closed surface of a set of cells, projected onto a surface where it is near.
+    def wrap(self, cells: BoolArray, solid: SurfaceQuery | None = None) -> Manifold:
+        """Return a set of cells as a solid, projected onto the surface where it is near, and simplified.
 
-        Corners of cells move to `thickness` in front of the closest point of the surface as seen from their place,
-        so a wrap of a single sheet keeps two sides. Corners farther than two cells away span a gap and are smoothed.
-        Corners inside `solid`, with which the wrap will be united, stay: projected, they would leave a slit.
+        Corners of cells move to `HALF_THICKNESS` in front of the closest point of the surface as seen from their
+        place, so a wrap of a single sheet keeps two sides. Corners farther than two cells away span a gap and are
+        smoothed. Corners inside `solid`, with which the wrap will be united, stay: projected, they would leave a slit.
         """
         corners, quads = _boundary_squares(cells)
         points = self.origin + (corners - 0.5) * self.pitch
-        closest, _ = surface.closest(points)
+        closest, _ = self._surface.closest(points)
         away = points - closest
         distance = np.linalg.norm(away, axis=1)
         is_far = distance > 2 * self.pitch
         moved = ~is_far
         if solid is not None:
             moved[moved] = ~solid.inside(points[moved])
-        step = thickness / np.maximum(distance, np.finfo(float).tiny)
+        step = HALF_THICKNESS / np.maximum(distance, np.finfo(float).tiny)
         points[moved] = (closest + np.minimum(step, 1)[:, None] * away)[moved]
         _smooth(points, quads, is_far)
-        return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        wrap = to_manifold(points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+        return wrap.simplify(HALF_THICKNESS / 2 if solid is None else FILLING_ERROR)
 
 
 def _grown(cells: BoolArray, radius: float) -> BoolArray:

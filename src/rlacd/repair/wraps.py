@@ -6,19 +6,18 @@ import numpy as np
 from manifold3d import Manifold
 
 from rlacd import _native
-from rlacd._native import poll_stop
-from rlacd.repair.distance import MOST_POINTS, SurfaceQuery, is_tangle, points_covering, spread_points, tangled_bodies
+from rlacd._native import poll_stop, spread_points
+from rlacd.repair.distance import MOST_POINTS, SurfaceQuery, is_tangle, points_covering, tangled_bodies
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import hull_of_points, slab_of_faces, unite
 from rlacd.repair.voxels import DEFAULT_GAP, Reach
-from rlacd.solid.arrays import BoolArray, Int64Array
+from rlacd.solid.arrays import Int64Array
 from rlacd.solid.component import DENSE, concatenated
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
 from rlacd.solid.solid import surface_of
 
-_WRAP_ERROR = 4 * HALF_THICKNESS
 # Least share of the solid's volume of a void of an outer skin that is filled, and greatest of slits: voids in furniture
 # have 0.04 and more, crevices at most 0.0023.
 _SLIT_VOLUME = 0.01
@@ -65,7 +64,7 @@ def wrap_sheets(state: State, sheets: Soup) -> bool:
         return False
     soup = state.of_bodies(is_slab)
     points, _ = points_covering(soup.vertices, soup.faces, state.reach.pitch / 2)
-    wrap = _wrap(state, state.reach.around_points(points), HALF_THICKNESS / 2)
+    wrap = state.reach.wrap(state.reach.around_points(points))
     if wrap.volume() <= 0:
         return False
     state.note(soup.body, "wrapped")
@@ -121,11 +120,11 @@ def fill_voids(state: State) -> None:
     points, on = points_covering(walls.vertices, walls.faces, DEFAULT_GAP)
     reach, void = state.reach, state.reach.voids_near(points)
     voids = np.setdiff1d(void, 0)
-    is_large = reach.volumes(voids) >= _SLIT_VOLUME * state.solid.volume()
+    is_large = np.bincount(reach.void.ravel())[voids] * reach.pitch**3 >= _SLIT_VOLUME * state.solid.volume()
     cells = reach.voids_outside(voids[is_large | np.isin(voids, void[is_open[walls.body[on]]])], state.query())
     if len(cells) == 0:
         return
-    wrap = _wrap(state, reach.around_cells(cells), _WRAP_ERROR, state.query())
+    wrap = reach.wrap(reach.around_cells(cells), state.query())
     filled = unite([state.solid, wrap])
     triangles = filled.num_tri() / state.solid.num_tri()
     bared = filled.surface_area() * triangles**_TRIANGLES
@@ -160,7 +159,7 @@ def fill_slits(state: State) -> None:
         points, across = points[inside], across[inside]
     if len(points) == 0:
         return
-    wrap = _wrap(state, state.reach.around_points(points), _WRAP_ERROR, query)
+    wrap = state.reach.wrap(state.reach.around_points(points), query)
     filled = unite([state.solid, wrap])
     is_little = abs(filled.volume() / state.solid.volume() - 1) < _SLIT_VOLUME
     if is_little and filled.surface_area() < (1 - _BARED) * state.solid.surface_area():
@@ -181,14 +180,9 @@ def _is_large(state: State, walls: Soup) -> bool:
 
 def _wrapped(state: State, soup: Soup) -> Manifold:
     """A solid of all that the ball cannot reach from outside some faces."""
-    reach = Reach(soup.vertices, soup.faces, state.wanted.gap, state.wanted.cells)
-    faces = SurfaceQuery(soup.vertices, soup.faces, state.surface.threads)
-    return to_manifold(*reach.wrap(~reach.reached, faces, HALF_THICKNESS)).simplify(HALF_THICKNESS / 2)
-
-
-def _wrap(state: State, cells: BoolArray, error: float, solid: SurfaceQuery | None = None) -> Manifold:
-    """Return a solid of grid cells, projected onto the input where it does not overlap `solid`, and simplified."""
-    return to_manifold(*state.reach.wrap(cells, state.surface, HALF_THICKNESS, solid)).simplify(error)
+    surface = SurfaceQuery(soup.vertices, soup.faces, state.surface.threads)
+    reach = Reach(surface, state.wanted.gap, state.wanted.cells)
+    return reach.wrap(~reach.reached)
 
 
 def _crossings(soup: Soup, patch: Int64Array) -> int:

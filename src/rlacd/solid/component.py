@@ -102,11 +102,6 @@ class Part:
         return self.whole.against.filled((self.exact or self.hull).body)
 
     @property
-    def piece_hulls(self) -> float:
-        """Sum of the volumes of its pieces' hulls."""
-        return sum(member.hull.volume for member in self.members) if self.members else self.hull.volume
-
-    @property
     def box(self) -> FloatArray:
         """Lower and upper corner of the bounding box [2, 3]."""
         return self.hull.box
@@ -234,12 +229,10 @@ class Component(Part):
 
     def inside(self, hull: Hull) -> Component | None:
         """Return all that the solid fills of a hull, closed by caps on the hull's facets; None if that is flat."""
-        vertices, faces = self.against.inside(hull.body)
-        tight = Hull.of(vertices) if len(faces) else None
-        if tight is None:
+        try:
+            return Component(self.against.inside(hull.body), whole=self.whole)
+        except ValueError:
             return None
-        volume = _native.mesh_volume(vertices, faces)
-        return Component.of((vertices, faces, volume, tight.vertices, tight.faces, tight.volume), whole=self.whole)
 
     def pieces(self) -> list[Component]:
         """Connected pieces, cavities kept inside the piece that encloses them; ``[self]`` if it is connected."""

@@ -48,7 +48,7 @@ def cover(mesh: InputMesh, run: Run) -> tuple[Solid, list[Part]]:
         Each is its own hull.
     """
     with run.shielded():
-        used = compacted(mesh.vertices, mesh.faces)[0] if len(mesh.faces) else mesh.vertices
+        used = compacted(mesh.vertices, mesh.faces)[0]
         frame = Frame.of(used, mesh.unit)
         vertices = frame.to_frame(mesh.vertices)
         faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
@@ -80,11 +80,9 @@ def _part(hull: Hull) -> Part:
 def _bodies(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
     """The points [N, 3] of each body, or of several bodies near each other."""
     used = np.flatnonzero(marked(faces, len(vertices)))
-    label = point_bodies(vertices, faces)[used]
-    is_there = marked(label, len(vertices))
-    count, body = np.count_nonzero(is_there), (np.cumsum(is_there) - 1)[label]
-    order = np.argsort(body, kind="stable")
-    vertices, first = vertices[used], np.searchsorted(body[order], np.arange(count))
+    _, body, sizes = np.unique(point_bodies(vertices, faces)[used], return_inverse=True, return_counts=True)
+    order, count = np.argsort(body, kind="stable"), len(sizes)
+    vertices, first = vertices[used], np.cumsum(sizes) - sizes
     if count > MOST_HULLS:
         group = np.empty(count, dtype=np.int64)
         cells = np.floor(_CELLS * vertices[order[first]])

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 
 from rlacd import _native
 from rlacd.fit import RESOLVED
+from rlacd.report import Point
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.hull import TOLERANCE, Hull
 
 Interval = tuple[float, float]
 """A certified lower and upper bound."""
-
-Place = tuple[float, float, float]
 
 DISTANCE_ACCURACY = RESOLVED / 1000
 """Default width of the intervals, in the normalised frame. It costs no more than one a thousand times as wide, but near
@@ -41,13 +40,13 @@ class HullDistances:
         Greatest distance from the input surface to the union as a solid: what the hulls miss. Points inside a hull
         are at distance 0.
     over_at, under_at
-        Places where the lower ends of these are reached; without meaning where they are 0.
+        Points where the lower ends of these are reached; without meaning where they are 0.
     """
 
     over: Interval
     under: Interval
-    over_at: Place = (0.0, 0.0, 0.0)
-    under_at: Place = (0.0, 0.0, 0.0)
+    over_at: Point = (0.0, 0.0, 0.0)
+    under_at: Point = (0.0, 0.0, 0.0)
 
 
 def hull_distances(

@@ -9,7 +9,6 @@ its drift, it is in the throat of a passage, as in the hole of a ring; else in n
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -43,26 +42,12 @@ CELLS, COARSER = 256, 1.5
 """Cells along the longest side, and by how much larger ones are tried while there are too many."""
 
 
-class Density(NamedTuple):
-    """How densely passages are filled.
-
-    Attributes
-    ----------
-    starts : int
-        Points of the surface from which balls start, beside the middles of its triangles.
-    spacing : float
-        A ball is left out if the centre of a larger one is within this share of its radius.
-    """
-
-    starts: int
-    spacing: float
-
-
 def passage_balls(
     solid: tuple[FloatArray, IntArray],
     surface: _native.Surface,
     radii: tuple[float, float],
-    density: Density,
+    starts: int,
+    spacing: float,
     threads: int,
     wanted: Callable[[Balls], BoolArray] | None = None,
 ) -> Balls:
@@ -76,13 +61,16 @@ def passage_balls(
         That of the solid.
     radii : (float, float)
         The least and the largest radius.
-    density : Density
+    starts : int
+        Points of the surface from which balls start, beside the middles of its triangles.
+    spacing : float
+        A ball is left out if the centre of a larger one is within this share of its radius.
     threads : int
         The result does not depend on it.
     wanted : callable, optional
         Tells which of some balls, not quite in their place yet, matter.
     """
-    (least, most), (starts, spacing) = radii, density
+    least, most = radii
     points, normals = _starts(*solid, starts)
     held = surface.held_balls(points, normals, least / GROWTH, most, threads)
     balls = Balls(points + held[:, None] * normals, held).some(held > 0)

@@ -11,47 +11,13 @@ from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from rlacd._native import Surface
-from rlacd.report import BodyRepair
+from rlacd.report import BodyRepair, Hole
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import Frame
 from rlacd.solid.input_mesh import no_points
 
 Shape: TypeAlias = Manifold | tuple[FloatArray, NDArray[np.int32]]
 """A closed solid: a manifold, or vertices float64 ``[V, 3]`` and faces int32 ``[F, 3]``."""
-
-
-@dataclass(frozen=True)
-class Hole:
-    """A hole of a body that has an inside: what was there is a guess.
-
-    Attributes
-    ----------
-    body
-        Number of the body, as in `rlacd.report.BodyRepair`.
-    at
-        The mean of the corners of its rim, in the frame.
-    width
-        Twice the distance from there to the farthest corner.
-    is_closed
-        Whether it was closed. The body became a thin shell otherwise.
-    is_smooth
-        Whether the cap continues the faces around it.
-    depth
-        How far the cap leads away from the surface where something can reach it, if that is more than caps may without
-        a word; else 0.
-    """
-
-    body: int
-    at: tuple[float, float, float]
-    width: float
-    is_closed: bool
-    is_smooth: bool
-    depth: float
-
-    @property
-    def doubt(self) -> tuple[float, float]:
-        """Greater where more of the body may be missing: a smooth cap is likely right."""
-        return (0.0 if self.is_smooth else self.width, self.width)
 
 
 @dataclass(frozen=True)
@@ -129,11 +95,9 @@ class Solid:
     @cached_property
     def manifold(self) -> Manifold:
         """The shape, ready for booleans; made when first needed, which takes longer than all of repair."""
-        return (
-            self.shape
-            if isinstance(self.shape, Manifold)
-            else Manifold(Mesh64(self.vertices, self.faces.astype(np.uint64)))
-        )
+        if isinstance(self.shape, Manifold):
+            return self.shape
+        return Manifold(Mesh64(self.vertices, self.faces.astype(np.uint64)))
 
     @cached_property
     def mesh(self) -> tuple[FloatArray, NDArray[np.int32]]:

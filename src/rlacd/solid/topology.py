@@ -25,7 +25,7 @@ from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.hull import TOLERANCE
 
 Index = TypeVar("Index", bound=np.signedinteger)
-_NEXT = np.array([1, 2, 0])
+NEXT = np.array([1, 2, 0])
 
 
 def nondegenerate(faces: Int64Array) -> BoolArray:
@@ -42,25 +42,12 @@ def marked(items: NDArray[np.integer], count: int) -> BoolArray:
     return found
 
 
-def has_marked(mark: BoolArray, corners: Int64Array) -> BoolArray:
-    """Return ``[N]`` whether any of three corners (edges, ...) ``[N, 3]`` is marked."""
-    a, b, c = corners.T
-    result: BoolArray = mark[a] | mark[b] | mark[c]
-    return result
-
-
 def compacted(vertices: FloatArray, faces: NDArray[Index]) -> tuple[FloatArray, NDArray[Index]]:
-    """The vertices that faces use, in the same order, and the faces."""
-    used = np.zeros(len(vertices), dtype=bool)
-    used[faces] = True
-    if used.all():
+    """The vertices that faces use, in the same order, and the faces; of a cloud of points, which has none, all."""
+    used = marked(faces, len(vertices))
+    if used.all() or len(faces) == 0:
         return vertices, faces
     return vertices[used], (np.cumsum(used, dtype=faces.dtype) - 1).astype(faces.dtype)[faces]
-
-
-def used_points(vertices: FloatArray, faces: NDArray[Index]) -> FloatArray:
-    """The vertices that faces use; of a cloud of points, which has none, all."""
-    return compacted(vertices, faces)[0] if len(faces) else vertices
 
 
 def first_of_doubled(faces: Int64Array, count: int) -> BoolArray:
@@ -117,7 +104,7 @@ def bodies_of(faces: Int64Array, edges: Edges) -> tuple[int, Int64Array]:
 
 def is_balanced(faces: Int64Array, edges: Edges) -> BoolArray:
     """Return ``[E]`` whether as many faces run along an edge in one direction as in the other."""
-    forward = np.bincount(edges.of_halfedge, (faces < faces[:, _NEXT]).ravel(), len(edges.face_count))
+    forward = np.bincount(edges.of_halfedge, (faces < faces[:, NEXT]).ravel(), len(edges.face_count))
     return np.asarray(2 * forward == edges.face_count)
 
 
@@ -148,12 +135,10 @@ def detach_slivers(vertices: FloatArray, faces: Int64Array, is_sliver: BoolArray
     halfedge = edges.of_halfedge.reshape(-1, 3)
     rest_edges = Edges.of(faces[~is_sliver], len(vertices))
     bodies, body = bodies_of(faces[~is_sliver], rest_edges)
-    is_open = np.zeros(bodies, dtype=bool)
     uneven = ~is_balanced(faces[~is_sliver], rest_edges)
-    is_open[body[uneven[rest_edges.of_halfedge].reshape(-1, 3).any(axis=1)]] = True
-    beside_body, beside_open = np.zeros((2, len(edges.face_count)), dtype=bool)
-    beside_body[halfedge[~is_sliver]] = True
-    beside_open[halfedge[~is_sliver][is_open[body]]] = True
+    is_open = marked(body[uneven[rest_edges.of_halfedge].reshape(-1, 3).any(axis=1)], bodies)
+    beside_body = marked(halfedge[~is_sliver], len(edges.face_count))
+    beside_open = marked(halfedge[~is_sliver][is_open[body]], len(edges.face_count))
     patches, patch = bodies_of(faces[is_sliver], Edges.of(faces[is_sliver], len(vertices)))
     hangs = np.bincount(patch, beside_body[halfedge[is_sliver]].any(axis=1), patches) > 0
     needed = np.bincount(patch, beside_open[halfedge[is_sliver]].any(axis=1), patches) > 0
@@ -161,8 +146,7 @@ def detach_slivers(vertices: FloatArray, faces: Int64Array, is_sliver: BoolArray
     corners, index = np.unique(faces[detached], return_inverse=True)
     result = faces.copy()
     result[detached] = len(vertices) + index.reshape(-1, 3)
-    a, b, c = vertices[faces[detached]].transpose(1, 0, 2)
-    nothing = detached[np.linalg.norm(np.cross(b - a, c - a), axis=1) < 2 * NO_AREA]
+    nothing = detached[face_areas(vertices, faces[detached]) < NO_AREA]
     return np.concatenate([vertices, vertices[corners]]), np.delete(result, nothing, axis=0)
 
 

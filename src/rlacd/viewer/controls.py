@@ -22,7 +22,7 @@ from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.options.presets import PRESETS
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.topology import used_points
+from rlacd.solid.topology import compacted
 
 _NAMES = (
     *("criterion", "threshold", "radius", "tolerance", "volume_tolerance", "quality", "primitives"),
@@ -109,7 +109,7 @@ STANDING = 0.005
 
 def guessed_up(mesh: InputMesh) -> Axis:
     """Guess y if the mesh stands on y = 0 and not on z = 0, else z, the default elsewhere."""
-    points = used_points(mesh.vertices, mesh.faces)
+    points = compacted(mesh.vertices, mesh.faces)[0]
     low = points.min(axis=0)
     stands = np.abs(low) <= STANDING * (points.max(axis=0) - low).max()
     return "y" if stands[1] and not stands[2] else "z"

@@ -9,14 +9,13 @@ only the joint hull has to be tested.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
-from rlacd import _native, report
+from rlacd import _native
 from rlacd.criteria import Criterion
-from rlacd.report import Overlap, Point
+from rlacd.report import Overlap, ShortSeam
 from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import Frame
@@ -25,46 +24,6 @@ from rlacd.solid.hull import TOLERANCE, Hull
 HELD = 0.7
 """Each point of a seam has to lie in some hull at least this share as deep as in the solid, or as half the overlap if
 that is less. On either side of a seam in a bent solid, neither hull is quite as deep as the solid."""
-
-
-@dataclass(frozen=True)
-class ShortSeam:
-    """A seam that the criterion keeps from overlapping enough."""
-
-    parts: tuple[int, int]
-    """The two."""
-    place: FloatArray
-    """``[3]``, where the seam lacks the most depth."""
-    depth: float
-    """How deep that place lies in the hull that it lies deepest in."""
-
-
-@dataclass(frozen=True)
-class Seams:
-    """The seams, where two hulls touched with less overlap than asked for."""
-
-    count: int
-    short: tuple[ShortSeam, ...]
-    """The seams that still overlap by less."""
-
-    def told(self, frame: Frame) -> Overlap:
-        """What the report says of them."""
-        short = [
-            report.ShortSeam(
-                one.parts, cast("Point", tuple(frame.to_input(one.place).tolist())), one.depth / frame.scale
-            )
-            for one in self.short
-        ]
-        return Overlap(self.count, len(short), tuple(short))
-
-    def shallow(self, overlap: str) -> list[str]:
-        """What to warn of; `overlap` is the one asked for, in words."""
-        if not self.short:
-            return []
-        return [
-            f"{len(self.short)} of {self.count} seams between hulls overlap by less than {overlap}: more would break "
-            "the criterion. A smaller overlap or a larger threshold helps."
-        ]
 
 
 class _Seam(NamedTuple):
@@ -79,8 +38,8 @@ class _Seam(NamedTuple):
 
 
 def overlap_parts(
-    parts: Sequence[Part], solid: Component, criterion: Criterion, overlap: float
-) -> tuple[list[Part], Seams]:
+    parts: Sequence[Part], solid: Component, criterion: Criterion, overlap: float, frame: Frame
+) -> tuple[list[Part], Overlap]:
     """Grow hulls into their neighbours until those that touch overlap, as far as the criterion allows.
 
     The depth is measured across each seam. At an end of it, where the solid itself is shallower, so is the overlap.
@@ -94,12 +53,14 @@ def overlap_parts(
     criterion : Criterion
     overlap : float
         Depth of the overlap, in the frame.
+    frame : Frame
 
     Returns
     -------
     parts : list of Part
         In the same order.
-    seams : Seams
+    seams : Overlap
+        What the report says of them.
     """
     bodies = [_Body(part) for part in parts]
     tolerated = max((criterion.error(part) for part in parts if not criterion.is_met(part)), default=None)
@@ -133,10 +94,11 @@ def overlap_parts(
                 break
         for place, body in best.items():
             bodies[place] = body
-    return [body.part for body in bodies], Seams(len(seams), tuple(_short(bodies, seams)))
+    short = tuple(_short(bodies, seams, frame))
+    return [body.part for body in bodies], Overlap(len(seams), len(short), short)
 
 
-def _short(bodies: Sequence[_Body], seams: Sequence[_Seam]) -> Iterator[ShortSeam]:
+def _short(bodies: Sequence[_Body], seams: Sequence[_Seam], frame: Frame) -> Iterator[ShortSeam]:
     """The seams with a place that lies in no body as deep as asked for."""
     if not seams:
         return
@@ -146,7 +108,8 @@ def _short(bodies: Sequence[_Body], seams: Sequence[_Seam]) -> Iterator[ShortSea
         deepest = seam.deepest([bodies[i] for i in np.flatnonzero(near).tolist()])
         worst = int((deepest - seam.asked).argmin())
         if deepest[worst] < seam.asked[worst]:
-            yield ShortSeam(seam.parts, seam.places[worst], float(deepest[worst]))
+            x, y, z = frame.to_input(seam.places[worst]).tolist()
+            yield ShortSeam(seam.parts, (x, y, z), float(deepest[worst]) / frame.scale)
 
 
 def _changes(

@@ -14,8 +14,7 @@ from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, heights, length
 from rlacd.solid.component import Part
-from rlacd.solid.frame import ROUNDING
-from rlacd.solid.hull import NO_LIMITS, Hull, keeps
+from rlacd.solid.hull import Hull, keeps
 from rlacd.solid.primitive import Primitive
 
 SIMPLER = 1.25
@@ -41,8 +40,8 @@ def primitive_part(
     part: Part,
     criterion: Criterion,
     kinds: Collection[PrimitiveKind],
-    limits: HullLimits = NO_LIMITS,
-    slack: float = ROUNDING,
+    limits: HullLimits,
+    slack: float,
 ) -> Part:
     """Get the part with a primitive for a hull, if one meets the criterion; otherwise the same part.
 
@@ -103,7 +102,8 @@ def fit_primitives(hull: Hull, kinds: Collection[PrimitiveKind] = PRIMITIVE_KIND
         fitted.append(Primitive("sphere", centre, np.eye(3), (radius,)))
     if not {"box", "capsule", "cylinder"} & set(kinds):
         return fitted
-    shadows = [shadow for axis in _candidate_axes(hull) if (shadow := _Shadow.of(points, axis)) is not None]
+    seen = [_Shadow(points, axis) for axis in _candidate_axes(hull)]
+    shadows = [shadow for shadow in seen if len(shadow.outline) > 2]  # not a line up to rounding
     if not shadows:
         return fitted
     if "box" in kinds:
@@ -178,8 +178,8 @@ class _Shadow:
     area, length : float
     """
 
-    def __init__(self, points: FloatArray, axes: FloatArray) -> None:
-        self._axes = axes
+    def __init__(self, points: FloatArray, axis: FloatArray) -> None:
+        self._axes = axes = _axes_along(axis)
         self._points = heights(points, np.ascontiguousarray(axes.T))
         seen = np.ascontiguousarray(self._points[:, :2])
         self.outline = outline(seen)
@@ -188,12 +188,6 @@ class _Shadow:
         along = self._points[:, 2]
         self._middle = float(along.min() + along.max()) / 2
         self.length = float(np.ptp(along))
-
-    @classmethod
-    def of(cls, points: FloatArray, axis: FloatArray) -> _Shadow | None:
-        """None if the projection is a line up to rounding."""
-        shadow = cls(points, _axes_along(axis))
-        return shadow if len(shadow.outline) > 2 else None
 
     def box(self) -> Primitive:
         """The smallest box with edges along the axis: a side of its base lies along one of the outline."""
@@ -265,12 +259,7 @@ def _distinct(vectors: FloatArray, most: int, together: bool = False) -> list[Fl
         lengths = np.bincount(group.ravel(), weights=lengths)
         vectors = units[first]
     order = np.argsort(-lengths, kind="stable")
-    found: list[FloatArray] = []
-    for direction in _new_directions(iter(vectors[order])):
-        found.append(direction)
-        if len(found) == most:
-            break
-    return found
+    return list(itertools.islice(_new_directions(iter(vectors[order])), most))
 
 
 def _new_directions(vectors: Iterator[FloatArray]) -> Iterator[FloatArray]:

@@ -38,7 +38,7 @@ from rlacd.run import Progress, ProgressCallback
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.poses import inverse, moved
-from rlacd.solid.topology import used_points
+from rlacd.solid.topology import compacted
 
 SHARE = 0.015
 """The distance that hulls may have by default, as a share of the robot's longest side. 20 robots then have 3.9 hulls a
@@ -245,7 +245,7 @@ def decomposed(
 def fitting(mesh: trimesh.Trimesh, options: Mapping[str, Any], body: Body) -> dict[str, Any]:
     """The options with lengths that are too large for the mesh cut to it; too small ones only for the world's."""
     fitted = dict(options)
-    scale = Frame.of(used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces))).scale
+    scale = Frame.of(compacted(np.asarray(mesh.vertices), np.asarray(mesh.faces))[0]).scale
     for name, (least, most) in LENGTHS.items():
         if isinstance(length := fitted.get(f"{name}_abs"), (int, float)):
             length = max(length, least / scale * (1 + ROUNDING)) if body.is_world else length

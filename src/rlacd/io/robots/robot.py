@@ -26,7 +26,7 @@ from rlacd.options.robots import RobotOptions
 from rlacd.solid.arrays import FloatArray, Int64Array
 from rlacd.solid.hull import Hull
 from rlacd.solid.poses import inverse, moved, product
-from rlacd.solid.topology import used_points
+from rlacd.solid.topology import compacted
 
 Found = TypeVar("Found")
 
@@ -193,7 +193,7 @@ class Robot(ABC):
         """
         each = zip(self.bodies, self.shapes(), strict=True)
         moving = [mesh for body, mesh in each if not body.is_world] or self.shapes()
-        used = [used_points(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh in moving]
+        used = [compacted(np.asarray(mesh.vertices), np.asarray(mesh.faces))[0] for mesh in moving]
         return float(np.ptp(np.concatenate(used), axis=0).max()) if used else 0.0
 
     @property
