@@ -39,7 +39,16 @@ inline double max_abs(Vec3 a) { return std::max(std::max(std::fabs(a.x), std::fa
 
 using Triangle = std::array<std::int32_t, 3>;  // indices of the corners, counter-clockwise seen from outside
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kHalfRootOfThree = 0.8660254037844387;  // the cosine of 30 degrees; half the diagonal of a cube
+
+// What rounding may amount to, as a share of what is computed or of the coordinates that it is computed from; and what
+// a single operation may add.
+constexpr double kRounding = 1e-12, kLastBits = 1e-15;
+
+// A length in the frame, whose longest side is 2, that counts as none: far above rounding, far below any tolerance.
+constexpr double kHair = 1e-9;
 
 using PlanePoint = std::array<double, 2>;
 
@@ -116,10 +125,8 @@ class Renumbered {
 };
 
 struct Box {
-  Vec3 lower{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
-             std::numeric_limits<double>::infinity()};
-  Vec3 upper{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
-             -std::numeric_limits<double>::infinity()};
+  Vec3 lower{kInfinity, kInfinity, kInfinity};
+  Vec3 upper{-kInfinity, -kInfinity, -kInfinity};
 
   template <class Points>
   static Box of(const Points& points) {

@@ -16,11 +16,9 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kFewPlanes = 3;  // a direction with fewer planes gets this many extra sections to bound its hulls
 constexpr std::size_t kFewTrials = 1 << 17;  // pairs of a point and a corner
 constexpr std::size_t kManyFaces = 1000;     // from here on, planes are measured two at a time, on two threads
-constexpr double kRounding = 1e-12;          // share of a box's volume; rounding of a hull's volume stays far below
 
 enum Side : std::size_t { kBelow, kAbove };
 
@@ -211,7 +209,7 @@ class Search {
     for (std::size_t i = bundles.place.size(); i-- > 0;)  // the first of equal planes counts
       numbers[bundles.place[i].bundle][bundles.place[i].plane] = static_cast<std::ptrdiff_t>(i);
     directions_.resize(numbers.size());
-    const double slack = kRounding * box_volume(mesh);
+    const double slack = kRounding * box_volume(mesh);  // rounding of a hull's volume stays far below
     parallel_for(directions_.size(), threads, [&](std::size_t k) {
       directions_[k] = std::make_unique<Direction>(solid_, bundles.all[k], numbers[k], slack);
     });

@@ -112,19 +112,17 @@ class Growth {
     const auto [a, b, c] = corners_of(solid_, solid_.faces[item.face]);
     Polygon polygon = {a, b, c};
     for (const HalfSpace& space : found_) {
-      const auto height = [&, offset = space.offset - depth_](Vec3 p) { return dot(space.normal, p) - offset; };
-      const Lies lies = split(polygon, height, deeper_, rest_);
-      if (lies == Lies::kAbove) return;
-      if (lies == Lies::kAcross) polygon.swap(deeper_);
+      const double offset = space.offset - depth_;
+      if (!keep_below(polygon, [&](Vec3 p) { return dot(space.normal, p) - offset; })) return;
     }
     if (item.is_natural) {
       found_.push_back({item.normal, dot(item.normal, a) + item.beyond});
       return;
     }
-    double most = -std::numeric_limits<double>::infinity();
+    double most = -kInfinity;
     std::int32_t best = 0;
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes_.size()); ++i) {
-      double least = std::numeric_limits<double>::infinity();
+      double least = kInfinity;
       for (const Vec3 p : polygon) least = std::min(least, dot(planes_.normal(i), p));
       if (least - planes_.offset(i) > most) {
         most = least - planes_.offset(i);
@@ -141,13 +139,12 @@ class Growth {
   const double depth_;
   std::priority_queue<Item> open_;
   std::vector<HalfSpace> found_;
-  Polygon deeper_, rest_;
 };
 
 }  // namespace
 
-std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const ConvexBody& hull, double depth) {
-  return Growth(solid, bvh, hull, depth).run();
+std::vector<HalfSpace> Against::grown(const ConvexBody& hull, double depth) const {
+  return Growth(solid_, surface_.bvh(), hull, depth).run();
 }
 
 }  // namespace rlacd

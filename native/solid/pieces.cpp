@@ -16,13 +16,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kApart = 1e-10;  // facet planes are moved out by this, so that faces on them stay whole
-constexpr double kHalf = 0.5;     // a winding number between inside and outside
-
-// Where a solid crosses itself, each cut may multiply its crossings: one that doubles its faces, and adds so many, is
-// given up.
-constexpr std::size_t kManyNewFaces = 1000;
-
 bool ascends(const Mesh& mesh, std::int32_t low, const Run& run) {
   return mesh.faces[run.halfedge / 3][run.halfedge % 3] == low;
 }
@@ -130,7 +123,7 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
     if (!(volumes[i] < 0)) continue;
     for (const std::size_t shell : by_volume) {
       if (!surfaces[shell]) surfaces[shell] = std::make_unique<Surface>(all[shell]);
-      if (surfaces[shell]->winding().of_closed(all[i].vertices[0]) <= kHalf) continue;
+      if (!surfaces[shell]->holds(all[i].vertices[0])) continue;
       cavities[shell].push_back(i);
       break;
     }
@@ -177,20 +170,6 @@ std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::v
   halves.push_back(std::move(*below));
   halves.push_back(std::move(*above));
   return halves;
-}
-
-Mesh inside_all(Mesh mesh, const ConvexPlanes& planes) {
-  std::size_t fewest = mesh.faces.size();
-  for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i) {
-    const Vec3 normal = planes.normal(i);
-    const double offset = planes.offset(i) + kApart;
-    if (std::none_of(mesh.vertices.begin(), mesh.vertices.end(), [&](Vec3 p) { return dot(normal, p) > offset; }))
-      continue;
-    mesh = capped(std::move(cut_by_plane(mesh, normal, offset)[0]), normal);
-    if (mesh.faces.size() > 2 * fewest + kManyNewFaces) return {};
-    fewest = std::min(fewest, mesh.faces.size());
-  }
-  return mesh;
 }
 
 }  // namespace rlacd

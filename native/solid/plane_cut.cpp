@@ -12,9 +12,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kOnPlane = 1e-13;  // relative to the mesh's largest coordinate: above the rounding of a height
-constexpr double kFlat = 1e-12;     // relative to the same: corners this close to a line or a plane lie in it
-
 class Cutter {
  public:
   Cutter(const Mesh& mesh, Vec3 normal, double offset)
@@ -25,7 +22,7 @@ class Cutter {
     for (const Vec3 p : points_) {
       const double height = dot(normal, p) - offset;
       heights_.push_back(height);
-      sides_.push_back(std::fabs(height) <= kOnPlane * farthest_ ? 0 : height < 0 ? -1 : 1);
+      sides_.push_back(std::fabs(height) <= kRounding * farthest_ ? 0 : height < 0 ? -1 : 1);
     }
   }
 
@@ -130,7 +127,7 @@ class Cutter {
 
   bool is_between(std::int32_t before, std::int32_t v, std::int32_t after) const {
     const Vec3 a = points_[v] - points_[before], b = points_[after] - points_[v], c = points_[after] - points_[before];
-    return dot(a, b) > 0 && norm(cross(a, b)) <= kFlat * farthest_ * norm(c);
+    return dot(a, b) > 0 && norm(cross(a, b)) <= kRounding * farthest_ * norm(c);
   }
 
   // Moves a point onto its neighbour on the rim, if the faces around it lie in a plane and none flips.
@@ -147,7 +144,7 @@ class Cutter {
       if (is_gone[f]) continue;
       RLACD_ASSERT(std::find(faces[f].begin(), faces[f].end(), v) != faces[f].end());
       for (const std::int32_t corner : faces[f])
-        if (std::fabs(dot(normal, points_[corner] - points_[v])) > kFlat * farthest_) return false;
+        if (std::fabs(dot(normal, points_[corner] - points_[v])) > kRounding * farthest_) return false;
       Triangle moved = faces[f];
       bool has_both = false;
       for (std::int32_t& corner : moved) {

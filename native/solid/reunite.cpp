@@ -17,9 +17,7 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kSame = kCoincident;  // distance at which vertices are one, or on an edge
-constexpr double kFilm = 1e-9;         // thickness of the film over the solids by which the union's volume may differ
-constexpr int kDeepest = 8;            // times that an edge between stops may have stops: two, but for rounding
+constexpr int kDeepest = 8;  // times that an edge between stops may have stops: two, but for rounding
 
 class Reunion {
  public:
@@ -64,8 +62,8 @@ class Reunion {
               [&](std::int32_t a, std::int32_t b) { return std::pair{at(a).x, a} < std::pair{at(b).x, b}; });
     for (auto v = order.begin(); v != order.end(); ++v) {
       if (same[*v] != *v) continue;
-      for (auto w = v + 1; w != order.end() && at(*w).x <= at(*v).x + kSame; ++w)
-        if (same[*w] == *w && max_abs(at(*w) - at(*v)) <= kSame) same[*w] = *v;
+      for (auto w = v + 1; w != order.end() && at(*w).x <= at(*v).x + kCoincident; ++w)
+        if (same[*w] == *w && max_abs(at(*w) - at(*v)) <= kCoincident) same[*w] = *v;
     }
     std::size_t kept = 0;
     for (const Triangle& f : mesh_.faces) {
@@ -110,12 +108,12 @@ class Reunion {
         const double length2 = norm2(along), low = std::min(a.x, a.x + along.x), high = std::max(a.x, a.x + along.x);
         if (stops_.count(undirected(e[0], e[1])) > 0) continue;
         std::vector<std::pair<double, std::int32_t>> stops;
-        for (auto v = std::lower_bound(by_x.begin(), by_x.end(), low - kSame,
+        for (auto v = std::lower_bound(by_x.begin(), by_x.end(), low - kCoincident,
                                        [&](std::int32_t i, double x) { return mesh_.vertices[i].x < x; });
-             v != by_x.end() && mesh_.vertices[*v].x <= high + kSame; ++v) {
+             v != by_x.end() && mesh_.vertices[*v].x <= high + kCoincident; ++v) {
           const Vec3 to = mesh_.vertices[*v] - a;
           const double t = dot(to, along) / length2;
-          if (*v != e[0] && *v != e[1] && t > 0 && t < 1 && norm2(to - t * along) <= kSame * kSame)
+          if (*v != e[0] && *v != e[1] && t > 0 && t < 1 && norm2(to - t * along) <= kCoincident * kCoincident)
             stops.push_back({t, *v});
         }
         if (!stops.empty()) note(e, std::move(stops));
@@ -248,7 +246,8 @@ std::optional<Mesh> reunited(const std::vector<Mesh>& solids) {
     volume += mesh_volume(solid);
     area += mesh_area(solid);
   }
-  if (std::fabs(mesh_volume(*united) - volume) > kFilm * area) return std::nullopt;
+  // A film over the solids of this thickness is the most by which the union's volume may differ.
+  if (std::fabs(mesh_volume(*united) - volume) > kHair * area) return std::nullopt;
   return united;
 }
 

@@ -29,10 +29,7 @@ bool is_film(const Outline& p) {
 
 // Keeps what of a polygon lies left of the line through a and b; false if hardly anything does.
 bool keep_left(Outline& polygon, PlanePoint a, PlanePoint b) {
-  Outline left, right;
-  const Lies lies = split(polygon, [a, b](PlanePoint p) { return -doubled_area(a, b, p); }, left, right);
-  if (lies == Lies::kAcross) polygon.swap(left);
-  return lies != Lies::kAbove && !is_film(polygon);
+  return keep_below(polygon, [a, b](PlanePoint p) { return -doubled_area(a, b, p); }) && !is_film(polygon);
 }
 
 // A triangle with its plane and the two coordinates it is projected to.

@@ -17,7 +17,7 @@ constexpr std::ptrdiff_t kAlone = 20'000;  // trees over no more triangles are m
 struct Ends {
   double least[6];
 
-  Ends() { std::fill(least, least + 6, std::numeric_limits<double>::infinity()); }
+  Ends() { std::fill(least, least + 6, kInfinity); }
   explicit Ends(Vec3 p) : least{p.x, p.y, p.z, -p.x, -p.y, -p.z} {}
   void extend(const Ends& other) {
     for (int i = 0; i < 6; ++i) least[i] = other.least[i] < least[i] ? other.least[i] : least[i];
@@ -101,7 +101,7 @@ Halves split(Items first, Items last, const Ends& centres, int depth) {
     count += counts[i];
     cost_above[i] = count > 0 ? count * above.half_area() : 0;
   }
-  double least = std::numeric_limits<double>::infinity();
+  double least = kInfinity;
   int cut = 0;
   for (int i = 1, count = 0; i < kBins; ++i) {
     if (counts[i - 1] > 0) below.extend(bins[i - 1].box);

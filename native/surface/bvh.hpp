@@ -84,15 +84,14 @@ class Bvh {
   // Triangles are stored in the order of the leaves; a *slot* is a position in that order.
   struct Hit {
     Vec3 point;
-    double distance2 = std::numeric_limits<double>::infinity();
+    double distance2 = kInfinity;
     std::int32_t slot = -1;
   };
 
   // The closest point to p. A hint (the slot of a triangle expected to be near) only makes the query faster. The search
   // ends at the first triangle within `enough`: the distance is then at most `enough`, not the least. If no triangle is
   // nearer than `within`, the slot is -1.
-  Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0,
-              double within = std::numeric_limits<double>::infinity()) const;
+  Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0, double within = kInfinity) const;
 
   // The same closest point, found sooner if the triangle of a slot (-1: none is known) is near: its distance bounds the
   // search, with an allowance for rounding, so that the triangle found is the same without it.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <tuple>
 
 #include "core/elementary.hpp"
 #include "core/invariant.hpp"
@@ -179,20 +178,17 @@ std::pair<std::int64_t, std::vector<std::int64_t>> Groups::labels() {
   return {count, std::move(label)};
 }
 
-ClosedBodies closed_bodies(const Mesh& mesh) {
+std::optional<ClosedBodies> closed_bodies(const Mesh& mesh) {
   const std::vector<std::uint32_t> mate = mates_of(mesh.faces, mesh.vertices.size());
-  ClosedBodies found;
-  if (mate.empty()) return found;
+  if (mate.empty()) return std::nullopt;
   Groups groups(mesh.faces.size());
   for (std::size_t h = 0; h < mate.size(); ++h)
     if (mate[h] < h) groups.join(static_cast<std::int64_t>(h / 3), mate[h] / 3);
-  std::tie(found.count, found.body) = groups.labels();
+  const auto [count, body_of] = groups.labels();
+  ClosedBodies found{body_of, std::vector<double>(count), std::vector<double>(count), std::vector<Box>(count)};
   found.has_no_pinch = are_fans(mesh.faces, mate, mesh.vertices.size());
-  found.volume.resize(found.count);
-  found.area.resize(found.count);
-  found.box.resize(found.count);
-  std::vector<Vec3> normals(mesh.faces.size()), apex(found.count);
-  double height2 = std::numeric_limits<double>::infinity();
+  std::vector<Vec3> normals(mesh.faces.size()), apex(count);
+  double height2 = kInfinity;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     poll_stop(f);
     const auto [a, b, c] = mesh.faces[f];

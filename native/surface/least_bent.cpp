@@ -45,7 +45,7 @@ std::vector<Triangle> least_bent(const Loop& loop) {
     for (int i = 0; i + span < n; ++i) {
       const int k = i + span;
       Chord best;
-      best.cost = std::numeric_limits<double>::infinity();
+      best.cost = kInfinity;
       best.length = chord(i, k).length;
       best.middle = i + 1;  // where costs overflow
       for (int j = i + 1; j < k; ++j) {
