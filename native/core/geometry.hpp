@@ -21,6 +21,7 @@ inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}
 inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
 inline Vec3 operator*(double s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Vec3 operator/(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
 inline bool operator==(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
@@ -94,6 +95,13 @@ inline int longest_side(const Corners& t) {
   for (int k = 1; k < 3; ++k)
     if (norm2(t[(k + 1) % 3] - t[k]) > norm2(t[(longest + 1) % 3] - t[longest])) longest = k;
   return longest;
+}
+
+// Across the longest side, so that they stay well shaped.
+inline std::array<Corners, 2> halves(const Corners& t) {
+  const int k = longest_side(t);
+  const Vec3 p = t[k], q = t[(k + 1) % 3], tip = t[(k + 2) % 3], middle = 0.5 * (p + q);
+  return {{{p, middle, tip}, {middle, q, tip}}};
 }
 
 inline std::vector<Vec3> joined(std::vector<Vec3> points, const std::vector<Vec3>& others) {

@@ -41,8 +41,7 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
   for (const Triangle& f : mesh.faces) {
     const Vec3 scaled = long_normal(mesh, f);
     doubled_area.push_back(norm(scaled));
-    const double length = std::max(doubled_area.back(), std::numeric_limits<double>::min());
-    normals.push_back({scaled.x / length, scaled.y / length, scaled.z / length});
+    normals.push_back(scaled / std::max(doubled_area.back(), std::numeric_limits<double>::min()));
   }
 
   std::vector<ReflexEdge> found;
@@ -77,8 +76,6 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
   return found;
 }
 
-Vec3 divided(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
-
 Vec3 middle(const Mesh& mesh, const ReflexEdge& edge) {
   return 0.5 * (mesh.vertices[edge.end[0]] + mesh.vertices[edge.end[1]]);
 }
@@ -95,7 +92,7 @@ std::vector<double> crease_lengths(const Mesh& mesh, const std::vector<ReflexEdg
   for (const int side : {0, 1})
     for (std::size_t i = 0; i < edges.size(); ++i) {
       const Vec3 along = mesh.vertices[edges[i].end[1 - side]] - mesh.vertices[edges[i].end[side]];
-      ends.push_back({edges[i].end[side], static_cast<std::int32_t>(i), divided(along, length[i])});
+      ends.push_back({edges[i].end[side], static_cast<std::int32_t>(i), along / length[i]});
     }
   std::stable_sort(ends.begin(), ends.end(), [](const End& a, const End& b) { return a.vertex < b.vertex; });
 
@@ -127,7 +124,7 @@ EdgePlanes planes_of(const Mesh& mesh, const ReflexEdge& edge) {
   const Vec3 centre = middle(mesh, edge);
   EdgePlanes planes;
   for (int k = 0; k < 3; ++k) {
-    const Vec3 normal = snapped(k == 0 ? divided(across, norm(across)) : edge.normal[k - 1]);
+    const Vec3 normal = snapped(k == 0 ? across / norm(across) : edge.normal[k - 1]);
     planes[k] = {normal, dot(normal, centre)};
   }
   return planes;

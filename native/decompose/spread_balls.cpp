@@ -1,8 +1,8 @@
 #include "decompose/spread_balls.hpp"
 
+#include <map>
 #include <numeric>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "core/parallel.hpp"
 #include "core/stop.hpp"
@@ -298,13 +298,13 @@ class Spreading {
   class Taken {
    public:
     explicit Taken(double width) : width_(width) {}
-    void add(std::int32_t candidate, Vec3 at) { cells_[key(place(at))].push_back(candidate); }
+    void add(std::int32_t candidate, Vec3 at) { cells_[place(at)].push_back(candidate); }
     bool blocks(Vec3 at, double spacing, const std::vector<Candidate>& candidates) const {
       const auto [i, j, k] = place(at);
       for (std::int64_t c = k - 1; c <= k + 1; ++c)
         for (std::int64_t b = j - 1; b <= j + 1; ++b)
           for (std::int64_t a = i - 1; a <= i + 1; ++a) {
-            const auto cell = cells_.find(key({a, b, c}));
+            const auto cell = cells_.find({a, b, c});
             if (cell == cells_.end()) continue;
             for (const std::int32_t other : cell->second) {
               const double limit = std::min(spacing, kBallSpacing * candidates[other].radius);
@@ -319,14 +319,8 @@ class Spreading {
       return {static_cast<std::int64_t>(std::floor(x.x / width_)), static_cast<std::int64_t>(std::floor(x.y / width_)),
               static_cast<std::int64_t>(std::floor(x.z / width_))};
     }
-    static std::uint64_t key(std::array<std::int64_t, 3> place) {
-      constexpr std::int64_t kOffset = 1 << 20;
-      std::uint64_t joined = 0;
-      for (const std::int64_t p : place) joined = joined << 21 | static_cast<std::uint64_t>(p + kOffset);
-      return joined;
-    }
     double width_;
-    std::unordered_map<std::uint64_t, std::vector<std::int32_t>> cells_;
+    std::map<std::array<std::int64_t, 3>, std::vector<std::int32_t>> cells_;
   };
 
   const Surface& surface_;

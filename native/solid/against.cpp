@@ -88,8 +88,8 @@ struct Look {
   std::int32_t hint;        // the slot of a nearby face of the solid
   double most = kInfinity;  // how far a point of the cell outside the solid may well be
 
-  Look(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
-    radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
+  Look(const Corners& t, std::int32_t near) : corner(t), middle((1.0 / 3) * (t[0] + t[1] + t[2])), hint(near) {
+    radius = std::sqrt(std::max({norm2(t[0] - middle), norm2(t[1] - middle), norm2(t[2] - middle)}));
   }
   bool operator<(const Look& other) const { return most < other.most; }
 };
@@ -277,16 +277,13 @@ bool Against::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
     if (cell.most > threshold) open.push(cell);
     return false;
   };
-  for (const auto& [a, b, c] : facets)
-    if (look_at(Look(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
+  for (const Triangle& facet : facets)
+    if (look_at(Look(corners_of(hull, facet), -1))) return true;
   for (int looked = 0; looked < most && !open.empty(); looked += 2) {
     const Look cell = open.top();
     open.pop();
-    // Across the longest side, so that cells stay well shaped.
-    const int from = longest_side(cell.corner);
-    const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
-    const Vec3 between = 0.5 * (p + q);
-    if (look_at(Look(p, between, tip, cell.hint)) || look_at(Look(between, q, tip, cell.hint))) return true;
+    for (const Corners& half : halves(cell.corner))
+      if (look_at(Look(half, cell.hint))) return true;
   }
   return false;
 }

@@ -45,11 +45,11 @@ class Growth {
     double distance;
     std::int32_t node;  // -1 for a face
     Box box;            // of the node
-    std::int32_t face;
-    double area;
-    Vec3 normal;
-    double beyond;  // how far the hull reaches beyond the face's plane
-    bool is_natural;
+    std::int32_t face = -1;
+    double area = 0;
+    Vec3 normal{};
+    double beyond = 0;  // how far the hull reaches beyond the face's plane
+    bool is_natural = false;
 
     std::tuple<double, bool, bool, double, std::int32_t> order() const {
       return {distance, node < 0, !is_natural, -area, node < 0 ? face : node};
@@ -61,18 +61,10 @@ class Growth {
     const Bvh::Node& node = bvh_.nodes()[number];
     for (int side = 0; side < 2; ++side) {
       if (node.child[side] >= 0) {
-        if (is_in(node.box[side])) {
-          const Box& box = node.box[side];
-          const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
-          open_.push({distance([&](Vec3 n) { return dot(n, middle) - reach_along(n, half); }),
-                      node.child[side],
-                      box,
-                      -1,
-                      0,
-                      {},
-                      0,
-                      false});
-        }
+        const Box& box = node.box[side];
+        const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
+        const auto least = [&](Vec3 n) { return dot(n, middle) - reach_along(n, half); };
+        if (is_in(box)) open_.push({distance(least), node.child[side], box});
         continue;
       }
       for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) open_face(bvh_.face(~node.child[side] + i));

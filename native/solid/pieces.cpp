@@ -149,7 +149,7 @@ std::vector<Vec3> between(const ConvexBody& hull, const std::vector<const Convex
       middle_of(around[by_growth[1].second]->mesh().vertices) - middle_of(around[by_growth[0].second]->mesh().vertices);
   const double length = norm(along);
   if (length == 0) return {};
-  return {{along.x / length, along.y / length, along.z / length}};
+  return {along / length};
 }
 
 std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::vector<Vec3>& directions, double share,

@@ -54,7 +54,11 @@ class Cutter {
         faces.push_back({polygon[k], polygon[k + 2], polygon[(k + 3) % 4]});
       }
     }
-    Loops loops = rims(net(std::move(in_plane)));
+    // Loops against the boundary's edges. Without loops the surface was not closed: its side stays open, with all its
+    // points.
+    std::vector<Edge> boundary = net(std::move(in_plane));
+    for (Edge& e : boundary) std::swap(e[0], e[1]);
+    Loops loops = loops_of(std::move(boundary)).value_or(Loops());
     straighten(faces, loops);
     return compacted(faces, loops);
   }
@@ -84,13 +88,6 @@ class Cutter {
       points_.push_back(p);
     }
     return known->second;
-  }
-
-  // Loops against the boundary's edges. Without loops the surface was not closed: its side stays open, with all its
-  // points.
-  static Loops rims(std::vector<Edge> boundary) {
-    for (Edge& e : boundary) std::swap(e[0], e[1]);
-    return loops_of(std::move(boundary)).value_or(Loops());
   }
 
   // Removes corners of the rims that lie on a straight line in a flat part of the surface, where its triangles met.

@@ -10,14 +10,60 @@
 #include "core/stop.hpp"
 #include "solid/caps.hpp"
 #include "solid/plane_cut.hpp"
-#include "solid/touching.hpp"
 #include "solid/triangulate.hpp"
 
 namespace rlacd {
 
 namespace {
 
-constexpr int kDeepest = 8;  // times that an edge between stops may have stops: two, but for rounding
+constexpr double kCoincident = 1e-8;  // distance at which faces touch, and vertices are one or on an edge
+constexpr int kDeepest = 8;           // times that an edge between stops may have stops: two, but for rounding
+
+bool lies_in(const Plane& plane, const Corners& t) {
+  return std::all_of(t.begin(), t.end(), [&](Vec3 p) { return std::fabs(plane.depth(p)) <= kCoincident; });
+}
+
+struct Facet {
+  Corners corner;
+  Box box;
+  Plane plane;
+  double height;  // twice the area over the longest edge
+
+  explicit Facet(const Corners& t) : corner(t), box(Box::of(t)) {
+    const Vec3 normal = long_normal(t);
+    const double longest = norm(t[(longest_side(t) + 1) % 3] - t[longest_side(t)]);
+    plane = {normalized(normal), dot(normalized(normal), t[0])};
+    height = longest > 0 ? norm(normal) / longest : 0;
+  }
+  bool may_touch(const Facet& other) const {
+    return dot(plane.normal, other.plane.normal) < 0 && box.meets(other.box, kCoincident) &&
+           lies_in(plane, other.corner);
+  }
+};
+
+std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
+  std::vector<Facet> found;
+  for (const Triangle& face : mesh.faces) {
+    const Facet facet(corners_of(mesh, face));
+    if (facet.height > kCoincident && facet.box.meets(box, kCoincident)) found.push_back(facet);
+  }
+  return found;
+}
+
+// Adds the planes in which faces of two solids may lie on each other, unless they are known.
+void add_touching_planes(std::vector<Plane>& planes, const Mesh& a, const Mesh& b) {
+  const std::vector<Facet> others = facets_within(b, box_of_faces(a));
+  std::vector<Facet> own = facets_within(a, box_of_faces(b));
+  // Large faces first: their planes are the most exact.
+  std::stable_sort(own.begin(), own.end(), [](const Facet& f, const Facet& g) { return f.height > g.height; });
+  for (const Facet& facet : own) {
+    poll_stop();
+    if (std::any_of(planes.begin(), planes.end(), [&](const Plane& plane) { return lies_in(plane, facet.corner); }))
+      continue;
+    if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return facet.may_touch(other); }))
+      planes.push_back(facet.plane);
+  }
+}
 
 class Reunion {
  public:
@@ -78,10 +124,8 @@ class Reunion {
     rims_.resize(planes_.size());
     std::size_t kept = 0;
     for (const Triangle& f : mesh_.faces) {
-      const auto own = std::find_if(planes_.begin(), planes_.end(), [&](const Plane& plane) {
-        return std::all_of(f.begin(), f.end(),
-                           [&](std::int32_t v) { return std::fabs(plane.depth(mesh_.vertices[v])) <= kCoincident; });
-      });
+      const auto own = std::find_if(planes_.begin(), planes_.end(),
+                                    [&](const Plane& plane) { return lies_in(plane, corners_of(mesh_, f)); });
       if (own == planes_.end()) {
         mesh_.faces[kept++] = f;
         continue;

@@ -7,7 +7,6 @@
 //      choose, or nearly so.
 
 #include <algorithm>
-#include <array>
 
 #include "core/parallel.hpp"
 #include "core/stop.hpp"
@@ -15,12 +14,6 @@
 
 namespace rlacd {
 namespace {
-
-std::array<Corners, 2> halves(const Corners& corner) {
-  const int k = longest_side(corner);
-  const Vec3 p = corner[k], q = corner[(k + 1) % 3], tip = corner[(k + 2) % 3], middle = 0.5 * (p + q);
-  return {{{p, middle, tip}, {middle, q, tip}}};
-}
 
 constexpr int kLevels = 5;
 

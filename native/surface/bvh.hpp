@@ -97,9 +97,6 @@ class Bvh {
   // search, with an allowance for rounding, so that the triangle found is the same without it.
   Hit closest_near(Vec3 p, std::int32_t near) const;
 
-  // Appends the faces whose first corners are at most `radius` away from x, ascending.
-  void within(Vec3 x, double radius, std::vector<std::int32_t>& found) const;
-
   double distance(std::int32_t slot, Vec3 p) const { return distance_to_triangle(triangles_[slot], p); }
   std::int32_t face(std::int32_t slot) const { return faces_[slot]; }
   std::size_t size() const { return triangles_.size(); }

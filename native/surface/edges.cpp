@@ -45,10 +45,7 @@ struct Spoke {
   bool runs_forward;  // from the smaller vertex to the larger
 };
 
-Vec3 scaled_to_one(Vec3 a) {
-  const double length = std::max(norm(a), std::numeric_limits<double>::min());
-  return {a.x / length, a.y / length, a.z / length};
-}
+Vec3 scaled_to_one(Vec3 a) { return a / std::max(norm(a), std::numeric_limits<double>::min()); }
 
 // Angles of the faces around the edge from `low` to `high`. Any direction across the edge may be zero.
 void measure_angles(const Mesh& mesh, std::int32_t low, std::int32_t high, std::vector<Spoke>& ring) {
