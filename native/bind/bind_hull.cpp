@@ -99,8 +99,6 @@ void bind_hull(nb::module_& m) {
   nb::class_<ConvexBody>(m, "ConvexBody", "A closed convex triangle mesh, prepared for what is asked about it.")
       .def("__init__", released([](ConvexBody* self, const Mesh& mesh) { new (self) ConvexBody(mesh); }), "vertices"_a,
            "faces"_a)
-      .def(
-          "__len__", [](const ConvexBody& self) { return self.mesh().vertices.size(); }, "Number of corners.")
       .def_prop_ro("box",
                    released([](const ConvexBody& self) { return std::array{self.box().lower, self.box().upper}; }),
                    "Lower and upper corner of the bounding box [2, 3].")

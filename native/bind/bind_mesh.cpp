@@ -209,7 +209,6 @@ void bind_mesh(nb::module_& m) {
             for (const ConvexBody* hull : hulls) self->add(static_cast<std::int32_t>(self->size()), hull->box());
           },
           "hulls"_a, "Hulls are numbered from 0.")
-      .def("__len__", &Boxes::size)
       .def(
           "add", [](Boxes& self, std::int32_t number, const ConvexBody& hull) { self.add(number, hull.box()); },
           "number"_a, "hull"_a, "Add the box of a hull; its number is larger than all before.")

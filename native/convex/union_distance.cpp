@@ -39,68 +39,64 @@ class Clipper {
  public:
   // Replaces every polygon by its part outside the convex polytope of the planes with these offsets. A polygon that
   // does not meet it stays whole.
-  void subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets);
+  void subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets) {
+    left_.clear();
+    for (Polygon& polygon : polygons) {
+      if (is_separated(polygon, planes, offsets)) {
+        left_.push_back(std::move(polygon));
+        continue;
+      }
+      cut_off_.clear();
+      rest_ = polygon;
+      auto lies = Lies::kBelow;
+      for (std::size_t k = 0; k < crossed_.size() && lies != Lies::kAbove; ++k) {
+        const Vec3 normal = planes.normal(crossed_[k]);
+        const auto height = [normal, offset = offsets[crossed_[k]]](Vec3 p) {
+          const double h = dot(normal, p) - offset;
+          return std::fabs(h) <= kRounding ? 0.0 : h;  // no clipped polygon is thinner than rounding
+        };
+        lies = split(rest_, height, inside_, outside_);
+        if (lies != Lies::kAcross) continue;
+        rest_.swap(inside_);
+        cut_off_.push_back(outside_);
+      }
+      if (lies == Lies::kAbove)
+        left_.push_back(std::move(polygon));
+      else
+        std::move(cut_off_.begin(), cut_off_.end(), std::back_inserter(left_));
+    }
+    polygons.swap(left_);
+  }
 
  private:
   // Whether a single half-space shows that a polygon does not reach into the intersection; if not, the planes that the
   // polygon crosses are stored in `crossed_`.
-  bool is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets);
+  RLACD_WIDE bool is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets) {
+    const double *x = planes.x(), *y = planes.y(), *z = planes.z();
+    crossed_.clear();
+    for (std::size_t start = 0; start < planes.size(); start += ConvexPlanes::kBlock) {
+      double least[ConvexPlanes::kBlock], most[ConvexPlanes::kBlock];  // heights of the corners above each plane
+      std::fill(least, least + ConvexPlanes::kBlock, kInfinity);
+      std::fill(most, most + ConvexPlanes::kBlock, -kInfinity);
+      for (const Vec3 p : polygon)
+        for (std::size_t i = 0; i < ConvexPlanes::kBlock; ++i) {
+          const std::size_t k = start + i;
+          const double height = x[k] * p.x + y[k] * p.y + z[k] * p.z - offsets[k];
+          least[i] = least[i] < height ? least[i] : height;
+          most[i] = most[i] > height ? most[i] : height;
+        }
+      for (std::size_t i = 0; i < ConvexPlanes::kBlock; ++i) {
+        if (least[i] >= -kRounding) return true;
+        if (most[i] > kRounding) crossed_.push_back(static_cast<std::int32_t>(start + i));
+      }
+    }
+    return false;
+  }
 
   std::vector<std::int32_t> crossed_;
   std::vector<Polygon> left_, cut_off_;
   Polygon rest_, inside_, outside_;
 };
-
-void Clipper::subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets) {
-  left_.clear();
-  for (Polygon& polygon : polygons) {
-    if (is_separated(polygon, planes, offsets)) {
-      left_.push_back(std::move(polygon));
-      continue;
-    }
-    cut_off_.clear();
-    rest_ = polygon;
-    auto lies = Lies::kBelow;
-    for (std::size_t k = 0; k < crossed_.size() && lies != Lies::kAbove; ++k) {
-      const Vec3 normal = planes.normal(crossed_[k]);
-      const auto height = [normal, offset = offsets[crossed_[k]]](Vec3 p) {
-        const double h = dot(normal, p) - offset;
-        return std::fabs(h) <= kRounding ? 0.0 : h;  // no clipped polygon is thinner than rounding
-      };
-      lies = split(rest_, height, inside_, outside_);
-      if (lies != Lies::kAcross) continue;
-      rest_.swap(inside_);
-      cut_off_.push_back(outside_);
-    }
-    if (lies == Lies::kAbove)
-      left_.push_back(std::move(polygon));
-    else
-      std::move(cut_off_.begin(), cut_off_.end(), std::back_inserter(left_));
-  }
-  polygons.swap(left_);
-}
-
-RLACD_WIDE bool Clipper::is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets) {
-  const double *x = planes.x(), *y = planes.y(), *z = planes.z();
-  crossed_.clear();
-  for (std::size_t start = 0; start < planes.size(); start += ConvexPlanes::kBlock) {
-    double least[ConvexPlanes::kBlock], most[ConvexPlanes::kBlock];  // heights of the corners above each plane
-    std::fill(least, least + ConvexPlanes::kBlock, kInfinity);
-    std::fill(most, most + ConvexPlanes::kBlock, -kInfinity);
-    for (const Vec3 p : polygon)
-      for (std::size_t i = 0; i < ConvexPlanes::kBlock; ++i) {
-        const std::size_t k = start + i;
-        const double height = x[k] * p.x + y[k] * p.y + z[k] * p.z - offsets[k];
-        least[i] = least[i] < height ? least[i] : height;
-        most[i] = most[i] > height ? most[i] : height;
-      }
-    for (std::size_t i = 0; i < ConvexPlanes::kBlock; ++i) {
-      if (least[i] >= -kRounding) return true;
-      if (most[i] > kRounding) crossed_.push_back(static_cast<std::int32_t>(start + i));
-    }
-  }
-  return false;
-}
 
 // Polygons merged into one mesh, in which equal corners are one vertex: its distance is computed once.
 class Gathering {

@@ -65,11 +65,9 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
       next = std::find_if(r, static_cast<const Run*>(end), [r](const Run& other) { return other.high != r->high; });
       if (next - r != 2 || r->high == static_cast<std::int32_t>(v)) continue;
       const auto face_of = [](const Run& run) { return static_cast<std::int32_t>(run.halfedge / 3); };
-      const auto ascends = [&](const Run& run) {
-        return mesh.faces[run.halfedge / 3][run.halfedge % 3] == static_cast<std::int32_t>(v);
-      };
-      if (ascends(r[0]) == ascends(r[1])) continue;
-      const Run &up = ascends(r[0]) ? r[0] : r[1], &down = ascends(r[0]) ? r[1] : r[0];
+      const bool is_first = ascends(mesh.faces, v, r[0]);
+      if (is_first == ascends(mesh.faces, v, r[1])) continue;
+      const Run &up = is_first ? r[0] : r[1], &down = is_first ? r[1] : r[0];
       add_if_reflex(static_cast<std::int32_t>(v), r->high, face_of(up), face_of(down));
     }
   }

@@ -16,13 +16,9 @@ namespace rlacd {
 
 namespace {
 
-bool ascends(const Mesh& mesh, std::int32_t low, const Run& run) {
-  return mesh.faces[run.halfedge / 3][run.halfedge % 3] == low;
-}
-
 // Sorts the halfedges between two vertices by angle, such that the solid lies between an ascending one and the one
 // before it. False if ascending and descending halfedges do not alternate.
-bool sort_around(const Mesh& mesh, std::int32_t low, Run* begin, Run* end) {
+bool sort_around(const Mesh& mesh, std::size_t low, Run* begin, Run* end) {
   const Vec3 origin = mesh.vertices[low], along = normalized(mesh.vertices[begin->high] - origin);
   const auto apex = [&](const Run& run) {
     return mesh.vertices[mesh.faces[run.halfedge / 3][(run.halfedge + 2) % 3]] - origin;
@@ -31,7 +27,7 @@ bool sort_around(const Mesh& mesh, std::int32_t low, Run* begin, Run* end) {
   const auto angle = [&](const Run& run) { return angle_of(dot(v, apex(run)), dot(u, apex(run))); };
   std::sort(begin, end, [&](const Run& a, const Run& b) { return angle(a) < angle(b); });
   for (const Run* r = begin; r != end; ++r)
-    if (ascends(mesh, low, *r) == ascends(mesh, low, r + 1 == end ? *begin : r[1])) return false;
+    if (ascends(mesh.faces, low, *r) == ascends(mesh.faces, low, r + 1 == end ? *begin : r[1])) return false;
   return true;
 }
 
@@ -43,13 +39,12 @@ std::vector<Mesh> bodies(const Mesh& mesh) {
   const auto join = [&groups](const Run& a, const Run& b) { groups.join(a.halfedge / 3, b.halfedge / 3); };
   Buckets<Run> runs = sorted_halfedges(mesh.faces, mesh.vertices.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    const auto low = static_cast<std::int32_t>(v);
     const auto [begin, end] = runs.range(v);
     for (Run *first = begin, *after; first != end; first = after) {
       after = std::find_if(first, end, [first](const Run& run) { return run.high != first->high; });
-      if (after - first > 2 && sort_around(mesh, low, first, after)) {
+      if (after - first > 2 && sort_around(mesh, v, first, after)) {
         for (const Run* r = first; r != after; ++r)
-          if (ascends(mesh, low, *r)) join(*r, r == first ? after[-1] : r[-1]);
+          if (ascends(mesh.faces, v, *r)) join(*r, r == first ? after[-1] : r[-1]);
       } else {
         for (const Run* r = first + 1; r != after; ++r) join(*r, r[-1]);
       }

@@ -124,10 +124,7 @@ std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::siz
     if ((end - begin) % 2 != 0) return {};
     for (const Run* r = begin; r != end; r += 2) {
       const bool is_pair = r[0].high == r[1].high && (r + 2 == end || r[2].high != r[0].high);
-      const auto low = static_cast<std::int32_t>(v);
-      const bool ascends[2] = {faces[r[0].halfedge / 3][r[0].halfedge % 3] == low,
-                               faces[r[1].halfedge / 3][r[1].halfedge % 3] == low};
-      if (!is_pair || ascends[0] == ascends[1]) return {};
+      if (!is_pair || ascends(faces, v, r[0]) == ascends(faces, v, r[1])) return {};
       mate[r[0].halfedge] = r[1].halfedge;
       mate[r[1].halfedge] = r[0].halfedge;
     }

@@ -46,6 +46,11 @@ Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t ve
 
 // Halfedge 3 f + c runs from corner c of face f to its next corner.
 
+// Whether a halfedge runs from the smaller of its edge's vertices to the larger.
+inline bool ascends(const std::vector<Triangle>& faces, std::size_t low, const Run& run) {
+  return faces[run.halfedge / 3][run.halfedge % 3] == static_cast<std::int32_t>(low);
+}
+
 // The other halfedge along the same edge; empty if there are not always two, in opposite directions.
 std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::size_t vertices);
 
