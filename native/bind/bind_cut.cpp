@@ -10,6 +10,9 @@
 namespace rlacd {
 
 double scalar(Tag<PlaneScore>);
+auto parts(Piece& own) {
+  return std::tie(own.mesh.vertices, own.mesh.faces, own.volume, own.hull.vertices, own.hull.faces, own.hull_volume);
+}
 
 namespace {
 
@@ -20,41 +23,18 @@ std::vector<double> to_offsets(const OffsetsIn& array, const std::vector<Vec3>& 
   return copied<double>(array);
 }
 
-using Columns =
-    std::tuple<std::vector<Vec3>, std::vector<Triangle>, double, std::vector<Vec3>, std::vector<Triangle>, double>;
-
-std::optional<Columns> columns(std::optional<Piece> piece) {
-  if (!piece) return std::nullopt;
-  return Columns(std::move(piece->mesh.vertices), std::move(piece->mesh.faces), piece->volume,
-                 std::move(piece->hull.vertices), std::move(piece->hull.faces), piece->hull_volume);
-}
-
-auto columns(std::array<std::optional<Piece>, 2> sides) {
-  return std::pair(columns(std::move(sides[0])), columns(std::move(sides[1])));
-}
-
-auto columns(std::vector<Piece> pieces) {
-  std::vector<Columns> all;
-  for (Piece& piece : pieces) all.push_back(*columns(std::optional(std::move(piece))));
-  return all;
-}
-
 }  // namespace
 
 void bind_cut(nb::module_& m) {
-  m.def(
-      "candidate_planes", released([](const Mesh& mesh, const ConvexBody& hull, int per_axis, std::size_t edges) {
-        std::vector<Plane> planes;
-        if (per_axis > 0) planes = equidistant_planes(mesh, hull, per_axis);
-        for (const Plane& plane : concave_planes(mesh, hull, edges)) planes.push_back(plane);
-        std::vector<Vec3> normals;
-        std::vector<double> offsets;
-        for (const auto& [normal, offset] : planes) normals.push_back(normal), offsets.push_back(offset);
-        return std::pair(std::move(normals), std::move(offsets));
-      }),
-      "vertices"_a, "faces"_a, "hull"_a, "per_axis"_a, "edges"_a,
-      "Unit normals [K, 3] and offsets [K] of planes: `per_axis` along each coordinate axis and principal axis, which "
-      "divide the hull's extent into equal slabs, and at most three for each of the concave edges chosen.");
+  m.def("candidate_planes", released([](const Mesh& mesh, const ConvexBody& hull, int per_axis, std::size_t edges) {
+          std::vector<Plane> planes;
+          if (per_axis > 0) planes = equidistant_planes(mesh, hull, per_axis);
+          for (const Plane& plane : concave_planes(mesh, hull, edges)) planes.push_back(plane);
+          return planes;
+        }),
+        "vertices"_a, "faces"_a, "hull"_a, "per_axis"_a, "edges"_a,
+        "Unit normals and offsets [K, 4] of planes: `per_axis` along each coordinate axis and principal axis, which "
+        "divide the hull's extent into equal slabs, and at most three for each of the concave edges chosen.");
   m.def(
       "sweep",
       released([](const Mesh& mesh, const std::vector<Vec3>& directions, const OffsetsIn& offsets, int threads) {
@@ -68,8 +48,8 @@ void bind_cut(nb::module_& m) {
   m.def("find_least_excess",
         released([](const Mesh& mesh, const std::vector<Vec3>& directions, const OffsetsIn& offsets, double exponent,
                     double tie, double least_solid, const std::vector<double>& slivers, int threads) {
-          return static_cast<std::int64_t>(find_least_excess(mesh, directions, to_offsets(offsets, directions),
-                                                             {exponent, tie, least_solid, slivers}, threads));
+          return find_least_excess(mesh, directions, to_offsets(offsets, directions),
+                                   {exponent, tie, least_solid, slivers}, threads);
         }),
         "vertices"_a, "faces"_a, "directions"_a, "offsets"_a, "exponent"_a, "tie"_a, "least_solid"_a, "slivers"_a,
         "threads"_a = 0,
@@ -79,37 +59,32 @@ void bind_cut(nb::module_& m) {
         "extent: the first of `slivers` by which there are valid planes. Costs, the norm's power `exponent` where that "
         "is finite, that differ by no more than `tie` are equal. The mesh must be closed and outward oriented.");
   m.def("cut", released([](const Mesh& mesh, double x, double y, double z, double offset, double least) {
-          return columns(cut(mesh, {x, y, z}, offset, least));
+          return cut(mesh, {x, y, z}, offset, least);
         }),
         "vertices"_a, "faces"_a, "x"_a, "y"_a, "z"_a, "offset"_a, "least"_a,
         "The closed sides below and above a plane of a closed mesh: for each its vertices [V, 3], faces [F, 3] and "
         "volume, and those of its hull; None for a side of no more than the least volume, or without a hull.");
-  m.def(
-      "halve_between",
-      released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<const ConvexBody*>& around, double share,
-                  double least) { return columns(halve(mesh, hull, between(hull, around), share, least)); }),
-      "vertices"_a, "faces"_a, "hull"_a, "around"_a, "share"_a, "least"_a,
-      "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
-      "other of the two hulls around whose volumes it would add the least to: the smaller first, none if one would "
-      "be empty or there are no two.");
+  m.def("halve_between",
+        released([](const Mesh& mesh, const ConvexBody& hull, const std::vector<const ConvexBody*>& around,
+                    double share, double least) { return halve(mesh, hull, between(hull, around), share, least); }),
+        "vertices"_a, "faces"_a, "hull"_a, "around"_a, "share"_a, "least"_a,
+        "The sides of a closed mesh, as `cut` returns them, of a plane at a share of its length, from the one to the "
+        "other of the two hulls around whose volumes it would add the least to: the smaller first, none if one would "
+        "be empty or there are no two.");
   m.def("halve_along",
         released([](const Mesh& mesh, const ConvexBody& hull, bool principal, double share, double least) {
           const auto axes = principal ? principal_axes(mesh) : std::array<Vec3, 3>{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-          return columns(halve(mesh, hull, {axes.begin(), axes.end()}, share, least));
+          return halve(mesh, hull, {axes.begin(), axes.end()}, share, least);
         }),
         "vertices"_a, "faces"_a, "hull"_a, "principal"_a, "share"_a, "least"_a,
         "The same along the longest coordinate axis or principal axis.");
   m.def(
-      "connected_pieces", released([](const Mesh& mesh, double least) {
-        std::optional<std::vector<Piece>> found = connected_pieces(mesh, least);
-        return found ? std::optional(columns(std::move(*found))) : std::nullopt;
-      }),
-      "vertices"_a, "faces"_a, "least"_a,
+      "connected_pieces", released(connected_pieces), "vertices"_a, "faces"_a, "least"_a,
       "The pieces of a closed mesh that edges connect, with their cavities, as `cut` returns its sides, without those "
       "of no more than the least volume; None if all is one piece.");
   m.def("reunite", released([](const std::vector<Mesh>& solids, double least) {
           std::optional<Mesh> united = reunited(solids);
-          return columns(united ? piece_of(std::move(*united), least) : std::nullopt);
+          return united ? piece_of(std::move(*united), least) : std::nullopt;
         }),
         "vertices"_a, "faces"_a, "least"_a,
         "Solids with disjoint interiors that touch face to face as one, as `cut` returns its sides; None if rounding "

@@ -12,28 +12,24 @@
 
 namespace rlacd {
 
-constexpr int fields(Tag<Interval>) { return 2; }
-constexpr int fields(Tag<Pushed>) { return 3; }
+auto parts(Interval& own) { return std::tie(own.lower, own.upper); }
+auto parts(Greatest& own) { return std::tie(own.lower, own.upper, own.at); }
+auto parts(Against::Fit& own) { return std::tie(own.depth, own.reach); }
+auto parts(Pushed& own) { return std::tie(own.best, own.radii, own.ends); }
 
 namespace {
-
-constexpr std::size_t kChunk = 256;  // points, enough to justify a thread
 
 // The closest points of a surface: neighbours in the list are often near each other.
 std::vector<Bvh::Hit> closest(const Bvh& bvh, const std::vector<Vec3>& points, int threads) {
   std::vector<Bvh::Hit> hits(points.size());
-  const auto find = [&](std::size_t i) { hits[i] = bvh.closest_near(points[i], i % kChunk ? hits[i - 1].slot : -1); };
-  parallel_for(points.size(), threads, find, kChunk);
+  const auto find = [&](std::size_t i) { hits[i] = bvh.closest_near(points[i], i % kQuick ? hits[i - 1].slot : -1); };
+  parallel_for(points.size(), threads, find, kQuick);
   return hits;
 }
 
 void require_positive(double tolerance, double gap = 1) {
   require(tolerance > 0, "the tolerance must be positive");
   require(gap > 0, "the gap must be positive");
-}
-
-auto as_tuple(const Greatest& found) {
-  return std::tuple(found.lower, found.upper, std::tuple(found.at.x, found.at.y, found.at.z));
 }
 
 void bind_surface(nb::module_& m) {
@@ -69,7 +65,7 @@ void bind_surface(nb::module_& m) {
                const Bvh::Hit hit = self.bvh().closest(points[i], -1, least.data()[i], most.data()[i]);
                lies[i] = hit.slot >= 0 && hit.distance2 > least.data()[i] * least.data()[i];
              };
-             parallel_for(points.size(), threads, find, kChunk);
+             parallel_for(points.size(), threads, find, kQuick);
              return lies;
            }),
            "points"_a, "least"_a, "most"_a, "threads"_a = 0,
@@ -110,7 +106,7 @@ void bind_surface(nb::module_& m) {
                  const auto find = [&](std::size_t i) {
                    windings[i] = is_closed ? winding.of_closed(points[i]) : winding.at(points[i], accuracy);
                  };
-                 parallel_for(points.size(), threads, find, kChunk);
+                 parallel_for(points.size(), threads, find, kQuick);
                  return windings;
                }),
            "points"_a, "accuracy"_a = 2.0, "threads"_a = 0, "is_closed"_a = false,
@@ -142,8 +138,7 @@ void bind_against(nb::module_& m) {
            "False when one is, or so nearly (0.1 %) that branch and bound gave up.")
       .def("measure", released([](const Against& self, const ConvexBody& hull, double tolerance, double floor) {
              require_positive(tolerance);
-             const Against::Fit fit = self.measure(hull, tolerance, floor);
-             return std::pair(fit.depth, fit.reach);
+             return self.measure(hull, tolerance, floor);
            }),
            "hull"_a, "tolerance"_a, "floor"_a = 0.0,
            "How deep the solid's surface comes into a hull at most, and how far the hull's surface is from the solid: "
@@ -187,10 +182,7 @@ void bind_against(nb::module_& m) {
 
 void bind_union(nb::module_& m) {
   nb::class_<HullUnion>(m, "HullUnion", "The union of convex hulls, each closed, convex and outward oriented.")
-      .def("__init__",
-           released([](HullUnion* self, const std::vector<std::shared_ptr<ConvexBody>>& hulls, int threads) {
-             new (self) HullUnion(hulls, threads);
-           }),
+      .def(nb::init<std::vector<std::shared_ptr<ConvexBody>>, int>(), nb::call_guard<nb::gil_scoped_release>(),
            "hulls"_a, "threads"_a = 0)
       .def("exposed", released([](const HullUnion& self, double gap, int threads) {
              require_positive(1, gap);
@@ -204,14 +196,14 @@ void bind_union(nb::module_& m) {
            released([](const HullUnion& self, const Surface& surface, double tolerance, double gap, int threads,
                        double floor) {
              require_positive(tolerance, gap);
-             return as_tuple(self.over(surface.bvh(), {tolerance, floor}, gap, threads));
+             return self.over(surface.bvh(), {tolerance, floor}, gap, threads);
            }),
            "surface"_a, "tolerance"_a, "gap"_a = 1e-6, "threads"_a = 0, "floor"_a = 0.0,
            "(lower, upper, place) of the greatest distance from the union's surface to the given surface.\n\n"
            "The interval is at most `tolerance` wide, or ends below `floor`.")
       .def("under", released([](const HullUnion& self, const Mesh& mesh, double tolerance, int threads, double floor) {
              require_positive(tolerance);
-             return as_tuple(self.under(mesh, {tolerance, floor}, threads));
+             return self.under(mesh, {tolerance, floor}, threads);
            }),
            "vertices"_a, "faces"_a, "tolerance"_a, "threads"_a = 0, "floor"_a = 0.0,
            "(lower, upper, place) of the greatest distance from the mesh's faces to the union as a solid, 0 inside; as "
@@ -219,7 +211,7 @@ void bind_union(nb::module_& m) {
       .def("distance", released([](const HullUnion& self, const std::vector<Vec3>& points, int threads) {
              std::vector<double> distances(points.size());
              parallel_for(
-                 points.size(), threads, [&](std::size_t i) { distances[i] = self.distance(points[i]); }, kChunk);
+                 points.size(), threads, [&](std::size_t i) { distances[i] = self.distance(points[i]); }, kQuick);
              return distances;
            }),
            "points"_a, "threads"_a = 0, "Distances [N] of points [N, 3] to the solid, 0 inside a hull.");

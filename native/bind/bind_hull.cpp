@@ -10,12 +10,10 @@
 
 namespace rlacd {
 
-constexpr int fields(Tag<Hull>) { return 3; }
-constexpr int fields(Tag<Contact>) { return 2; }
+auto parts(Hull& own) { return std::tie(own.indices, own.faces, own.rank); }
+auto parts(Contact& own) { return std::tie(own.sides, own.places); }
 
 namespace {
-
-constexpr std::size_t kPairsAThread = 8;  // starting a thread takes as long as a few joint hulls of small parts
 
 // The predicates are undefined for infinity and NaN.
 std::vector<Vec3> to_numbers_only(const std::vector<PointsIn>& groups) {
@@ -31,12 +29,12 @@ std::vector<Vec3> to_numbers_only(const std::vector<PointsIn>& groups) {
 std::vector<double> joint_hull_volumes(const std::vector<const ConvexBody*>& hulls, const PairsIn& pairs, int threads) {
   const std::vector<std::int32_t> pair = to_numbers(pairs, hulls.size());
   std::vector<double> volumes(pairs.shape(0));
-  const auto worth_threads = static_cast<int>(1 + volumes.size() / kPairsAThread);
-  parallel_for(volumes.size(), std::min(resolve_threads(threads), worth_threads), [&](std::size_t i) {
+  const auto measure = [&](std::size_t i) {
     HullBuilder hull;
     hull.add(joined(hulls[pair[2 * i]]->mesh().vertices, hulls[pair[2 * i + 1]]->mesh().vertices));
     volumes[i] = hull.volume();
-  });
+  };
+  parallel_for(volumes.size(), threads, measure, kSlower);
   return volumes;
 }
 
@@ -92,8 +90,7 @@ void bind_hull(nb::module_& m) {
           for (const HalfSpace& space : bounds) above.push_back({-space.normal, -space.offset});
           return simplify_hull(hull, max_vertices, max_faces, tolerance, above, enough);
         }),
-        "hull"_a, "max_vertices"_a, "max_faces"_a, "tolerance"_a, "bounds"_a,
-        "enough"_a = std::numeric_limits<double>::infinity(),
+        "hull"_a, "max_vertices"_a, "max_faces"_a, "tolerance"_a, "bounds"_a, "enough"_a = kInfinity,
         "A convex hull (vertices [V, 3], faces [F, 3]) around a convex hull with at most max_vertices corners and "
         "max_faces triangles and little added volume; corners that cost no more than `tolerance` of distance go "
         "anyway. It stays in the half-spaces n.x <= d of bounds [P, 4] (unit n, d), unless the limits leave no such "
@@ -102,11 +99,9 @@ void bind_hull(nb::module_& m) {
   nb::class_<ConvexBody>(m, "ConvexBody", "A closed convex triangle mesh, prepared for what is asked about it.")
       .def("__init__", released([](ConvexBody* self, const Mesh& mesh) { new (self) ConvexBody(mesh); }), "vertices"_a,
            "faces"_a)
-      .def(
-          "__len__", [](const ConvexBody& self) { return self.mesh().vertices.size(); }, "Number of corners.")
-      .def_prop_ro(
-          "box", released([](const ConvexBody& self) { return std::vector<Vec3>{self.box().lower, self.box().upper}; }),
-          "Lower and upper corner of the bounding box [2, 3].")
+      .def_prop_ro("box",
+                   released([](const ConvexBody& self) { return std::array{self.box().lower, self.box().upper}; }),
+                   "Lower and upper corner of the bounding box [2, 3].")
       .def("depths", released([](const ConvexBody& self, const std::vector<Vec3>& points) {
              std::vector<double> depths;
              for (const Vec3 point : points) depths.push_back(self.planes().nearest(point).depth);

@@ -17,10 +17,16 @@
 
 namespace rlacd {
 
-constexpr int fields(Tag<Edges>) { return 3; }
-constexpr int fields(Tag<Wedges>) { return 2; }
-constexpr int fields(Tag<SpreadPoints>) { return 2; }
-constexpr int fields(Tag<Crossings>) { return 2; }
+auto parts(Edges& own) { return std::tie(own.of_halfedge, own.vertices, own.valence); }
+auto parts(Wedges& own) { return std::tie(own.halfedges, own.sides); }
+auto parts(SpreadPoints& own) { return std::tie(own.points, own.faces); }
+auto parts(Crossings& own) { return std::tie(own.pairs, own.corners); }
+auto parts(Welded& own) { return std::tie(own.mesh.vertices, own.mesh.faces, own.is_film); }
+auto parts(MarkedCells& own) { return std::tie(own.origin, own.marks, own.shape); }
+auto parts(Mass& own) { return std::tie(own.volume, own.centre, own.inertia); }
+auto parts(ClosedBodies& own) {
+  return std::tie(own.body, own.volume, own.area, own.box, own.has_no_pinch, own.least_height, own.least_fold);
+}
 
 namespace {
 
@@ -75,11 +81,7 @@ std::pair<std::int64_t, std::vector<std::int64_t>> components(std::int64_t count
 }  // namespace
 
 void bind_mesh(nb::module_& m) {
-  m.def("weld", released([](const WideMesh& mesh) {
-          Welded welded = weld(mesh);
-          return std::tuple(std::move(welded.mesh.vertices), std::move(welded.mesh.faces), std::move(welded.is_film));
-        }),
-        "vertices"_a, "faces"_a,
+  m.def("weld", released([](const WideMesh& mesh) { return weld(mesh); }), "vertices"_a, "faces"_a,
         "The distinct places of the used vertices, in order of first appearance [U, 3]; the faces [G, 3] with three "
         "different corners, and whether they are films [G]. Of faces with the same corners, the first that is wound "
         "like most of them stays; it is a film if as many are wound in either way.");
@@ -137,10 +139,7 @@ void bind_mesh(nb::module_& m) {
   m.def("mark_cells", released([](const WideMesh& mesh, double spacing, double pitch, std::int64_t margin) {
           require(!mesh.faces.empty(), "no faces, no cells");
           require(spacing > 0 && pitch > 0 && margin >= 0, "sizes must be positive");
-          MarkedCells cells = mark_cells(mesh, spacing, pitch, margin);
-          const Vec3 origin = cells.origin;
-          return std::tuple(std::vector{origin.x, origin.y, origin.z}, std::move(cells.marks),
-                            std::tuple(cells.shape[0], cells.shape[1], cells.shape[2]));
+          return mark_cells(mesh, spacing, pitch, margin);
         }),
         "vertices"_a, "faces"_a, "spacing"_a, "pitch"_a, "margin"_a,
         "A grid of cells around a mesh: the middle of the first, which of them hold points of faces spread at this "
@@ -164,13 +163,7 @@ void bind_mesh(nb::module_& m) {
         "labels"_a, "cells"_a, "reach"_a,
         "The label [N] of the nearest labelled cell of a grid [X, Y, Z] at most `reach` cells away from each cell [N, "
         "3]; 0 where there is none.");
-  m.def("closed_bodies", released([](const AnyMesh& mesh) {
-          ClosedBodies found = closed_bodies(mesh);
-          auto bodies = std::tuple(std::move(found.body), std::move(found.volume), std::move(found.area),
-                                   std::move(found.box), found.has_no_pinch, found.least_height, found.least_fold);
-          return found.count == 0 ? std::nullopt : std::optional(std::move(bodies));
-        }),
-        "vertices"_a, "faces"_a,
+  m.def("closed_bodies", released([](const AnyMesh& mesh) { return closed_bodies(mesh); }), "vertices"_a, "faces"_a,
         "The bodies of a mesh all of whose edges join two faces that run along them in opposite directions, else None: "
         "the body [F] of each face; signed volume [B], area [B] and box [B, 6] of each body; whether the faces around "
         "each vertex are all neighbours; the least height of a face, and the least length of the sum of the unit "
@@ -182,24 +175,12 @@ void bind_mesh(nb::module_& m) {
         "Signed volume of a closed triangle mesh.");
   m.def("mesh_area", released([](const AnyMesh& mesh) { return mesh_area(mesh); }), "vertices"_a, "faces"_a,
         "Area of a triangle mesh.");
-  m.def("principal_axes", released([](const AnyMesh& mesh) {
-          const std::array<Vec3, 3> axes = principal_axes(mesh);
-          return std::vector<Vec3>(axes.begin(), axes.end());
-        }),
-        "vertices"_a, "faces"_a,
+  m.def("principal_axes", released([](const AnyMesh& mesh) { return principal_axes(mesh); }), "vertices"_a, "faces"_a,
         "Principal axes [3, 3] of a surface, one per row, longest first, the largest entry of each positive.");
-  m.def("principal_axes_of_points", released([](const std::vector<Vec3>& points) {
-          const std::array<Vec3, 3> axes = principal_axes(points);
-          return std::vector<Vec3>(axes.begin(), axes.end());
-        }),
+  m.def("principal_axes_of_points", released([](const std::vector<Vec3>& points) { return principal_axes(points); }),
         "points"_a, "Principal axes [3, 3] of points [N, 3], likewise.");
-  m.def("mesh_mass", released([](const AnyMesh& mesh) {
-          const Mass mass = mesh_mass(mesh);
-          return std::tuple(mass.volume, std::vector{mass.centre.x, mass.centre.y, mass.centre.z},
-                            std::vector<Vec3>(mass.inertia.begin(), mass.inertia.end()));
-        }),
-        "vertices"_a, "faces"_a,
-        "Volume, centre of mass [3], and inertia about it [3, 3] of the solid of density one in a closed mesh.");
+  m.def("mesh_mass", released([](const AnyMesh& mesh) { return mesh_mass(mesh); }), "vertices"_a, "faces"_a,
+        "Volume, centre of mass, and inertia about it [3, 3] of the solid of density one in a closed mesh.");
   m.def("sample_surface", released(sample_surface), "vertices"_a, "faces"_a, "count"_a, "seed"_a,
         "Points [count, 3] spread evenly by area over a surface, and their faces [count]; the same bits for a seed.");
   m.def("crossings", released([](const Mesh& mesh, const NodesIn& body, std::int64_t most) {
@@ -228,7 +209,6 @@ void bind_mesh(nb::module_& m) {
             for (const ConvexBody* hull : hulls) self->add(static_cast<std::int32_t>(self->size()), hull->box());
           },
           "hulls"_a, "Hulls are numbered from 0.")
-      .def("__len__", &Boxes::size)
       .def(
           "add", [](Boxes& self, std::int32_t number, const ConvexBody& hull) { self.add(number, hull.box()); },
           "number"_a, "hull"_a, "Add the box of a hull; its number is larger than all before.")
@@ -240,8 +220,7 @@ void bind_mesh(nb::module_& m) {
   nb::class_<Simplifier>(m, "Simplifier", "A closed, oriented manifold mesh that gets fewer and fewer triangles.")
       .def("__init__", released([](Simplifier* self, const Mesh& mesh) { new (self) Simplifier(mesh); }), "vertices"_a,
            "faces"_a)
-      .def("reduce", released([](Simplifier& self, std::size_t count, int threads) { self.reduce(count, threads); }),
-           "count"_a, "threads"_a = 1,
+      .def("reduce", &Simplifier::reduce, nb::call_guard<nb::gil_scoped_release>(), "count"_a, "threads"_a = 1,
            "Collapse edges until at most `count` triangles are left, or hardly any edge can be collapsed.")
       .def("mesh", released(&Simplifier::mesh), "The vertices [V, 3] and faces [F, 3] reached.");
 }

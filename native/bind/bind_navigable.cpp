@@ -4,7 +4,7 @@
 
 namespace rlacd {
 
-constexpr int fields(Tag<Balls>) { return 2; }
+auto parts(Balls& own) { return std::tie(own.centres, own.radii); }
 
 void bind_navigable(nb::module_& m) {
   m.def(
@@ -33,11 +33,7 @@ void bind_navigable(nb::module_& m) {
                        const std::optional<VectorIn<std::int32_t>>& candidates, double least, bool first) {
              std::vector<std::int32_t> among;
              if (candidates) among = to_numbers(*candidates, self.centres.size());
-             std::vector<std::int32_t> balls;
-             std::vector<double> depths;
-             for (const auto& [ball, depth] : intrusions(hull, self, candidates ? &among : nullptr, least, first))
-               balls.push_back(ball), depths.push_back(depth);
-             return std::pair(std::move(balls), std::move(depths));
+             return intrusions(hull, self, candidates ? &among : nullptr, least, first);
            }),
            "hull"_a, "candidates"_a.none(), "least"_a, "first"_a = false,
            "Which of the candidates (None: of all balls) a convex hull reaches deeper than `least` into: (balls [K], "

@@ -106,27 +106,23 @@ struct FromArrays<std::vector<Vec3>> {
   using Arguments = std::tuple<PointsIn>;
   static std::vector<Vec3> make(const PointsIn& points) { return to_points(points); }
 };
-template <>
-struct FromArrays<Mesh> {
-  using Arguments = std::tuple<PointsIn, FacesIn>;
-  static Mesh make(const PointsIn& vertices, const FacesIn& faces) {
-    return {to_points(vertices), to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)))};
+template <class Made, class Faces>
+struct MeshFromArrays {
+  using Arguments = std::tuple<PointsIn, Faces>;
+  static Made make(const PointsIn& vertices, const Faces& faces) {
+    Made mesh;
+    mesh.vertices = copied<Vec3>(vertices);
+    mesh.faces = to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)));
+    if constexpr (std::is_same_v<Made, Mesh>) require_finite(mesh.vertices);
+    return mesh;
   }
 };
 template <>
-struct FromArrays<AnyMesh> {
-  using Arguments = std::tuple<PointsIn, FacesIn>;
-  static AnyMesh make(const PointsIn& vertices, const FacesIn& faces) {
-    return {{copied<Vec3>(vertices), to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)))}};
-  }
-};
+struct FromArrays<Mesh> : MeshFromArrays<Mesh, FacesIn> {};
 template <>
-struct FromArrays<WideMesh> {
-  using Arguments = std::tuple<PointsIn, WideFacesIn>;
-  static WideMesh make(const PointsIn& vertices, const WideFacesIn& faces) {
-    return {{copied<Vec3>(vertices), to_faces(faces, static_cast<std::int64_t>(vertices.shape(0)))}};
-  }
-};
+struct FromArrays<AnyMesh> : MeshFromArrays<AnyMesh, FacesIn> {};
+template <>
+struct FromArrays<WideMesh> : MeshFromArrays<WideMesh, WideFacesIn> {};
 template <>
 struct FromArrays<std::vector<Mesh>> {
   using Arguments = std::tuple<std::vector<PointsIn>, std::vector<FacesIn>>;
@@ -182,9 +178,20 @@ constexpr bool is_a = false;
 template <template <class...> class Of, class... T>
 constexpr bool is_a<Of, Of<T...>> = true;
 
-// How many fields a struct has that becomes a tuple of them.
-constexpr int fields(Tag<Mesh>) { return 2; }
-constexpr int fields(...) { return 0; }
+// The parts of a struct that becomes a tuple of them; of other types nothing.
+inline auto parts(Mesh& own) { return std::tie(own.vertices, own.faces); }
+inline auto parts(Vec3& own) { return std::tie(own.x, own.y, own.z); }
+template <class T, std::size_t n>
+auto parts(std::array<T, n>& own) {
+  return std::apply([](auto&... part) { return std::tie(part...); }, own);
+}
+void parts(...);
+
+// Rows of a fixed number become an array too.
+template <std::size_t n>
+auto out(const std::array<Vec3, n>& own) {
+  return Rows<double, Vec3>{{own.begin(), own.end()}};
+}
 
 // A kernel's result as what nanobind turns into Python's: vectors of rows become arrays, structs tuples.
 template <class T>
@@ -205,12 +212,8 @@ auto out(T own) {
     return own ? std::optional(out(std::move(*own))) : std::nullopt;
   } else if constexpr (is_a<std::tuple, T> || is_a<std::pair, T>) {
     return std::apply(each, own);
-  } else if constexpr (fields(Tag<T>()) == 2) {
-    auto& [a, b] = own;
-    return each(a, b);
-  } else if constexpr (fields(Tag<T>()) == 3) {
-    auto& [a, b, c] = own;
-    return each(a, b, c);
+  } else if constexpr (!std::is_void_v<decltype(parts(own))>) {
+    return std::apply(each, parts(own));
   } else {
     return own;
   }

@@ -62,7 +62,7 @@ std::vector<ConvexBody::Side> sides_of(const Mesh& hull) {
                                              std::llround(kSameNormal * normal.z)};
     const auto [found, is_new] = known.emplace(key, sides.size());
     if (is_new) {
-      sides.push_back({{normal, -std::numeric_limits<double>::infinity()}, {}});
+      sides.push_back({{normal, -kInfinity}, {}});
       corners.emplace_back();
     }
     std::vector<std::int32_t>& own = corners[found->second];

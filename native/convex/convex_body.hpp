@@ -28,7 +28,7 @@ class ConvexBody {
 
   // Signed distance of p; once the distance is known to be at least `enough`, any number between the two may be
   // returned.
-  double distance(Vec3 p, double enough = std::numeric_limits<double>::infinity()) const;
+  double distance(Vec3 p, double enough = kInfinity) const;
 
   // Triangles of equal normals, up to rounding.
   struct Side {

@@ -12,10 +12,6 @@
 namespace rlacd {
 namespace {
 
-// Facets whose plane a new point misses by less than this count as visible, so that the point's new facets never lie in
-// the plane of a neighbour and have nonzero area. A final scaling of that order makes up for the loss.
-constexpr double kFlat = 1e-9;
-
 // A collapse whose point is farther away than this (the hull is about 2 wide) adds too much volume to be useful.
 constexpr double kReach = 50;
 
@@ -96,7 +92,6 @@ bool ConvexCollapse::is_near(std::int32_t from, std::int32_t to) {
 double ConvexCollapse::reach(std::int32_t corner) {
   double& reach = reach_[corner];
   if (!std::isnan(reach)) return reach;
-  constexpr double kEverywhere = std::numeric_limits<double>::infinity();
   const Vec3 a = places_[corner];
   Vec3 normals;
   double facets = 0;
@@ -108,7 +103,7 @@ double ConvexCollapse::reach(std::int32_t corner) {
     const int i = facet.corner[0] == corner ? 0 : facet.corner[1] == corner ? 1 : 2;
     const Vec3 b = places_[facet.corner[(i + 1) % 3]] - a, c = places_[facet.corner[(i + 2) % 3]] - a;
     const Vec3 product = cross(b, c);
-    if (norm(product) <= kSliver * std::max({norm2(b), norm2(c), norm2(c - b)})) return reach = kEverywhere;
+    if (norm(product) <= kSliver * std::max({norm2(b), norm2(c), norm2(c - b)})) return reach = kInfinity;
     normals = normals + normalized(product);
     ++facets;
     edges_.push_back(b);
@@ -116,7 +111,7 @@ double ConvexCollapse::reach(std::int32_t corner) {
   } while (f != facet_of_[corner]);
   for (const Vec3 edge : edges_) {
     const double depth = -dot(normals, edge) / facets;
-    reach = std::max(reach, depth > 0 ? norm(edge) / depth : kEverywhere);
+    reach = std::max(reach, depth > 0 ? norm(edge) / depth : kInfinity);
   }
   return reach;
 }
@@ -138,8 +133,10 @@ bool ConvexCollapse::gather(std::int32_t from, std::int32_t to) {
   return joined;
 }
 
+// Facets whose plane a point misses by a hair count as visible, so that its new facets never lie in the plane of a
+// neighbour and have nonzero area. A final scaling of that order makes up for the loss.
 bool ConvexCollapse::find_horizon_of(Vec3 point) {
-  return find_horizon([point](const Facet& f) { return dot(f.normal, point) - f.offset >= -kFlat; });
+  return find_horizon([point](const Facet& f) { return dot(f.normal, point) - f.offset >= -kHair; });
 }
 
 std::optional<ConvexCollapse::Collapse> ConvexCollapse::plan(std::int32_t from, std::int32_t to) {
@@ -191,7 +188,7 @@ void ConvexCollapse::apply(const Collapse& collapse) {
   }
   for (std::size_t i = 0; i < ring.size(); ++i) {
     const Facet& before = facets_[fan[(i + ring.size() - 1) % ring.size()]];
-    const bool is_across_flat = dot(before.normal, points_[ring[i].to]) - before.offset >= -kFlat;
+    const bool is_across_flat = dot(before.normal, points_[ring[i].to]) - before.offset >= -kHair;
     if (ring.size() < kManyCorners || !is_across_flat) schedule(ring[i].from, apex);
   }
 }

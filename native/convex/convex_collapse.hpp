@@ -3,7 +3,7 @@
 // In:  a convex hull around the origin, about as wide in all directions.
 // Out: convex hulls around it with fewer and fewer corners, the cheapest edge collapse first.
 // Invariants: the living facets form a closed, outward oriented triangle mesh of sphere topology; it is convex up to
-// kFlat; every collapse replaces it by its hull with one new point.
+// a hair; every collapse replaces it by its hull with one new point.
 #pragma once
 
 #include <cstdint>

@@ -10,15 +10,11 @@ namespace {
 
 // Planes whose normals are closer than this are one. Like every other it is pushed out to touch the hull, so merging
 // the two changes a depth by at most this times the hull's diameter, and only upwards.
-constexpr double kSameNormal = 1e-9;
 
 // A hull is thin if its mean thickness is below this share of its extent. The planes of its facets then meet at such
 // small angles, or have such uncertain normals, that they hold far more than the hull: beyond the rim of a flat one,
 // beyond the tip of a needle.
 constexpr double kThin = 3e-4;
-
-// Planes that touch a hull in an edge touch both its ends within this share of the extent.
-constexpr double kTouching = 1e-12;
 
 // Pushes planes out until they touch a point.
 RLACD_WIDE void push_out(double* h, const double* x, const double* y, const double* z, std::size_t count, Vec3 p) {
@@ -33,9 +29,7 @@ struct Facet {
   double area;
   Vec3 normal;
   Facet(double a, Vec3 n)
-      : key{std::llround(n.x / kSameNormal), std::llround(n.y / kSameNormal), std::llround(n.z / kSameNormal)},
-        area(a),
-        normal(n) {}
+      : key{std::llround(n.x / kHair), std::llround(n.y / kHair), std::llround(n.z / kHair)}, area(a), normal(n) {}
   bool operator<(const Facet& other) const { return key != other.key ? key < other.key : area > other.area; }
 };
 
@@ -48,8 +42,8 @@ void add_around(const Mesh& hull, double extent, std::vector<Facet>& facets) {
     for (int k = 0; k < 3; ++k) {
       const Vec3 from = hull.vertices[face[k]], to = hull.vertices[face[(k + 1) % 3]];
       const Vec3 across = normalized(cross(to - from, flat));
-      if (!(std::fabs(norm2(across) - 1) < 1e-12)) continue;
-      const double least = std::min(dot(across, from), dot(across, to)) + kTouching * extent;
+      if (!(std::fabs(norm2(across) - 1) < kRounding)) continue;
+      const double least = std::min(dot(across, from), dot(across, to)) + kRounding * extent;
       if (std::all_of(hull.vertices.begin(), hull.vertices.end(), [&](Vec3 p) { return dot(across, p) <= least; }))
         around.emplace_back(0, across);
     }
@@ -72,7 +66,7 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
     const double area = norm(product);
     if (!(area > 0)) continue;
     const Vec3 n = (1 / area) * product;
-    if (!(std::fabs(norm2(n) - 1) < 1e-12)) continue;  // underflow
+    if (!(std::fabs(norm2(n) - 1) < kRounding)) continue;  // underflow
     facets.emplace_back(area, n);
   }
   if (facets.empty()) throw std::invalid_argument("the hull has no facet with an area");
@@ -88,7 +82,7 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
   x_.assign(padded, 0);
   y_.assign(padded, 0);
   z_.assign(padded, 0);
-  h_.assign(padded, -std::numeric_limits<double>::infinity());
+  h_.assign(padded, -kInfinity);
   for (std::size_t i = 0; i < count_; ++i) {
     x_[i] = facets[i].normal.x;
     y_[i] = facets[i].normal.y;
@@ -102,14 +96,14 @@ ConvexPlanes::ConvexPlanes(const Mesh& hull) {
     poll_stop();
     push_out(h_.data(), x_.data(), y_.data(), z_.data(), padded, hull.vertices[v]);
   }
-  std::fill(h_.begin() + static_cast<std::ptrdiff_t>(count_), h_.end(), std::numeric_limits<double>::infinity());
+  std::fill(h_.begin() + static_cast<std::ptrdiff_t>(count_), h_.end(), kInfinity);
 }
 
 RLACD_WIDE ConvexPlanes::Nearest ConvexPlanes::nearest(Vec3 p) const {
   Nearest best;
   double depths[kBlock];
   for (std::size_t start = 0; start < h_.size(); start += kBlock) {
-    double least = std::numeric_limits<double>::infinity();
+    double least = kInfinity;
     for (std::size_t i = 0; i < kBlock; ++i)
       depths[i] = h_[start + i] - (x_[start + i] * p.x + y_[start + i] * p.y + z_[start + i] * p.z);
     for (std::size_t i = 0; i < kBlock; ++i) least = depths[i] < least ? depths[i] : least;

@@ -44,7 +44,7 @@ class ConvexPlanes {
   double depth(std::int32_t i, Vec3 p) const { return h_[i] - (x_[i] * p.x + y_[i] * p.y + z_[i] * p.z); }
 
   struct Nearest {
-    double depth = std::numeric_limits<double>::infinity();
+    double depth = kInfinity;
     std::int32_t plane = -1;
   };
   // The plane of least depth: for a point inside the hull, the distance to its surface; negative outside.

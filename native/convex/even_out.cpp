@@ -15,8 +15,6 @@ constexpr double kFirstMove = 0.5;  // of the farthest corner, as a share of its
 constexpr int kTries = 4;
 constexpr double kNearly = 1.2;
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
-
 struct Cut {
   double depth;     // how far the inner hull reaches beyond the facet; negative if it does not
   double scale;     // of the outer hull, that would just hold it; infinite if none does
@@ -36,7 +34,7 @@ Cut cut_by(const Mesh& outer, const Triangle& face, const std::vector<Vec3>& inn
   for (const Vec3 p : inner)
     if (const double height = dot(cut.normal, p); height > most) most = height, deepest = p;
   cut.depth = most - offset;
-  cut.scale = offset > 0 ? most / offset : kNever;
+  cut.scale = offset > 0 ? most / offset : kInfinity;
   const Vec3 q = deepest - cut.depth * cut.normal;
   double sum = 0;
   for (int i = 0; i < 3; ++i) {

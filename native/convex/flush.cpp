@@ -15,14 +15,13 @@ constexpr double kWithin = 0.3;        // share by which places are moved from t
 constexpr double kReached = 1 - 1e-6;  // share of a depth that counts as all of it, for rounding
 
 // What of a polygon lies below a plane.
-Polygon cut(const Polygon& polygon, const Plane& plane) {
-  Polygon below, above;
-  const Lies lies = split(polygon, [&](Vec3 p) { return -plane.depth(p); }, below, above);
-  return lies == Lies::kBelow ? polygon : below;
+Polygon cut(Polygon polygon, const Plane& plane) {
+  if (!keep_below(polygon, [&](Vec3 p) { return -plane.depth(p); })) polygon.clear();
+  return polygon;
 }
 
 struct Range {
-  double least = std::numeric_limits<double>::infinity(), most = -std::numeric_limits<double>::infinity();
+  double least = kInfinity, most = -kInfinity;
 };
 
 // How far points lie beyond a plane.

@@ -18,21 +18,6 @@ constexpr double kFat = 1e-2;     // least ratio of inradius to extent at which 
 
 }  // namespace
 
-void HullBuilder::reserve(std::size_t points) {
-  points_.reserve(points);
-  next_outside_.reserve(points);
-}
-
-void HullBuilder::clear() {
-  rank_ = -1;
-  points_.clear();
-  facets_.clear();
-  free_.clear();
-  next_outside_.clear();
-  extent_ = Box();
-  reach_ = 0;
-}
-
 void HullBuilder::drop_inner_points() {
   if (rank_ < 3) return;
   std::vector<Vec3> corners;
@@ -173,7 +158,6 @@ void HullBuilder::add(const std::vector<Vec3>& points) {
   for (const std::int32_t id : alive)
     if (facets_[id].outside >= 0) pending.push_back(id);
   expand(pending);
-  RLACD_ASSERT(is_closed());
 }
 
 // Invariant between insertions: every point that lies outside the hull is in the list of one facet that sees it, and
@@ -195,21 +179,6 @@ void HullBuilder::expand(std::vector<std::int32_t>& pending) {
     }
     insert(farthest, id, pending);
   }
-}
-
-bool HullBuilder::is_closed() const {
-  for (std::size_t id = 0; id < facets_.size(); ++id) {
-    const Facet& f = facets_[id];
-    for (int e = 0; e < 3 && f.alive; ++e) {
-      const Facet& g = facets_[f.neighbour[e]];
-      bool meets = false;
-      for (int k = 0; k < 3; ++k)
-        meets = meets || (g.corner[k] == f.corner[(e + 1) % 3] && g.corner[(k + 1) % 3] == f.corner[e] &&
-                          g.neighbour[k] == static_cast<std::int32_t>(id));
-      if (!meets || !g.alive) return false;
-    }
-  }
-  return true;
 }
 
 // Replaces the facets that the point sees by a cone of triangles over their horizon.
@@ -292,17 +261,6 @@ std::vector<std::int32_t> HullBuilder::extreme_corners() const {
   return extreme;
 }
 
-std::vector<std::int32_t> HullBuilder::corners() const {
-  std::vector<bool> used(points_.size(), rank_ < 3);
-  for (const Facet& f : facets_)
-    if (f.alive)
-      for (const std::int32_t corner : f.corner) used[corner] = true;
-  std::vector<std::int32_t> result;
-  for (std::size_t i = 0; i < used.size(); ++i)
-    if (used[i]) result.push_back(static_cast<std::int32_t>(i));
-  return result;
-}
-
 namespace {
 
 // The exponent of the power of two that brings the points into the range where the predicates are exact; 0 inside it.
@@ -325,7 +283,6 @@ Hull convex_hull(const std::vector<Vec3>& points) {
     return convex_hull(scaled);
   }
   HullBuilder builder;
-  builder.reserve(points.size());
   builder.add(points);
   hull.rank = builder.rank();
   if (hull.rank < 3) return hull;
@@ -335,9 +292,9 @@ Hull convex_hull(const std::vector<Vec3>& points) {
   if (hull.faces.size() > 2 * hull.indices.size() - 4) {  // a corner inside a facet or an edge of the polytope
     std::vector<Vec3> extreme;
     for (const std::int32_t i : hull.indices) extreme.push_back(points[i]);
-    builder.clear();
-    builder.add(extreme);
-    hull.faces = builder.triangles();
+    HullBuilder again;
+    again.add(extreme);
+    hull.faces = again.triangles();
     return hull;
   }
   std::vector<std::int32_t> rank_of(points.size(), -1);

@@ -32,9 +32,6 @@ class HullBuilder : Facets<HullFacet> {
   // hull. Decisions about the points that are added stay exact.
   explicit HullBuilder(double tolerance = 0) : tolerance_(tolerance) {}
 
-  void reserve(std::size_t points);
-  void clear();
-
   // Extends the hull by a batch of points. Earlier points keep their numbers, in the order they were added.
   void add(const std::vector<Vec3>& points);
 
@@ -48,7 +45,6 @@ class HullBuilder : Facets<HullFacet> {
   const std::vector<Vec3>& points() const { return points_; }
   const Box& extent() const { return extent_; }  // of all points
   std::vector<Triangle> triangles() const;
-  std::vector<std::int32_t> corners() const;  // ascending: points that are corners of facets (rank 3), or all points
   std::vector<std::int32_t> extreme_corners() const;  // those not inside a facet or an edge of the polytope (rank 3)
 
  private:
@@ -56,7 +52,6 @@ class HullBuilder : Facets<HullFacet> {
   bool sees(const Facet& f, Vec3 p) const;
   bool sees_closely(const Facet& f, Vec3 p) const;
   bool initialise();
-  bool is_closed() const;  // every edge of a facet is an edge of its neighbour in the opposite direction
   std::int32_t new_facet(std::int32_t a, std::int32_t b, std::int32_t c);
   template <class Sees>
   void assign(std::int32_t point, const std::vector<std::int32_t>& facets, const Sees& sees);

@@ -20,7 +20,6 @@ using Above = Plane;  // what lies above it: normal . x >= offset
 namespace linear_program {
 
 constexpr double kViolated = 1e-11;
-constexpr double kParallel = 1e-12;
 
 struct Above2 {
   double x, y, offset;
@@ -33,9 +32,9 @@ inline std::optional<PlanePoint> on_line(PlanePoint start, PlanePoint along, dou
   for (std::size_t i = 0; i < count; ++i) {
     const Above2& c = constraints[i];
     const double rate = c.x * along[0] + c.y * along[1], missing = c.offset - (c.x * start[0] + c.y * start[1]);
-    if (rate > kParallel)
+    if (rate > kRounding)
       low = std::max(low, missing / rate);
-    else if (rate < -kParallel)
+    else if (rate < -kRounding)
       high = std::min(high, missing / rate);
     else if (missing > kViolated)
       return std::nullopt;
@@ -51,7 +50,7 @@ inline std::optional<PlanePoint> lowest2(PlanePoint objective, const std::vector
     const Above2& c = constraints[i];
     if (c.x * best[0] + c.y * best[1] >= c.offset - kViolated) continue;
     const double length2 = c.x * c.x + c.y * c.y;
-    if (!(length2 > kParallel * kParallel)) return std::nullopt;
+    if (!(length2 > kRounding * kRounding)) return std::nullopt;
     const double length = std::sqrt(length2);
     const PlanePoint start = {c.offset * c.x / length2, c.offset * c.y / length2},
                      along = {-c.y / length, c.x / length};

@@ -30,7 +30,7 @@ inline PlanePoint on_the_way(PlanePoint p, PlanePoint q, double share) {
 template <class Point, class Height>
 Lies split(const std::vector<Point>& polygon, const Height& height, std::vector<Point>& below,
            std::vector<Point>& above) {
-  double least = std::numeric_limits<double>::infinity(), most = -least;
+  double least = kInfinity, most = -least;
   for (const Point& p : polygon) {
     const double h = height(p);
     least = std::min(least, h), most = std::max(most, h);
@@ -51,6 +51,15 @@ Lies split(const std::vector<Point>& polygon, const Height& height, std::vector<
     here = next;
   }
   return Lies::kAcross;
+}
+
+// Keeps what of a polygon lies below height 0; false, and nothing is changed, if it lies above.
+template <class Point, class Height>
+bool keep_below(std::vector<Point>& polygon, const Height& height) {
+  thread_local std::vector<Point> below, above;  // many small polygons would allocate them again and again
+  const Lies lies = split(polygon, height, below, above);
+  if (lies == Lies::kAcross) polygon.swap(below);
+  return lies != Lies::kAbove;
 }
 
 }  // namespace rlacd

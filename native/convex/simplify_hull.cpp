@@ -22,10 +22,6 @@ constexpr std::size_t kFewCorners = 10;
 constexpr double kLastStretch = 1.5, kStep = 1.1;
 constexpr int kSweepsOnTheWay = 3, kSweepsAtTheEnd = 30;
 
-// Hulls thinner than this share of their length are first thickened to it: rounding is 1e-4 of a thickness of 1e-12,
-// and where two facets meet at the tip of a needle that much of its length would be left outside.
-constexpr double kThinnest = 1e-9;
-
 // The affine map to a frame where the hull is about 2 wide in three perpendicular directions and around the origin. The
 // directions come from extreme points (the longest line, the point farthest from it), not from second moments, whose
 // cancellation would lose a plate's thickness below 1e-8 of its width.
@@ -233,7 +229,7 @@ Mesh relax_around(Mesh outer, const Mesh& inner, const std::vector<Above>& bound
       if (!sound || !(norm2(objective) > 0)) continue;
       objective = normalized(objective);
       const std::optional<Vec3> lowest = lowest_point(objective, constraints, kFarthestMove);
-      if (lowest && dot(objective, *lowest) < dot(objective, v[w]) - 1e-12) v[w] = *lowest;
+      if (lowest && dot(objective, *lowest) < dot(objective, v[w]) - kRounding) v[w] = *lowest;
     }
     Mesh next = hull_mesh(v);
     const double reached = mesh_volume(next);
@@ -262,7 +258,9 @@ Mesh simplify_hull(const ConvexBody& body, std::size_t max_vertices, std::size_t
   const std::size_t most = std::min(max_vertices, (max_faces + 4) / 2);
   const Mesh& hull = body.mesh();
   const Whitening whitening(hull.vertices);
-  if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kThinnest); !thick.empty())
+  // Hulls thinner than a hair, if they are 1 long, are first thickened to it: rounding is 1e-4 of a thickness of 1e-12,
+  // and where two facets meet at the tip of a needle that much of its length would be left outside.
+  if (const std::vector<Vec3> thick = whitening.thickened(hull.vertices, kHair); !thick.empty())
     return hull.vertices.size() <= most
                ? hull
                : simplify_hull(ConvexBody(hull_mesh(thick)), max_vertices, max_faces, tolerance, {}, enough);

@@ -6,17 +6,10 @@
 
 #include "convex/polygon.hpp"
 #include "core/stop.hpp"
-#include "surface/surface_field.hpp"
 #include "surface/weld.hpp"
 
 namespace rlacd {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Planes are moved out by this before a triangle of the surface is clipped by them, so that the hulls on both sides of
-// a cut leave no rounding slivers between them. The material lost lies at most this far beyond every facet's plane.
-constexpr double kInsideSlack = 1e-9;
 
 // A facet cut into more pieces than this is left whole.
 constexpr std::size_t kMostPieces = 4096;
@@ -24,79 +17,86 @@ constexpr std::size_t kMostPieces = 4096;
 // Two facets face the same way when the angle between them is below 60 degrees.
 constexpr double kSameWay = 0.5;
 
-// Corners this close to a plane count as on it: no clipped polygon is thinner than rounding.
-constexpr double kOnPlane = 1e-12;
-
 using Offsets = std::vector<double>;  // of facet planes, instead of their own, and padded like those
+
+// Distance to a surface; the witnesses are its triangles, by their slots.
+class SurfaceField {
+ public:
+  explicit SurfaceField(const Bvh& bvh) : bvh_(bvh) {}
+
+  Sample at(Vec3 p, std::int32_t hint, double enough) const {
+    const Bvh::Hit hit = bvh_.closest(p, hint, enough);
+    return {std::sqrt(hit.distance2), hit.slot};
+  }
+  double from(std::int32_t slot, Vec3 p) const { return bvh_.distance(slot, p); }
+
+ private:
+  const Bvh& bvh_;
+};
 
 // Keeps only its buffers between calls: many small polygons would otherwise allocate them again and again.
 class Clipper {
  public:
   // Replaces every polygon by its part outside the convex polytope of the planes with these offsets. A polygon that
   // does not meet it stays whole.
-  void subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets);
+  void subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets) {
+    left_.clear();
+    for (Polygon& polygon : polygons) {
+      if (is_separated(polygon, planes, offsets)) {
+        left_.push_back(std::move(polygon));
+        continue;
+      }
+      cut_off_.clear();
+      rest_ = polygon;
+      auto lies = Lies::kBelow;
+      for (std::size_t k = 0; k < crossed_.size() && lies != Lies::kAbove; ++k) {
+        const Vec3 normal = planes.normal(crossed_[k]);
+        const auto height = [normal, offset = offsets[crossed_[k]]](Vec3 p) {
+          const double h = dot(normal, p) - offset;
+          return std::fabs(h) <= kRounding ? 0.0 : h;  // no clipped polygon is thinner than rounding
+        };
+        lies = split(rest_, height, inside_, outside_);
+        if (lies != Lies::kAcross) continue;
+        rest_.swap(inside_);
+        cut_off_.push_back(outside_);
+      }
+      if (lies == Lies::kAbove)
+        left_.push_back(std::move(polygon));
+      else
+        std::move(cut_off_.begin(), cut_off_.end(), std::back_inserter(left_));
+    }
+    polygons.swap(left_);
+  }
 
  private:
   // Whether a single half-space shows that a polygon does not reach into the intersection; if not, the planes that the
   // polygon crosses are stored in `crossed_`.
-  bool is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets);
+  RLACD_WIDE bool is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets) {
+    const double *x = planes.x(), *y = planes.y(), *z = planes.z();
+    crossed_.clear();
+    for (std::size_t start = 0; start < planes.size(); start += ConvexPlanes::kBlock) {
+      double least[ConvexPlanes::kBlock], most[ConvexPlanes::kBlock];  // heights of the corners above each plane
+      std::fill(least, least + ConvexPlanes::kBlock, kInfinity);
+      std::fill(most, most + ConvexPlanes::kBlock, -kInfinity);
+      for (const Vec3 p : polygon)
+        for (std::size_t i = 0; i < ConvexPlanes::kBlock; ++i) {
+          const std::size_t k = start + i;
+          const double height = x[k] * p.x + y[k] * p.y + z[k] * p.z - offsets[k];
+          least[i] = least[i] < height ? least[i] : height;
+          most[i] = most[i] > height ? most[i] : height;
+        }
+      for (std::size_t i = 0; i < ConvexPlanes::kBlock; ++i) {
+        if (least[i] >= -kRounding) return true;
+        if (most[i] > kRounding) crossed_.push_back(static_cast<std::int32_t>(start + i));
+      }
+    }
+    return false;
+  }
 
   std::vector<std::int32_t> crossed_;
   std::vector<Polygon> left_, cut_off_;
   Polygon rest_, inside_, outside_;
 };
-
-void Clipper::subtract(std::vector<Polygon>& polygons, const ConvexPlanes& planes, const Offsets& offsets) {
-  left_.clear();
-  for (Polygon& polygon : polygons) {
-    if (is_separated(polygon, planes, offsets)) {
-      left_.push_back(std::move(polygon));
-      continue;
-    }
-    cut_off_.clear();
-    rest_ = polygon;
-    auto lies = Lies::kBelow;
-    for (std::size_t k = 0; k < crossed_.size() && lies != Lies::kAbove; ++k) {
-      const Vec3 normal = planes.normal(crossed_[k]);
-      const auto height = [normal, offset = offsets[crossed_[k]]](Vec3 p) {
-        const double h = dot(normal, p) - offset;
-        return std::fabs(h) <= kOnPlane ? 0.0 : h;
-      };
-      lies = split(rest_, height, inside_, outside_);
-      if (lies != Lies::kAcross) continue;
-      rest_.swap(inside_);
-      cut_off_.push_back(outside_);
-    }
-    if (lies == Lies::kAbove)
-      left_.push_back(std::move(polygon));
-    else
-      std::move(cut_off_.begin(), cut_off_.end(), std::back_inserter(left_));
-  }
-  polygons.swap(left_);
-}
-
-RLACD_WIDE bool Clipper::is_separated(const Polygon& polygon, const ConvexPlanes& planes, const Offsets& offsets) {
-  constexpr std::size_t kBlock = ConvexPlanes::kBlock;
-  const double *x = planes.x(), *y = planes.y(), *z = planes.z();
-  crossed_.clear();
-  for (std::size_t start = 0; start < planes.size(); start += kBlock) {
-    double least[kBlock], most[kBlock];  // heights of the corners above each plane
-    std::fill(least, least + kBlock, std::numeric_limits<double>::infinity());
-    std::fill(most, most + kBlock, -std::numeric_limits<double>::infinity());
-    for (const Vec3 p : polygon)
-      for (std::size_t i = 0; i < kBlock; ++i) {
-        const std::size_t k = start + i;
-        const double height = x[k] * p.x + y[k] * p.y + z[k] * p.z - offsets[k];
-        least[i] = least[i] < height ? least[i] : height;
-        most[i] = most[i] > height ? most[i] : height;
-      }
-    for (std::size_t i = 0; i < kBlock; ++i) {
-      if (least[i] >= -kOnPlane) return true;
-      if (most[i] > kOnPlane) crossed_.push_back(static_cast<std::int32_t>(start + i));
-    }
-  }
-  return false;
-}
 
 // Polygons merged into one mesh, in which equal corners are one vertex: its distance is computed once.
 class Gathering {
@@ -126,13 +126,6 @@ HullUnion::HullUnion(std::vector<std::shared_ptr<ConvexBody>> hulls, int threads
   parallel_for(members_.size(), members_.size() < 8 ? 1 : threads, [&](std::size_t i) { members_[i]->planes(); });
 }
 
-double HullUnion::distance(Vec3 p) const {
-  double best = kInfinity;
-  for (const auto& member : members_)
-    if (member->box().distance2(p) < best * best) best = std::min(best, std::max(0.0, member->distance(p, best)));
-  return best;
-}
-
 // Distance to the union; the witnesses are the hulls.
 class HullField {
  public:
@@ -154,6 +147,8 @@ class HullField {
  private:
   const std::vector<std::shared_ptr<ConvexBody>>& members_;
 };
+
+double HullUnion::distance(Vec3 p) const { return HullField(*this).at(p, -1, 0).value; }
 
 HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
   struct Facet {
@@ -210,29 +205,26 @@ Greatest HullUnion::over(const Bvh& surface, const Goal& goal, double gap, int t
 
 Greatest HullUnion::under(const Mesh& surface, const Goal& goal, int threads) const {
   if (members_.empty()) return {{kInfinity, kInfinity}, {}};
+  // Planes are moved out, so that the hulls on both sides of a cut leave no rounding slivers between them. The material
+  // lost lies at most this far beyond every facet's plane.
   std::vector<Offsets> grown;
   for (const auto& member : members_)
-    for (double& offset : grown.emplace_back(member->planes().offsets())) offset += kInsideSlack;
+    for (double& offset : grown.emplace_back(member->planes().offsets())) offset += kHair;
 
-  constexpr std::size_t kChunk = 64;
-  const auto for_each = [threads](std::size_t count, const auto& task) {
-    parallel_for((count + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
-      Clipper clipper;
-      for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) task(i, clipper);
-    });
-  };
   std::vector<std::vector<Polygon>> outside(surface.faces.size());
-  for_each(outside.size(), [&](std::size_t f, Clipper& clipper) {
+  const auto clip = [&](std::size_t f) {
     poll_stop();
+    thread_local Clipper clipper;
     const Corners corner = corners_of(surface, surface.faces[f]);
     const Box box = Box::of(corner);
     outside[f] = {{corner.begin(), corner.end()}};
     for (std::size_t m = 0; m < members_.size(); ++m) {
-      if (!box.meets(members_[m]->box(), kInsideSlack)) continue;
+      if (!box.meets(members_[m]->box(), kHair)) continue;
       if (outside[f].size() > kMostPieces) break;  // uncut pieces are not wrong here, only more work
       clipper.subtract(outside[f], members_[m]->planes(), grown[m]);
     }
-  });
+  };
+  parallel_for(outside.size(), threads, clip, kQuick);
 
   Gathering left;
   for (const std::vector<Polygon>& polygons : outside)

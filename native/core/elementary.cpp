@@ -59,7 +59,7 @@ double cube_root(double x) {
 }
 
 double logarithm(double x) {
-  if (!(x > 0)) return -std::numeric_limits<double>::infinity();
+  if (!(x > 0)) return -kInfinity;
   if (std::isinf(x)) return x;
   int exponent = 0;
   double mantissa = std::frexp(x, &exponent);

@@ -21,6 +21,7 @@ inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}
 inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
 inline Vec3 operator*(double s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Vec3 operator/(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
 inline bool operator==(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
@@ -39,7 +40,16 @@ inline double max_abs(Vec3 a) { return std::max(std::max(std::fabs(a.x), std::fa
 
 using Triangle = std::array<std::int32_t, 3>;  // indices of the corners, counter-clockwise seen from outside
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kHalfRootOfThree = 0.8660254037844387;  // the cosine of 30 degrees; half the diagonal of a cube
+
+// What rounding may amount to, as a share of what is computed or of the coordinates that it is computed from; and what
+// a single operation may add.
+constexpr double kRounding = 1e-12, kLastBits = 1e-15;
+
+// A length in the frame, whose longest side is 2, that counts as none: far above rounding, far below any tolerance.
+constexpr double kHair = 1e-9;
 
 using PlanePoint = std::array<double, 2>;
 
@@ -87,6 +97,13 @@ inline int longest_side(const Corners& t) {
   return longest;
 }
 
+// Across the longest side, so that they stay well shaped.
+inline std::array<Corners, 2> halves(const Corners& t) {
+  const int k = longest_side(t);
+  const Vec3 p = t[k], q = t[(k + 1) % 3], tip = t[(k + 2) % 3], middle = 0.5 * (p + q);
+  return {{{p, middle, tip}, {middle, q, tip}}};
+}
+
 inline std::vector<Vec3> joined(std::vector<Vec3> points, const std::vector<Vec3>& others) {
   points.insert(points.end(), others.begin(), others.end());
   return points;
@@ -116,10 +133,8 @@ class Renumbered {
 };
 
 struct Box {
-  Vec3 lower{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
-             std::numeric_limits<double>::infinity()};
-  Vec3 upper{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
-             -std::numeric_limits<double>::infinity()};
+  Vec3 lower{kInfinity, kInfinity, kInfinity};
+  Vec3 upper{-kInfinity, -kInfinity, -kInfinity};
 
   template <class Points>
   static Box of(const Points& points) {

@@ -8,8 +8,7 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kRounding = 1e-15;  // entries this small beside the trace are rounding: no axis turns for them
-constexpr int kSweeps = 30;          // five are enough
+constexpr int kSweeps = 30;  // five are enough
 
 using Moments = std::array<Vec3, 3>;  // second ones about a centroid, row-major, up to a positive factor
 
@@ -67,7 +66,8 @@ void rotate(Moments& moments, std::array<Vec3, 3>& axes, int p, int q) {
 // Jacobi's method takes sums, products, quotients and square roots alone, which IEEE 754 rounds the same everywhere.
 std::array<Vec3, 3> axes_of(Moments moments) {
   std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  const double negligible = kRounding * (moments[0].x + moments[1].y + moments[2].z);
+  // Entries this small beside the trace are rounding: no axis turns for them.
+  const double negligible = kLastBits * (moments[0].x + moments[1].y + moments[2].z);
   bool turned = true;
   for (int sweep = 0; turned && sweep < kSweeps; ++sweep) {
     turned = false;

@@ -18,6 +18,10 @@ inline int resolve_threads(int threads) {
 // takes items too, so that a loop within an item of another ends whether or not a helper is free for it.
 void share(std::size_t count, std::size_t helpers, const std::function<void(std::size_t)>& task);
 
+// Items that one thread takes at a time: quick ones, like a distance, and slower ones, like a joint hull of small
+// parts.
+constexpr std::size_t kQuick = 64, kSlower = 8;
+
 // Calls task(i) once for every i in [0, count). Items are handed out in order, `chunk` of them at a time. Each must
 // write only to its own slot, so that the result does not depend on the number of threads. The first exception is
 // rethrown here. What stops this thread stops all of them.

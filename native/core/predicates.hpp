@@ -9,8 +9,6 @@
 // about 1e-90 .. 1e90).
 #pragma once
 
-#include <tuple>
-
 #include "core/geometry.hpp"
 
 namespace rlacd {
@@ -23,6 +21,16 @@ inline double product_error(double a, double b, double product) {
   const double b_high = kHalves * b - (kHalves * b - b), b_low = b - b_high;
   return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
 }
+
+// a - b as high + low, exactly.
+struct ExactDifference {
+  double high, low;
+  ExactDifference(double a, double b) : high(a - b) {
+    const double virtual_b = a - high;
+    const double virtual_a = high + virtual_b;
+    low = (a - virtual_a) + (virtual_b - b);
+  }
+};
 
 // A sum of doubles, non-overlapping, in order of increasing magnitude, without zeros: its sign is its last term's.
 template <int Capacity>
@@ -49,6 +57,12 @@ class Expansion {
     if (low != 0) add(low);
     add(high);
   }
+  void add_product(const ExactDifference& a, const ExactDifference& b, double sign) {
+    add_product(sign * a.low, b.low);
+    add_product(sign * a.low, b.high);
+    add_product(sign * a.high, b.low);
+    add_product(sign * a.high, b.high);
+  }
 
   template <int Other>
   void add_scaled(const Expansion<Other>& e, double b) {
@@ -62,16 +76,6 @@ class Expansion {
  private:
   double terms_[Capacity];
   int size_ = 0;
-};
-
-// a - b as high + low, exactly.
-struct ExactDifference {
-  double high, low;
-  ExactDifference(double a, double b) : high(a - b) {
-    const double virtual_b = a - high;
-    const double virtual_a = high + virtual_b;
-    low = (a - virtual_a) + (virtual_b - b);
-  }
 };
 
 // A number of about 106 bits: high + low with |low| <= ulp(high) / 2.
@@ -123,14 +127,8 @@ inline int orient3d_exact(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
     Expansion<16> minor;  // b_j c_k - b_k c_j
-    const auto add = [&minor](const ExactDifference& p, const ExactDifference& q, double sign) {
-      minor.add_product(sign * p.low, q.low);
-      minor.add_product(sign * p.low, q.high);
-      minor.add_product(sign * p.high, q.low);
-      minor.add_product(sign * p.high, q.high);
-    };
-    add(b3[j], c3[k], 1);
-    add(b3[k], c3[j], -1);
+    minor.add_product(b3[j], c3[k], 1);
+    minor.add_product(b3[k], c3[j], -1);
     determinant.add_scaled(minor, d3[i].low);
     determinant.add_scaled(minor, d3[i].high);
   }
@@ -143,12 +141,8 @@ inline bool collinear_exact(Vec3 a, Vec3 b, Vec3 c) {
     const int j = (i + 1) % 3;
     const ExactDifference u(b[i], a[i]), v(b[j], a[j]), s(c[i], a[i]), t(c[j], a[j]);
     Expansion<16> minor;
-    for (const auto& [p, q, sign] : {std::tuple{u, t, 1.0}, std::tuple{v, s, -1.0}}) {
-      minor.add_product(sign * p.low, q.low);
-      minor.add_product(sign * p.low, q.high);
-      minor.add_product(sign * p.high, q.low);
-      minor.add_product(sign * p.high, q.high);
-    }
+    minor.add_product(u, t, 1);
+    minor.add_product(v, s, -1);
     if (minor.sign() != 0) return false;
   }
   return true;

@@ -9,7 +9,7 @@ namespace {
 
 // Shares of the radius that may be missing along a path, and at its vertices.
 constexpr double kSlackOfWay = 0.01, kSlackOfPoint = 0.004;
-constexpr double kRounding = 1e-6;
+constexpr double kMargin = 1e-6;  // for rounding
 constexpr int kPushes = 24;
 // A cell's free point may lie a little outside it.
 constexpr double kInCell = 0.55;
@@ -19,8 +19,8 @@ constexpr double kInCell = 0.55;
 BallReach::BallReach(const NavigableField& field, ClearanceGrid& grid)
     : field_(field),
       grid_(grid),
-      least_(field.radius() * (1 - kRounding)),
-      half_diagonal_(0.5 * std::sqrt(3.0) * grid.pitch * (1 + kRounding)),
+      least_(field.radius() * (1 - kMargin)),
+      half_diagonal_(kHalfRootOfThree * grid.pitch * (1 + kMargin)),
       regions_(static_cast<std::size_t>(1 + grid.size())) {
   join_cells();
 }

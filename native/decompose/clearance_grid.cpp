@@ -7,9 +7,7 @@
 namespace rlacd {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::int32_t kBlock = 8;  // cells along a side of the largest cubes
-constexpr double kHalfDiagonal = 0.8660254037844387;
 // Distance from the level, in pitches, within which a cell counts as crossed. More than the half diagonal, so that
 // every straight line has such a cell on either side: those above the level descend to the whole boundary, those below
 // climb into its creases and corners.
@@ -26,10 +24,10 @@ class Filling {
       : field_(field), grid_(grid), to_the_end_(to_the_end) {}
 
   void fill(ClearanceGrid::Cube cube, Found& found) const {
-    const double half = 0.5 * cube.side, reach = kHalfDiagonal * cube.side * grid_.pitch;
+    const double half = 0.5 * cube.side, reach = kHalfRootOfThree * cube.side * grid_.pitch;
     const Vec3 x = grid_.origin + grid_.pitch * Vec3{cube.first[0] + half, cube.first[1] + half, cube.first[2] + half};
     const double radius = field_.radius(), level = field_.level();
-    const double margin = reach + (kCrossed - kHalfDiagonal) * grid_.pitch;
+    const double margin = reach + (kCrossed - kHalfRootOfThree) * grid_.pitch;
 
     if (cube.inside < reach) cube.inside = -field_.hull().distance(x, radius + margin);
     const double away = std::max(-cube.inside, 0.0), ground = field_.above_ground(x);

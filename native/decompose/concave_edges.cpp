@@ -17,15 +17,12 @@ namespace {
 constexpr double kReflex = 10 * kPi / 180;  // flatter edges tessellate curves
 constexpr double kFold =
     0.1 * kPi / 180;  // two faces this close in angle enclose a slit or a film: rounding decides which
-constexpr double kThinnestFace = 1e-6;  // the normals of faces thinner than this are meaningless in single precision
-constexpr double kStraightOn = 0.8660254037844387;  // cosine of 30 degrees: edges that turn by less continue each other
-constexpr std::size_t kMostAtVertex = 4;            // more reflex edges at a vertex mean a rough surface, not a crease
-constexpr std::size_t kContenders = 256;            // edges that are compared with each other; scans have thousands
-constexpr double kFlat = 1e-6;           // corners this close to a face's plane are on it in single precision
-constexpr double kHair = 1e-9;           // above rounding (1e-15), below the clean-up of hulls (1e-6)
+constexpr std::size_t kMostAtVertex = 4;  // more reflex edges at a vertex mean a rough surface, not a crease
+constexpr std::size_t kContenders = 256;  // edges that are compared with each other; scans have thousands
+// In single precision, corners this close to a face's plane are on it, and normals of thinner faces are meaningless.
+constexpr double kSinglePrecision = 1e-6;
 constexpr double kSameDirection = 3e-7;  // a normal this close to a coordinate axis is replaced by it
 constexpr double kSamePlane = 1e-4;      // between coordinates of planes
-constexpr double kTie = 1e-9;            // of scores this close the first is taken, so that rounding does not decide
 
 struct ReflexEdge {
   std::int32_t end[2];   // vertices, ascending
@@ -44,8 +41,7 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
   for (const Triangle& f : mesh.faces) {
     const Vec3 scaled = long_normal(mesh, f);
     doubled_area.push_back(norm(scaled));
-    const double length = std::max(doubled_area.back(), std::numeric_limits<double>::min());
-    normals.push_back({scaled.x / length, scaled.y / length, scaled.z / length});
+    normals.push_back(scaled / std::max(doubled_area.back(), std::numeric_limits<double>::min()));
   }
 
   std::vector<ReflexEdge> found;
@@ -56,7 +52,8 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
     if (!(turn > 0)) return;
     const double length = norm(along);
     const double angle = angle_of(turn, length * dot(normals[f], normals[g]));
-    if (angle > kReflex && angle < kPi - kFold && std::min(doubled_area[f], doubled_area[g]) > kThinnestFace * length)
+    if (angle > kReflex && angle < kPi - kFold &&
+        std::min(doubled_area[f], doubled_area[g]) > kSinglePrecision * length)
       found.push_back({{low, high}, {f, g}, {normals[f], normals[g]}, angle});
   };
 
@@ -68,18 +65,14 @@ std::vector<ReflexEdge> reflex_edges(const Mesh& mesh) {
       next = std::find_if(r, static_cast<const Run*>(end), [r](const Run& other) { return other.high != r->high; });
       if (next - r != 2 || r->high == static_cast<std::int32_t>(v)) continue;
       const auto face_of = [](const Run& run) { return static_cast<std::int32_t>(run.halfedge / 3); };
-      const auto ascends = [&](const Run& run) {
-        return mesh.faces[run.halfedge / 3][run.halfedge % 3] == static_cast<std::int32_t>(v);
-      };
-      if (ascends(r[0]) == ascends(r[1])) continue;
-      const Run &up = ascends(r[0]) ? r[0] : r[1], &down = ascends(r[0]) ? r[1] : r[0];
+      const bool is_first = ascends(mesh.faces, v, r[0]);
+      if (is_first == ascends(mesh.faces, v, r[1])) continue;
+      const Run &up = is_first ? r[0] : r[1], &down = is_first ? r[1] : r[0];
       add_if_reflex(static_cast<std::int32_t>(v), r->high, face_of(up), face_of(down));
     }
   }
   return found;
 }
-
-Vec3 divided(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
 
 Vec3 middle(const Mesh& mesh, const ReflexEdge& edge) {
   return 0.5 * (mesh.vertices[edge.end[0]] + mesh.vertices[edge.end[1]]);
@@ -97,14 +90,14 @@ std::vector<double> crease_lengths(const Mesh& mesh, const std::vector<ReflexEdg
   for (const int side : {0, 1})
     for (std::size_t i = 0; i < edges.size(); ++i) {
       const Vec3 along = mesh.vertices[edges[i].end[1 - side]] - mesh.vertices[edges[i].end[side]];
-      ends.push_back({edges[i].end[side], static_cast<std::int32_t>(i), divided(along, length[i])});
+      ends.push_back({edges[i].end[side], static_cast<std::int32_t>(i), along / length[i]});
     }
   std::stable_sort(ends.begin(), ends.end(), [](const End& a, const End& b) { return a.vertex < b.vertex; });
 
   Groups creases(edges.size());
-  for (std::size_t i = 0; i < ends.size(); ++i)
+  for (std::size_t i = 0; i < ends.size(); ++i)  // edges that turn by less than 30 degrees continue each other
     for (std::size_t j = i + 1; j < std::min(i + kMostAtVertex, ends.size()) && ends[j].vertex == ends[i].vertex; ++j)
-      if (dot(ends[i].outgoing, ends[j].outgoing) < -kStraightOn) creases.join(ends[j].edge, ends[i].edge);
+      if (dot(ends[i].outgoing, ends[j].outgoing) < -kHalfRootOfThree) creases.join(ends[j].edge, ends[i].edge);
   const auto [count, crease] = creases.labels();
   std::vector<double> total(static_cast<std::size_t>(count), 0), result;
   for (std::size_t i = 0; i < edges.size(); ++i) total[crease[i]] += length[i];
@@ -129,7 +122,7 @@ EdgePlanes planes_of(const Mesh& mesh, const ReflexEdge& edge) {
   const Vec3 centre = middle(mesh, edge);
   EdgePlanes planes;
   for (int k = 0; k < 3; ++k) {
-    const Vec3 normal = snapped(k == 0 ? divided(across, norm(across)) : edge.normal[k - 1]);
+    const Vec3 normal = snapped(k == 0 ? across / norm(across) : edge.normal[k - 1]);
     planes[k] = {normal, dot(normal, centre)};
   }
   return planes;
@@ -178,7 +171,8 @@ std::vector<ReflexEdge> spread_out(std::vector<Contender>& contenders, const Pla
   while (chosen.size() < count) {
     poll_stop();
     std::transform(contenders.begin(), contenders.end(), score.begin(), [](const Contender& c) { return c.score(); });
-    const double enough = (1 - kTie) * *std::max_element(score.begin(), score.end());
+    // Of scores this close the first is taken, so that rounding does not decide.
+    const double enough = (1 - kHair) * *std::max_element(score.begin(), score.end());
     const auto place = std::find_if(score.begin(), score.end(), [enough](double s) { return s >= enough; });
     if (!(*place > 0)) break;
     const Contender best = contenders[static_cast<std::size_t>(place - score.begin())];
@@ -196,11 +190,11 @@ std::vector<ReflexEdge> spread_out(std::vector<Contender>& contenders, const Pla
 
 // The offset that puts a face, and everything coplanar with it, below its plane.
 double above_face(const Mesh& mesh, const Triangle& face, Vec3 outward) {
-  double top = -std::numeric_limits<double>::infinity();
+  double top = -kInfinity;
   for (const std::int32_t corner : face) top = std::max(top, dot(mesh.vertices[corner], outward));
   double flat = top;
   for (const Vec3 p : mesh.vertices)
-    if (const double height = dot(p, outward); height <= top + kFlat) flat = std::max(flat, height);
+    if (const double height = dot(p, outward); height <= top + kSinglePrecision) flat = std::max(flat, height);
   return max_abs(outward) == 1 ? flat : flat + kHair;
 }
 
@@ -261,7 +255,7 @@ std::vector<Plane> equidistant_planes(const Mesh& mesh, const ConvexBody& hull, 
   }
   std::vector<Plane> planes;
   for (const Vec3 direction : directions) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
+    double low = kInfinity, high = -low;
     for (const Vec3 p : hull.mesh().vertices)
       low = std::min(low, dot(p, direction)), high = std::max(high, dot(p, direction));
     for (int i = 1; i <= per_axis; ++i)

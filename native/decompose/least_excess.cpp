@@ -16,12 +16,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kFewPlanes = 3;  // a direction with fewer planes gets this many extra sections to bound its hulls
-constexpr std::size_t kFewTrials = 1 << 17;  // pairs of a point and a corner
-constexpr std::size_t kManyFaces = 1000;     // from here on, planes are measured two at a time, on two threads
-constexpr double kRounding = 1e-12;          // share of a box's volume; rounding of a hull's volume stays far below
-
 enum Side : std::size_t { kBelow, kAbove };
 
 Side across(Side side) { return side == kBelow ? kAbove : kBelow; }
@@ -30,24 +24,6 @@ double box_volume(const Mesh& mesh) {
   const Box box = Box::of(mesh.vertices);
   const Vec3 e = box.upper - box.lower;
   return e.x * e.y * e.z;
-}
-
-// The planes of a bundle, with extra ones if they are few.
-std::vector<double> section_offsets(const SolidMesh& solid, const Bundle& bundle) {
-  std::vector<double> offsets = bundle.offsets;
-  if (offsets.size() >= kFewPlanes) return offsets;
-  double low = kInfinity, high = -kInfinity;
-  for (std::size_t i = 0; i < solid.is_corner.size(); ++i) {
-    if (!solid.is_corner[i]) continue;
-    const double s = dot(bundle.normal, solid.mesh.vertices[i]);
-    low = std::min(low, s), high = std::max(high, s);
-  }
-  if (!std::isfinite(high - low)) return offsets;
-  for (std::size_t i = 1; i <= kFewPlanes; ++i)
-    offsets.push_back(low + (high - low) * (static_cast<double>(i) / (kFewPlanes + 1)));
-  std::sort(offsets.begin(), offsets.end());
-  offsets.erase(std::unique(offsets.begin(), offsets.end()), offsets.end());
-  return offsets;
 }
 
 // Lower bound on the volume between two parallel sections of a convex body, given the roots of their areas
@@ -87,15 +63,8 @@ std::vector<double> least_hull_volumes(const Sections& sections, const std::vect
 class Direction {
  public:
   // Numbers are those of the bundle's planes among all candidates. The slack exceeds the rounding of volumes.
-  Direction(const SolidMesh& mesh, const Bundle& bundle, const std::vector<std::ptrdiff_t>& numbers, double slack)
-      : sections_(mesh, bundle.normal, section_offsets(mesh, bundle)), slack_(slack) {
-    std::size_t placed = 0;
-    for (std::size_t j = 0; j < planes(); ++j) {
-      RLACD_ASSERT(j == 0 || sections_.offset(j - 1) < sections_.offset(j));
-      const bool is_candidate = placed < numbers.size() && bundle.offsets[placed] == sections_.offset(j);
-      numbers_.push_back(is_candidate ? numbers[placed++] : -1);
-    }
-    RLACD_ASSERT(placed == numbers.size());
+  Direction(const SolidMesh& mesh, const Bundle& bundle, std::vector<std::ptrdiff_t> numbers, double slack)
+      : sections_(mesh, bundle.normal, bundle.offsets), slack_(slack), numbers_(std::move(numbers)) {
     std::vector<double> roots;
     for (std::size_t j = 0; j < planes(); ++j)
       roots.push_back(std::sqrt(outline_area(sections_.outline(j), sections_.normal())));
@@ -113,7 +82,7 @@ class Direction {
   }
 
   std::size_t planes() const { return sections_.planes(); }
-  std::ptrdiff_t number(std::size_t j) const { return numbers_[j]; }  // -1 if the plane is no candidate
+  std::ptrdiff_t number(std::size_t j) const { return numbers_[j]; }
 
   // Lower bound on the excess of a side.
   double least(Side side, std::size_t j) const { return least_[side][j]; }
@@ -134,16 +103,8 @@ class Direction {
       sections_.for_each_inside(from + 1, j + 1, append);  // from the first slab beyond the known hulls
     else
       sections_.for_each_inside(j + 1, std::min(from, planes()) + 1, append);
-    auto hull = std::make_unique<HullBuilder>(sections_.film());
-    if (from != end(side)) {
-      // A growing hull tests its facets against every point: where that takes too long, a new hull takes in its
-      // corners.
-      const std::vector<Vec3>& corners = hulls_[side][from]->points();
-      if (points.size() * corners.size() <= kFewTrials)
-        *hull = *hulls_[side][from];
-      else
-        points.insert(points.end(), corners.begin(), corners.end());
-    }
+    auto hull = from == end(side) ? std::make_unique<HullBuilder>(sections_.film())
+                                  : std::make_unique<HullBuilder>(*hulls_[side][from]);
     hull->add(points);
     hull->drop_inner_points();
     const double excess = std::max(hull->volume() - solid(side, j), 0.0);
@@ -204,16 +165,16 @@ class Search {
  public:
   Search(const Mesh& mesh, const std::vector<Vec3>& normals, const std::vector<double>& offsets,
          const LeastExcess& wanted, int threads)
-      : wanted_(wanted), solid_(mesh), threads_(threads), at_a_time_(mesh.faces.size() < kManyFaces ? 1 : 2) {
+      : wanted_(wanted), solid_(mesh) {
     const Bundles bundles = bundle_planes(normals, offsets);
     std::vector<std::vector<std::ptrdiff_t>> numbers;
     for (const Bundle& bundle : bundles.all) numbers.emplace_back(bundle.offsets.size(), -1);
     for (std::size_t i = bundles.place.size(); i-- > 0;)  // the first of equal planes counts
       numbers[bundles.place[i].bundle][bundles.place[i].plane] = static_cast<std::ptrdiff_t>(i);
     directions_.resize(numbers.size());
-    const double slack = kRounding * box_volume(mesh);
+    const double slack = kRounding * box_volume(mesh);  // rounding of a hull's volume stays far below
     parallel_for(directions_.size(), threads, [&](std::size_t k) {
-      directions_[k] = std::make_unique<Direction>(solid_, bundles.all[k], numbers[k], slack);
+      directions_[k] = std::make_unique<Direction>(solid_, bundles.all[k], std::move(numbers[k]), slack);
     });
   }
 
@@ -236,13 +197,6 @@ class Search {
     }
   };
 
-  // A plane to measure.
-  struct Probe {
-    Interval interval;
-    std::size_t plane;
-    double cost;
-  };
-
   double cost(double below, double above) const {
     if (wanted_.exponent == 1) return below + above;
     if (wanted_.exponent == kInfinity) return std::max(below, above);
@@ -260,9 +214,7 @@ class Search {
     const Direction& direction = *directions_[interval.direction];
     std::vector<std::size_t> open;
     for (std::size_t j = interval.first; j < interval.last; ++j)
-      if (direction.number(j) >= 0 && bound(direction, j) <= limit() &&
-          direction.is_valid(j, wanted_.least_solid, sliver))
-        open.push_back(j);
+      if (bound(direction, j) <= limit() && direction.is_valid(j, wanted_.least_solid, sliver)) open.push_back(j);
     return open;
   }
 
@@ -280,42 +232,22 @@ class Search {
     };
     std::vector<Measured> measured;
     for (std::size_t k = 0; k < directions_.size(); ++k) put(k, 0, directions_[k]->planes(), sliver);
-    for (std::vector<Probe> probes; !(probes = next_probes(sliver)).empty();) {
-      parallel_for(probes.size(), threads_, [&](std::size_t i) {
-        probes[i].cost = measure(*directions_[probes[i].interval.direction], probes[i].plane);
-      });
-      for (const auto& [here, j, cost] : probes) {
-        measured.push_back({cost, directions_[here.direction]->number(j)});
-        least_cost_ = std::min(least_cost_, cost);
-      }
-      for (const auto& [here, j, cost] : probes) {
-        put(here.direction, here.first, j, sliver);
-        put(here.direction, j + 1, here.last, sliver);
-      }
+    while (!queue_.empty()) {
+      poll_stop();
+      const Interval here = queue_.top();
+      queue_.pop();
+      const std::vector<std::size_t> open = open_planes(here, sliver);
+      if (open.empty()) continue;
+      const std::size_t middle = open[open.size() / 2];
+      measured.push_back({measure(*directions_[here.direction], middle), directions_[here.direction]->number(middle)});
+      least_cost_ = std::min(least_cost_, measured.back().cost);
+      put(here.direction, here.first, middle, sliver);
+      put(here.direction, middle + 1, here.last, sliver);
     }
     std::ptrdiff_t first = -1;
     for (const Measured& plane : measured)
       if (plane.cost < kInfinity && plane.cost <= limit() && (first < 0 || plane.number < first)) first = plane.number;
     return first;
-  }
-
-  // The planes to measure next: those with the least bounds, each of another direction.
-  std::vector<Probe> next_probes(double sliver) {
-    std::vector<Probe> probes;
-    std::vector<Interval> later;
-    while (!queue_.empty() && probes.size() < at_a_time_) {
-      const Interval here = queue_.top();
-      queue_.pop();
-      if (std::any_of(probes.begin(), probes.end(),
-                      [&](const Probe& probe) { return probe.interval.direction == here.direction; })) {
-        later.push_back(here);
-        continue;
-      }
-      const std::vector<std::size_t> open = open_planes(here, sliver);
-      if (!open.empty()) probes.push_back({here, open[open.size() / 2], kInfinity});
-    }
-    for (const Interval& interval : later) queue_.push(interval);
-    return probes;
   }
 
   // The cost of a plane; infinity if one side alone rules it out.
@@ -330,8 +262,6 @@ class Search {
   const SolidMesh solid_;
   std::vector<std::unique_ptr<Direction>> directions_;
   std::priority_queue<Interval> queue_;
-  const int threads_;
-  const std::size_t at_a_time_;
   double least_cost_ = kInfinity;
 };
 

@@ -42,7 +42,7 @@ class NavigableField {
 
   // Distance to the nearest closed half-space, negative inside it.
   double above_ground(Vec3 x) const {
-    double least = std::numeric_limits<double>::infinity();
+    double least = kInfinity;
     for (const HalfSpace& closed : closed_) least = std::min(least, dot(closed.normal, x) - closed.offset);
     return least;
   }

@@ -10,8 +10,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kFilm = 1e-13;  // relative to the mesh
-
 int axis_of(Vec3 n) {
   for (int axis = 0; axis < 3; ++axis)
     if (std::fabs(n[axis]) == 1) return axis;
@@ -97,26 +95,13 @@ void Sections::project() {
   for (std::size_t i = 0; i < count; ++i) {
     const double s = dot(normal_, mesh_.vertices[i]);
     heights_[i] = s;
-    above_[i] = first_above(s);
+    above_[i] = static_cast<std::int32_t>(std::upper_bound(offsets_.begin(), offsets_.end(), s) - offsets_.begin());
     if (!solid_.is_corner[i]) continue;
     is_on_plane_ = is_on_plane_ || (above_[i] > 0 && offsets_[above_[i] - 1] == s);
     lowest_ = std::min(lowest_, s);
     highest_ = std::max(highest_, s);
   }
-  film_ = kFilm * (highest_ - lowest_);
-}
-
-// Planes are usually equidistant: then the first guess is right.
-std::int32_t Sections::first_above(double height) const {
-  if (offsets_.empty()) return 0;
-  const auto planes = static_cast<std::int32_t>(offsets_.size());
-  const double width = offsets_.back() - offsets_.front();
-  const double share = width > 0 ? (height - offsets_.front()) / width : 0;
-  auto j = share > 0 ? share < 1 ? static_cast<std::int32_t>(share * (planes - 1)) + 1 : planes : 0;
-  while (j < planes && offsets_[j] <= height) ++j;
-  while (j > 0 && offsets_[j - 1] > height) --j;
-  RLACD_ASSERT(j == planes || offsets_[j] > height);
-  return j;
+  film_ = kRounding * (highest_ - lowest_);
 }
 
 std::size_t Sections::first_from(std::int32_t vertex) const {

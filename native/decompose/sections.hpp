@@ -62,7 +62,6 @@ class Sections {
 
  private:
   void project();
-  std::int32_t first_above(double height) const;
   void fill_slabs();
   void cut_edges();
   void measure_solid();
@@ -78,8 +77,8 @@ class Sections {
   const std::vector<double> offsets_;
   std::vector<double> heights_;      // n.x of every vertex
   std::vector<std::int32_t> above_;  // first plane with offset > n.x, of every vertex
-  double lowest_ = std::numeric_limits<double>::infinity();
-  double highest_ = -std::numeric_limits<double>::infinity();
+  double lowest_ = kInfinity;
+  double highest_ = -kInfinity;
   double film_ = 0;
   bool is_on_plane_ = false;     // whether any vertex lies on a plane
   Buckets<std::int32_t> slabs_;  // their vertices

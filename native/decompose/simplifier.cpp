@@ -15,7 +15,6 @@ namespace {
 constexpr std::size_t kLarge = 12'000, kOneIn = 3;
 // Sweeps that remove no more than one face in this many have run out of edges.
 constexpr std::size_t kHardlyAny = 50;
-constexpr std::size_t kChunk = 4096;  // faces whose edges one thread prices at a time
 // Edges drawn for each collapse: few while there are many faces, and more as each collapse matters more.
 constexpr std::size_t kFewChoices = 6, kMostChoices = 150, kChoicesTimesFaces = 400'000;
 // Moving along a flat surface costs nothing: this share of a quadric's trace holds points near the middle of the edge.
@@ -140,7 +139,7 @@ std::vector<std::int32_t> Simplifier::cheap_edges(int threads) const {
       if (from < to) ranks[3 * f + k] = rank_of(priced(from, to).cost);
     }
   };
-  parallel_for(faces_.size(), threads, set_ranks, kChunk);
+  parallel_for(faces_.size(), threads, set_ranks, kQuick);
   std::vector<std::size_t> of_rank(kRanks + 1, 0);
   for (const std::uint16_t rank : ranks) ++of_rank[rank];
   std::size_t wanted = (ranks.size() - of_rank[kRanks]) / kOneIn, dearest = 0;

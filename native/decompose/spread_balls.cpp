@@ -1,8 +1,8 @@
 #include "decompose/spread_balls.hpp"
 
+#include <map>
 #include <numeric>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "core/parallel.hpp"
 #include "core/stop.hpp"
@@ -11,9 +11,8 @@
 namespace rlacd {
 namespace {
 
-constexpr double kSlack = 1e-9;  // absolute: the frame is 2 wide
-constexpr double kTouch = 1e-9;
-constexpr std::size_t kChunk = 64;
+// Above this, the surfaces that are nearest to a place and to another meet at an angle.
+constexpr double kMeeting = 0.15;
 
 struct Candidate {
   Vec3 at;
@@ -84,7 +83,7 @@ class Climb {
 
   // At the level, or above it: then down to it.
   bool is_there() {
-    if (value_.value < field_.level() - kSlack) return false;
+    if (value_.value < field_.level() - kHair) return false;
     x_ = x_ - (value_.value - field_.level()) * value_.uphill;
     value_.value = field_.level();
     return true;
@@ -129,7 +128,6 @@ class Climb {
     }
     return -value_at(seen_[0]) * seen_[0].uphill;
   }
-  static constexpr double kMeeting = 0.15;
 
   const NavigableField& field_;
   Vec3 start_, x_;
@@ -151,7 +149,7 @@ class Meeting {
   const ClearanceGrid::Crossed* at(const ClearanceGrid::Crossed& crossed) const {
     if (index_[crossed.cell] < 0) return nullptr;
     const ClearanceGrid::Crossed* found = nullptr;
-    double most = kMeet;
+    double most = kMeeting;
     grid_.for_neighbours(crossed.cell, [&](std::int32_t cell, Vec3 there) {
       if (index_[cell] < 0) return;
       const ClearanceGrid::Crossed& other = grid_.boundary[index_[cell]];
@@ -162,7 +160,6 @@ class Meeting {
   }
 
  private:
-  static constexpr double kMeet = 0.15;
   const ClearanceGrid& grid_;
   std::vector<std::int32_t> index_;  // into the boundary, by cell
 };
@@ -196,7 +193,7 @@ class Spreading {
         all[2 * i] = up_from(crossed, *other, false);
       if (other != nullptr) all[2 * i + 1] = up_from(crossed, *other, true);
     };
-    parallel_for(count, threads_, find, kChunk);
+    parallel_for(count, threads_, find, kQuick);
     all.erase(std::remove_if(all.begin(), all.end(), [](const Candidate& c) { return !(c.radius > 0); }), all.end());
     return all;
   }
@@ -208,7 +205,7 @@ class Spreading {
   }
   bool is_inside(std::int32_t region, Vec3 x) const {
     const auto [entry, is_new] = inside_.try_emplace(region);
-    if (is_new) entry->second = surface_.winding().of_closed(x) > 0.5;
+    if (is_new) entry->second = surface_.holds(x);
     return entry->second;
   }
 
@@ -236,7 +233,7 @@ class Spreading {
     const double ground = field_.above_ground(at);
     const double radius = std::min(distance - field_.tolerance(), ground);
     const bool in_hull = crossed.inside >= norm(at - grid_.centre(crossed.cell));
-    if (!in_hull && field_.hull().distance(at, radius) >= radius - kTouch) return {};
+    if (!in_hull && field_.hull().distance(at, radius) >= radius - kHair) return {};
     return {at, radius, std::min(distance, ground), sharpness};
   }
 
@@ -301,13 +298,13 @@ class Spreading {
   class Taken {
    public:
     explicit Taken(double width) : width_(width) {}
-    void add(std::int32_t candidate, Vec3 at) { cells_[key(place(at))].push_back(candidate); }
+    void add(std::int32_t candidate, Vec3 at) { cells_[place(at)].push_back(candidate); }
     bool blocks(Vec3 at, double spacing, const std::vector<Candidate>& candidates) const {
       const auto [i, j, k] = place(at);
       for (std::int64_t c = k - 1; c <= k + 1; ++c)
         for (std::int64_t b = j - 1; b <= j + 1; ++b)
           for (std::int64_t a = i - 1; a <= i + 1; ++a) {
-            const auto cell = cells_.find(key({a, b, c}));
+            const auto cell = cells_.find({a, b, c});
             if (cell == cells_.end()) continue;
             for (const std::int32_t other : cell->second) {
               const double limit = std::min(spacing, kBallSpacing * candidates[other].radius);
@@ -322,14 +319,8 @@ class Spreading {
       return {static_cast<std::int64_t>(std::floor(x.x / width_)), static_cast<std::int64_t>(std::floor(x.y / width_)),
               static_cast<std::int64_t>(std::floor(x.z / width_))};
     }
-    static std::uint64_t key(std::array<std::int64_t, 3> place) {
-      constexpr std::int64_t kOffset = 1 << 20;
-      std::uint64_t joined = 0;
-      for (const std::int64_t p : place) joined = joined << 21 | static_cast<std::uint64_t>(p + kOffset);
-      return joined;
-    }
     double width_;
-    std::unordered_map<std::uint64_t, std::vector<std::int32_t>> cells_;
+    std::map<std::array<std::int64_t, 3>, std::vector<std::int32_t>> cells_;
   };
 
   const Surface& surface_;
@@ -346,9 +337,11 @@ Balls spread_balls(const Surface& surface, const NavigableField& field, const Ba
   return Spreading(surface, field, pitch, threads).run(sources);
 }
 
-std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
-                                  const std::vector<std::int32_t>* candidates, double least, bool first) {
-  std::vector<Intrusion> found;
+std::pair<std::vector<std::int32_t>, std::vector<double>> intrusions(const ConvexBody& hull, const Balls& balls,
+                                                                     const std::vector<std::int32_t>* candidates,
+                                                                     double least, bool first) {
+  std::vector<std::int32_t> found;
+  std::vector<double> depths;
   const Box& box = hull.box();
   const std::size_t count = candidates != nullptr ? candidates->size() : balls.centres.size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -360,10 +353,10 @@ std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
     if (!box.meets({c, c}, enough)) continue;
     const double distance = hull.distance(c, enough);
     if (!(distance < enough)) continue;
-    found.push_back({ball, radius - distance});
+    found.push_back(ball), depths.push_back(radius - distance);
     if (first) break;
   }
-  return found;
+  return {std::move(found), std::move(depths)};
 }
 
 }  // namespace rlacd

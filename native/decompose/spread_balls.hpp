@@ -34,15 +34,12 @@ constexpr double kBallSpacing = 0.45;
 Balls spread_balls(const Surface& surface, const NavigableField& field, const BallSources& sources, double pitch,
                    int threads);
 
-struct Intrusion {
-  std::int32_t ball;
-  double depth;  // radius minus the signed distance of the centre from the hull
-};
-
-// The balls among `candidates` (all if null) that the hull penetrates deeper than `least`, in the given order. Depths
-// are exact. With `first`, at most one. Most balls are ruled out by one facet plane, often by the one that ruled out
-// the ball before; the rest are decided exactly.
-std::vector<Intrusion> intrusions(const ConvexBody& hull, const Balls& balls,
-                                  const std::vector<std::int32_t>* candidates, double least, bool first);
+// The balls among `candidates` (all if null) that the hull penetrates deeper than `least`, in the given order, and the
+// depths: the radius minus the signed distance of the centre from the hull, exact. With `first`, at most one. Most
+// balls are ruled out by one facet plane, often by the one that ruled out the ball before; the rest are decided
+// exactly.
+std::pair<std::vector<std::int32_t>, std::vector<double>> intrusions(const ConvexBody& hull, const Balls& balls,
+                                                                     const std::vector<std::int32_t>* candidates,
+                                                                     double least, bool first);
 
 }  // namespace rlacd

@@ -8,17 +8,17 @@
 #include "convex/polygon.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
-#include "solid/pieces.hpp"
+#include "solid/caps.hpp"
 
 namespace rlacd {
 namespace {
 
-constexpr double kInside = 0.5;
+// Facet planes are moved out by this before they cut the solid, so that faces on them stay whole.
+constexpr double kApart = 1e-10;
 
-// Points that are no farther from the surface lie on it.
-constexpr double kOn = 1e-9;
-
-constexpr double kBeyond = 1 + 1e-9;
+// Where a solid crosses itself, each cut may multiply its crossings: one that doubles its faces, and adds so many, is
+// given up.
+constexpr std::size_t kManyNewFaces = 1000;
 
 // Where a verdict is undecided, as a share of the threshold.
 constexpr double kUndecided = 1e-3;
@@ -31,8 +31,12 @@ constexpr double kSmall = 0.2;
 // Points of a cell may be farther out than its middle by its radius, but hardly ever are by more than this share of it.
 constexpr double kFarther = 0.25;
 
-// A distance below this share of the threshold need not be known more exactly.
-constexpr double kNear = 0.5;
+// Clips a polygon to the points deeper than t under all planes; returns a plane under which none is, or -1.
+std::int32_t clip_deeper(Polygon& polygon, const ConvexPlanes& planes, double t) {
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i)
+    if (!keep_below(polygon, [&](Vec3 p) { return t - planes.depth(i, p); })) return i;
+  return -1;
+}
 
 // The region deeper than t under all planes. Most objects are outside it, and mostly because of the same plane as those
 // before them.
@@ -64,24 +68,16 @@ class Depths {
   bool meets(Vec3 a, Vec3 b, Vec3 c) {
     if (std::max({planes_.depth(last_, a), planes_.depth(last_, b), planes_.depth(last_, c)}) <= t_) return false;
     polygon_.assign({a, b, c});
-    for (std::size_t i = 0; i < planes_.size(); ++i) {
-      const auto plane = static_cast<std::int32_t>(i);
-      const auto height = [&](Vec3 p) { return t_ - planes_.depth(plane, p); };
-      const Lies lies = split(polygon_, height, deeper_, rest_);
-      if (lies == Lies::kAbove) {
-        last_ = plane;
-        return false;
-      }
-      if (lies == Lies::kAcross) polygon_.swap(deeper_);
-    }
-    return planes_.nearest(middle_of(polygon_)).depth > t_;
+    const std::int32_t plane = clip_deeper(polygon_, planes_, t_);
+    if (plane >= 0) last_ = plane;
+    return plane < 0 && planes_.nearest(middle_of(polygon_)).depth > t_;
   }
 
  private:
   const ConvexPlanes& planes_;
   const double t_;
   std::int32_t last_ = 0;  // the plane that excluded the last object
-  Polygon polygon_, deeper_, rest_;
+  Polygon polygon_;
 };
 
 // A piece of a facet.
@@ -89,11 +85,11 @@ struct Look {
   Corners corner;
   Vec3 middle;
   double radius;
-  std::int32_t hint;                                      // the slot of a nearby face of the solid
-  double most = std::numeric_limits<double>::infinity();  // how far a point of the cell outside the solid may well be
+  std::int32_t hint;        // the slot of a nearby face of the solid
+  double most = kInfinity;  // how far a point of the cell outside the solid may well be
 
-  Look(Vec3 a, Vec3 b, Vec3 c, std::int32_t near) : corner{a, b, c}, middle((1.0 / 3) * (a + b + c)), hint(near) {
-    radius = std::sqrt(std::max({norm2(a - middle), norm2(b - middle), norm2(c - middle)}));
+  Look(const Corners& t, std::int32_t near) : corner(t), middle((1.0 / 3) * (t[0] + t[1] + t[2])), hint(near) {
+    radius = std::sqrt(std::max({norm2(t[0] - middle), norm2(t[1] - middle), norm2(t[2] - middle)}));
   }
   bool operator<(const Look& other) const { return most < other.most; }
 };
@@ -129,7 +125,8 @@ class SolidField {
     }
     const Bvh::Hit hit = surface_.bvh().closest(p, near, enough);
     const double distance = std::sqrt(hit.distance2);
-    if (distance <= std::max(enough, kOn) || surface_.winding().of_closed(p) < kInside) return {distance, hit.slot};
+    // On the surface, up to rounding, there is no ball.
+    if (distance <= std::max(enough, kHair) || !surface_.holds(p)) return {distance, hit.slot};
     balls_.push_back({p, distance, hit.slot});
     return {0, kFirstBall - static_cast<std::int32_t>(balls_.size() - 1)};
   }
@@ -190,17 +187,11 @@ Against::Fit Against::measure(const ConvexBody& hull, double tolerance, double f
 
 Mesh Against::faces_inside(const ConvexBody& hull) const {
   Mesh inside;
-  const ConvexPlanes& planes = hull.planes();
-  Polygon polygon, below, above;
+  Polygon polygon;
   const auto visit = [&](std::int32_t slot) {
     const Corners corners = corners_of(solid_, solid_.faces[surface_.bvh().face(slot)]);
     polygon.assign(corners.begin(), corners.end());
-    for (std::size_t i = 0; i < planes.size(); ++i) {
-      const auto height = [&](Vec3 p) { return -planes.depth(static_cast<std::int32_t>(i), p); };
-      const Lies lies = split(polygon, height, below, above);
-      if (lies == Lies::kAbove) return false;
-      if (lies == Lies::kAcross) polygon.swap(below);
-    }
+    if (clip_deeper(polygon, hull.planes(), 0) >= 0) return false;
     const auto first = static_cast<std::int32_t>(inside.vertices.size());
     inside.vertices.insert(inside.vertices.end(), polygon.begin(), polygon.end());
     for (std::size_t i = 2; i < polygon.size(); ++i) {
@@ -213,13 +204,23 @@ Mesh Against::faces_inside(const ConvexBody& hull) const {
   return inside;
 }
 
-Mesh Against::inside(const ConvexBody& hull) const { return inside_all(solid_, hull.planes()); }
+Mesh Against::inside(const ConvexBody& hull) const {
+  Mesh mesh = solid_;
+  std::size_t fewest = mesh.faces.size();
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(hull.planes().size()); ++i) {
+    const Plane plane = {hull.planes().normal(i), hull.planes().offset(i) + kApart};
+    if (std::none_of(mesh.vertices.begin(), mesh.vertices.end(), [&](Vec3 p) { return plane.depth(p) < 0; })) continue;
+    mesh = capped(std::move(cut_by_plane(mesh, plane.normal, plane.offset)[0]), plane.normal);
+    if (mesh.faces.size() > 2 * fewest + kManyNewFaces) return {};
+    fewest = std::min(fewest, mesh.faces.size());
+  }
+  return mesh;
+}
 
 double Against::feasible_volume(const ConvexBody& first, const ConvexBody& second, double threshold) const {
-  constexpr double kNever = std::numeric_limits<double>::infinity();
   const std::vector<Vec3>&all_first = first.mesh().vertices, &all_second = second.mesh().vertices;
   const ConvexBody few(hull_mesh(joined(first.few_corners(), second.few_corners())));
-  if (!few.mesh().faces.empty() && comes_deeper(few, threshold)) return kNever;
+  if (!few.mesh().faces.empty() && comes_deeper(few, threshold)) return kInfinity;
   const bool are_all = &first.few_corners() == &all_first && &second.few_corners() == &all_second;
   const ConvexBody body(are_all ? few.mesh() : hull_mesh(joined(all_first, all_second)));
   const Mesh& hull = body.mesh();
@@ -239,8 +240,8 @@ double Against::feasible_volume(const ConvexBody& first, const ConvexBody& secon
   std::vector<Triangle> facets;
   for (std::size_t f = 0; f < hull.faces.size(); ++f)
     if (is_new[f]) facets.push_back(hull.faces[f]);
-  if (!are_all && (is_missed(hull, facets, threshold, 0) || comes_deeper(body, threshold))) return kNever;
-  return is_missed(hull, facets, threshold, kMostLooks) ? kNever : mesh_volume(hull);
+  if (!are_all && (is_missed(hull, facets, threshold, 0) || comes_deeper(body, threshold))) return kInfinity;
+  return is_missed(hull, facets, threshold, kMostLooks) ? kInfinity : mesh_volume(hull);
 }
 
 bool Against::comes_deeper(const ConvexBody& hull, double threshold) const {
@@ -265,27 +266,24 @@ bool Against::is_missed(const Mesh& hull, const std::vector<Triangle>& facets, d
   const auto look_at = [&](Look cell) {
     poll_stop();
     if (cell.radius < kSmall * threshold) return false;
-    const double enough = std::max(kNear * threshold, threshold - cell.radius), within = kBeyond * threshold;
+    const double enough = std::max(kEnough * threshold, threshold - cell.radius), within = threshold + kHair;
     const Bvh::Hit hit = surface_.bvh().closest(cell.middle, cell.hint, enough, within);
     const double distance = std::sqrt(hit.distance2);  // `within` if nothing is nearer
     const bool is_far = distance > threshold;
-    if (is_far && surface_.winding().of_closed(cell.middle) < kInside) return true;
+    if (is_far && !surface_.holds(cell.middle)) return true;
     // On the way from a middle inside the solid to a point outside, the surface comes no sooner than its distance.
     cell.most = kFarther * cell.radius + (is_far ? -distance : distance);
     cell.hint = hit.slot;
     if (cell.most > threshold) open.push(cell);
     return false;
   };
-  for (const auto& [a, b, c] : facets)
-    if (look_at(Look(hull.vertices[a], hull.vertices[b], hull.vertices[c], -1))) return true;
+  for (const Triangle& facet : facets)
+    if (look_at(Look(corners_of(hull, facet), -1))) return true;
   for (int looked = 0; looked < most && !open.empty(); looked += 2) {
     const Look cell = open.top();
     open.pop();
-    // Across the longest side, so that cells stay well shaped.
-    const int from = longest_side(cell.corner);
-    const Vec3 p = cell.corner[from], q = cell.corner[(from + 1) % 3], tip = cell.corner[(from + 2) % 3];
-    const Vec3 between = 0.5 * (p + q);
-    if (look_at(Look(p, between, tip, cell.hint)) || look_at(Look(between, q, tip, cell.hint))) return true;
+    for (const Corners& half : halves(cell.corner))
+      if (look_at(Look(half, cell.hint))) return true;
   }
   return false;
 }

@@ -10,18 +10,10 @@
 #pragma once
 
 #include "convex/convex_body.hpp"
-#include "solid/filled.hpp"
 #include "surface/branch_and_bound.hpp"
 #include "surface/surface.hpp"
 
 namespace rlacd {
-
-// Hulls grow by at most `grain` more than they must. A hull whose box is farther from a triangle than `reach` takes it
-// only if all are.
-std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<const ConvexBody*>& hulls,
-                                         double reach, double grain, int threads);
-
-std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const ConvexBody& hull, double depth);
 
 class Against {
  public:
@@ -45,19 +37,19 @@ class Against {
   // The volume of the joint hull of two hulls that meet the threshold; infinite if that hull certainly does not.
   double feasible_volume(const ConvexBody& first, const ConvexBody& second, double threshold) const;
 
-  // How much of a convex hull the solid fills.
-  double filled(const ConvexBody& hull) const { return rlacd::filled(solid_, surface_, hull); }
-  // What it fills, closed by caps. Empty if the solid crosses itself so often that cuts multiply
-  // its faces.
+  // How much of a convex hull the solid fills (filled.cpp).
+  double filled(const ConvexBody& hull) const;
+  // What it fills, closed by caps: cut by one plane of the hull after the other. Empty if the solid crosses itself so
+  // often that cuts multiply its faces.
   Mesh inside(const ConvexBody& hull) const;
 
-  std::vector<HalfSpace> grown(const ConvexBody& hull, double depth) const {
-    return grow(solid_, surface_.bvh(), hull, depth);
-  }
+  // Half-spaces that hold a hull that has grown to where the solid's surface stops it (grow.cpp).
+  std::vector<HalfSpace> grown(const ConvexBody& hull, double depth) const;
+
+  // The points that each hull has to take in, so that together they cover the solid (uncovered.cpp). Hulls grow by at
+  // most `grain` more than they must. One whose box is farther from a triangle than `reach` takes it only if all are.
   std::vector<std::vector<Vec3>> uncovered(const std::vector<const ConvexBody*>& hulls, double reach, double grain,
-                                           int threads) const {
-    return rlacd::uncovered(solid_, surface_.bvh(), hulls, reach, grain, threads);
-  }
+                                           int threads) const;
 
  private:
   // Examines at most this many looks besides the facets themselves.

@@ -64,7 +64,7 @@ class Exterior {
   bool is_inside(Vec3 x, double away) {
     for (const Ball& ball : inner_)
       if (norm2(x - ball.centre) < ball.radius * ball.radius) return true;
-    if (surface_.winding().of_closed(x) <= 0.5) return false;
+    if (!surface_.holds(x)) return false;
     inner_.push_back({x, away});
     return true;
   }
@@ -160,7 +160,7 @@ using Clique = std::vector<std::int32_t>;
 Clique packed(ApartGraph& graph, std::int32_t start) {
   Clique clique;
   std::vector<std::int32_t> live;
-  std::vector<double> near(graph.size(), std::numeric_limits<double>::infinity());
+  std::vector<double> near(graph.size(), kInfinity);
   for (std::int32_t i = 0; i < graph.size(); ++i) live.push_back(i);
   for (std::int32_t next = start; next >= 0;) {
     clique.push_back(next);

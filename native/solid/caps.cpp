@@ -16,32 +16,58 @@ namespace rlacd {
 
 namespace {
 
+using Outlines = std::vector<std::vector<PlanePoint>>;
+
+Outlines outlines_of(const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward) {
+  Outlines outlines;
+  for (const std::vector<std::int32_t>& rim : rims) {
+    std::vector<Vec3> points;
+    points.reserve(rim.size());
+    for (const std::int32_t i : rim) points.push_back(vertices[i]);
+    outlines.push_back(on_plane(points, outward));
+  }
+  return outlines;
+}
+
+// What there is at the corners of all loops: their vertices, or points of the plane.
+template <class Item>
+std::vector<Item> joined(const std::vector<std::vector<Item>>& loops) {
+  std::vector<Item> all;
+  for (const std::vector<Item>& loop : loops) all.insert(all.end(), loop.begin(), loop.end());
+  return all;
+}
+
+CapArea append(std::vector<Triangle>& faces, const Loops& rims, const Outlines& outlines, int times) {
+  const std::vector<std::int32_t> vertex = joined(rims);
+  const std::vector<PlanePoint> point = joined(outlines);
+  CapArea area;
+  for (const Triangle& t : triangulate(outlines, vertex)) {
+    const double doubled = doubled_area(point[t[0]], point[t[1]], point[t[2]]);
+    area.all += std::fabs(doubled);
+    if (doubled < 0) area.folded -= doubled;
+    for (int i = 0; i < std::abs(times); ++i)
+      faces.push_back(times > 0 ? Triangle{vertex[t[0]], vertex[t[1]], vertex[t[2]]}
+                                : Triangle{vertex[t[0]], vertex[t[2]], vertex[t[1]]});
+  }
+  return area;
+}
+
 // Rims of a cut that cross each other, taken apart into loops that do not.
 //
 // Where a solid overlaps itself, the rims of a plane cut cross, and no triangulation of them as they are closes the cut
 // without leading out of the solid.
 //
 // Input:  one side of a cut (see plane_cut.hpp) and its rims as points of the plane.
-// Output: the same side with a vertex at every crossing, and regions of the plane around which the rims run w times,
-//         each with its boundary: loops that cross nowhere, the region to their left. Its triangles close the side
-//         where each is taken w times, or -w times upside down where the solid is inside out (w < 0).
+// Output: the same side with a vertex at every crossing, closed. To the left of loops that cross nowhere are the
+//         regions around which the rims run w times: each is closed w times, or -w times upside down where the solid
+//         is inside out (w < 0).
 // Algorithm: at a crossing, each rim continues along the other (Seifert's smoothing), which leaves simple loops. A ray
 // from each gives the winding number beside it. Rims are moved by noise far below any tolerance first, so that they
 // cross at single points or not at all; rims that share vertices do not cross there (see plane_cut.hpp).
 
-struct RimRegion {
-  int winding;                                    // never 0
-  Loops rims;                                     // loops of vertices
-  std::vector<std::vector<PlanePoint>> outlines;  // the same as points
-};
-
-struct UncrossedSide {
-  Mesh mesh;
-  std::vector<RimRegion> regions;
-};
-
-constexpr double kNoise = 1e-10;           // of the greatest coordinate
-constexpr std::size_t kMostCrossings = 4;  // for each corner
+constexpr double kNoise = 1e-10;  // of the greatest coordinate
+// For each corner: more come from surfaces that lie on each other in many layers, and would multiply from cut to cut.
+constexpr std::size_t kMostCrossings = 4;
 
 // The edges of the rims, edge i from corner i of the rims to the next, and what becomes of them.
 //
@@ -49,7 +75,7 @@ constexpr std::size_t kMostCrossings = 4;  // for each corner
 // n + 2k + 1 on the second.
 class Tangle {
  public:
-  Tangle(OpenSide side, const std::vector<std::vector<PlanePoint>>& outlines) : mesh_(std::move(side.mesh)) {
+  Tangle(OpenSide side, const Outlines& outlines) : mesh_(std::move(side.mesh)) {
     for (std::size_t r = 0; r < side.rims.size(); ++r) {
       const std::size_t first = vertex_.size(), size = side.rims[r].size();
       for (std::size_t k = 0; k < size; ++k) {
@@ -65,33 +91,34 @@ class Tangle {
       for (const int c : {0, 1}) point_[i][c] += kNoise * greatest * (2 * uniform(0, 2 * vertex_[i] + c) - 1);
   }
 
-  std::optional<UncrossedSide> uncrossed() {
+  // Nothing if there are too many crossings. Outlines are those of the side's rims, by `on_plane`.
+  std::optional<Mesh> closed() {
     if (!find_crossings()) return std::nullopt;
     insert_crossings();
     split_faces();
     std::vector<PlanePoint> ends;
     for (std::size_t node = 0; node < point_.size(); ++node)
       ends.insert(ends.end(), {point_[node], point_[follower_[node]]});
-    std::map<int, RimRegion> regions;
     for (std::vector<std::size_t>& loop : loops()) {
       const int left = left_of(loop, ends);
-      add(loop, left, regions);
+      add(loop, left);
       std::reverse(loop.begin(), loop.end());
-      add(loop, left - 1, regions);
+      add(loop, left - 1);
     }
-    UncrossedSide out;
-    for (auto& [winding, region] : regions) out.regions.push_back(std::move(region));
-    out.mesh = std::move(mesh_);
-    return out;
+    for (const auto& [winding, region] : regions_)
+      if (winding != 0) append(mesh_.faces, region.rims, region.outlines, winding);
+    return std::move(mesh_);
   }
 
  private:
-  void add(const std::vector<std::size_t>& loop, int winding, std::map<int, RimRegion>& regions) const {
-    if (winding == 0) return;
-    RimRegion& region = regions[winding];
-    region.winding = winding;
-    std::vector<std::int32_t>& rim = region.rims.emplace_back();
-    std::vector<PlanePoint>& outline = region.outlines.emplace_back();
+  struct Region {
+    Loops rims;  // of vertices
+    Outlines outlines;
+  };
+
+  void add(const std::vector<std::size_t>& loop, int winding) {
+    std::vector<std::int32_t>& rim = regions_[winding].rims.emplace_back();
+    std::vector<PlanePoint>& outline = regions_[winding].outlines.emplace_back();
     for (const std::size_t node : loop) {
       rim.push_back(vertex_[node]);
       outline.push_back(point_[node]);
@@ -233,6 +260,7 @@ class Tangle {
   };
 
   Mesh mesh_;
+  std::map<int, Region> regions_;  // by how often the rims run around them
   std::size_t corners_ = 0;
   std::vector<std::int32_t> vertex_;  // of a node
   std::vector<PlanePoint> point_;     // of a node
@@ -241,48 +269,6 @@ class Tangle {
   std::map<std::size_t, std::vector<Stop>> stops_;  // the crossings on an edge, in its direction
   std::vector<std::size_t> follower_;               // of a node, along the loops
 };
-
-// Outlines: of the side's rims, by `on_plane`. Nothing if there are more than four crossings for each corner of the
-// rims: that many come from surfaces that lie on each other in many layers, and would multiply from cut to cut.
-std::optional<UncrossedSide> uncross(OpenSide side, const std::vector<std::vector<PlanePoint>>& outlines) {
-  return Tangle(std::move(side), outlines).uncrossed();
-}
-
-using Outlines = std::vector<std::vector<PlanePoint>>;
-
-Outlines outlines_of(const std::vector<Vec3>& vertices, const Loops& rims, Vec3 outward) {
-  Outlines outlines;
-  for (const std::vector<std::int32_t>& rim : rims) {
-    std::vector<Vec3> points;
-    points.reserve(rim.size());
-    for (const std::int32_t i : rim) points.push_back(vertices[i]);
-    outlines.push_back(on_plane(points, outward));
-  }
-  return outlines;
-}
-
-// What there is at the corners of all loops: their vertices, or points of the plane.
-template <class Item>
-std::vector<Item> joined(const std::vector<std::vector<Item>>& loops) {
-  std::vector<Item> all;
-  for (const std::vector<Item>& loop : loops) all.insert(all.end(), loop.begin(), loop.end());
-  return all;
-}
-
-CapArea append(std::vector<Triangle>& faces, const Loops& rims, const Outlines& outlines, int times) {
-  const std::vector<std::int32_t> vertex = joined(rims);
-  const std::vector<PlanePoint> point = joined(outlines);
-  CapArea area;
-  for (const Triangle& t : triangulate(outlines, vertex)) {
-    const double doubled = doubled_area(point[t[0]], point[t[1]], point[t[2]]);
-    area.all += std::fabs(doubled);
-    if (doubled < 0) area.folded -= doubled;
-    for (int i = 0; i < std::abs(times); ++i)
-      faces.push_back(times > 0 ? Triangle{vertex[t[0]], vertex[t[1]], vertex[t[2]]}
-                                : Triangle{vertex[t[0]], vertex[t[2]], vertex[t[1]]});
-  }
-  return area;
-}
 
 }  // namespace
 
@@ -299,11 +285,7 @@ Mesh capped(OpenSide side, Vec3 outward) {
   if (area.folded <= kFolded * area.all) return std::move(side.mesh);
   OpenSide again{side.mesh, side.rims};
   again.mesh.faces.resize(open);
-  std::optional<UncrossedSide> apart = uncross(std::move(again), outlines);
-  if (!apart) return std::move(side.mesh);
-  for (const RimRegion& region : apart->regions)
-    append(apart->mesh.faces, region.rims, region.outlines, region.winding);
-  return std::move(apart->mesh);
+  return Tangle(std::move(again), outlines).closed().value_or(std::move(side.mesh));
 }
 
 }  // namespace rlacd

@@ -45,11 +45,11 @@ class Growth {
     double distance;
     std::int32_t node;  // -1 for a face
     Box box;            // of the node
-    std::int32_t face;
-    double area;
-    Vec3 normal;
-    double beyond;  // how far the hull reaches beyond the face's plane
-    bool is_natural;
+    std::int32_t face = -1;
+    double area = 0;
+    Vec3 normal{};
+    double beyond = 0;  // how far the hull reaches beyond the face's plane
+    bool is_natural = false;
 
     std::tuple<double, bool, bool, double, std::int32_t> order() const {
       return {distance, node < 0, !is_natural, -area, node < 0 ? face : node};
@@ -61,18 +61,10 @@ class Growth {
     const Bvh::Node& node = bvh_.nodes()[number];
     for (int side = 0; side < 2; ++side) {
       if (node.child[side] >= 0) {
-        if (is_in(node.box[side])) {
-          const Box& box = node.box[side];
-          const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
-          open_.push({distance([&](Vec3 n) { return dot(n, middle) - reach_along(n, half); }),
-                      node.child[side],
-                      box,
-                      -1,
-                      0,
-                      {},
-                      0,
-                      false});
-        }
+        const Box& box = node.box[side];
+        const Vec3 middle = 0.5 * (box.lower + box.upper), half = box.upper - middle;
+        const auto least = [&](Vec3 n) { return dot(n, middle) - reach_along(n, half); };
+        if (is_in(box)) open_.push({distance(least), node.child[side], box});
         continue;
       }
       for (std::int32_t i = 0; i < node.leaf_size[side]; ++i) open_face(bvh_.face(~node.child[side] + i));
@@ -112,19 +104,17 @@ class Growth {
     const auto [a, b, c] = corners_of(solid_, solid_.faces[item.face]);
     Polygon polygon = {a, b, c};
     for (const HalfSpace& space : found_) {
-      const auto height = [&, offset = space.offset - depth_](Vec3 p) { return dot(space.normal, p) - offset; };
-      const Lies lies = split(polygon, height, deeper_, rest_);
-      if (lies == Lies::kAbove) return;
-      if (lies == Lies::kAcross) polygon.swap(deeper_);
+      const double offset = space.offset - depth_;
+      if (!keep_below(polygon, [&](Vec3 p) { return dot(space.normal, p) - offset; })) return;
     }
     if (item.is_natural) {
       found_.push_back({item.normal, dot(item.normal, a) + item.beyond});
       return;
     }
-    double most = -std::numeric_limits<double>::infinity();
+    double most = -kInfinity;
     std::int32_t best = 0;
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes_.size()); ++i) {
-      double least = std::numeric_limits<double>::infinity();
+      double least = kInfinity;
       for (const Vec3 p : polygon) least = std::min(least, dot(planes_.normal(i), p));
       if (least - planes_.offset(i) > most) {
         most = least - planes_.offset(i);
@@ -141,13 +131,12 @@ class Growth {
   const double depth_;
   std::priority_queue<Item> open_;
   std::vector<HalfSpace> found_;
-  Polygon deeper_, rest_;
 };
 
 }  // namespace
 
-std::vector<HalfSpace> grow(const Mesh& solid, const Bvh& bvh, const ConvexBody& hull, double depth) {
-  return Growth(solid, bvh, hull, depth).run();
+std::vector<HalfSpace> Against::grown(const ConvexBody& hull, double depth) const {
+  return Growth(solid_, surface_.bvh(), hull, depth).run();
 }
 
 }  // namespace rlacd

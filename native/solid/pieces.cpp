@@ -16,20 +16,9 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kApart = 1e-10;  // facet planes are moved out by this, so that faces on them stay whole
-constexpr double kHalf = 0.5;     // a winding number between inside and outside
-
-// Where a solid crosses itself, each cut may multiply its crossings: one that doubles its faces, and adds so many, is
-// given up.
-constexpr std::size_t kManyNewFaces = 1000;
-
-bool ascends(const Mesh& mesh, std::int32_t low, const Run& run) {
-  return mesh.faces[run.halfedge / 3][run.halfedge % 3] == low;
-}
-
 // Sorts the halfedges between two vertices by angle, such that the solid lies between an ascending one and the one
 // before it. False if ascending and descending halfedges do not alternate.
-bool sort_around(const Mesh& mesh, std::int32_t low, Run* begin, Run* end) {
+bool sort_around(const Mesh& mesh, std::size_t low, Run* begin, Run* end) {
   const Vec3 origin = mesh.vertices[low], along = normalized(mesh.vertices[begin->high] - origin);
   const auto apex = [&](const Run& run) {
     return mesh.vertices[mesh.faces[run.halfedge / 3][(run.halfedge + 2) % 3]] - origin;
@@ -38,7 +27,7 @@ bool sort_around(const Mesh& mesh, std::int32_t low, Run* begin, Run* end) {
   const auto angle = [&](const Run& run) { return angle_of(dot(v, apex(run)), dot(u, apex(run))); };
   std::sort(begin, end, [&](const Run& a, const Run& b) { return angle(a) < angle(b); });
   for (const Run* r = begin; r != end; ++r)
-    if (ascends(mesh, low, *r) == ascends(mesh, low, r + 1 == end ? *begin : r[1])) return false;
+    if (ascends(mesh.faces, low, *r) == ascends(mesh.faces, low, r + 1 == end ? *begin : r[1])) return false;
   return true;
 }
 
@@ -50,13 +39,12 @@ std::vector<Mesh> bodies(const Mesh& mesh) {
   const auto join = [&groups](const Run& a, const Run& b) { groups.join(a.halfedge / 3, b.halfedge / 3); };
   Buckets<Run> runs = sorted_halfedges(mesh.faces, mesh.vertices.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    const auto low = static_cast<std::int32_t>(v);
     const auto [begin, end] = runs.range(v);
     for (Run *first = begin, *after; first != end; first = after) {
       after = std::find_if(first, end, [first](const Run& run) { return run.high != first->high; });
-      if (after - first > 2 && sort_around(mesh, low, first, after)) {
+      if (after - first > 2 && sort_around(mesh, v, first, after)) {
         for (const Run* r = first; r != after; ++r)
-          if (ascends(mesh, low, *r)) join(*r, r == first ? after[-1] : r[-1]);
+          if (ascends(mesh.faces, v, *r)) join(*r, r == first ? after[-1] : r[-1]);
       } else {
         for (const Run* r = first + 1; r != after; ++r) join(*r, r[-1]);
       }
@@ -130,7 +118,7 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
     if (!(volumes[i] < 0)) continue;
     for (const std::size_t shell : by_volume) {
       if (!surfaces[shell]) surfaces[shell] = std::make_unique<Surface>(all[shell]);
-      if (surfaces[shell]->winding().of_closed(all[i].vertices[0]) <= kHalf) continue;
+      if (!surfaces[shell]->holds(all[i].vertices[0])) continue;
       cavities[shell].push_back(i);
       break;
     }
@@ -156,7 +144,7 @@ std::vector<Vec3> between(const ConvexBody& hull, const std::vector<const Convex
       middle_of(around[by_growth[1].second]->mesh().vertices) - middle_of(around[by_growth[0].second]->mesh().vertices);
   const double length = norm(along);
   if (length == 0) return {};
-  return {{along.x / length, along.y / length, along.z / length}};
+  return {along / length};
 }
 
 std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::vector<Vec3>& directions, double share,
@@ -177,20 +165,6 @@ std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::v
   halves.push_back(std::move(*below));
   halves.push_back(std::move(*above));
   return halves;
-}
-
-Mesh inside_all(Mesh mesh, const ConvexPlanes& planes) {
-  std::size_t fewest = mesh.faces.size();
-  for (std::int32_t i = 0; i < static_cast<std::int32_t>(planes.size()); ++i) {
-    const Vec3 normal = planes.normal(i);
-    const double offset = planes.offset(i) + kApart;
-    if (std::none_of(mesh.vertices.begin(), mesh.vertices.end(), [&](Vec3 p) { return dot(normal, p) > offset; }))
-      continue;
-    mesh = capped(std::move(cut_by_plane(mesh, normal, offset)[0]), normal);
-    if (mesh.faces.size() > 2 * fewest + kManyNewFaces) return {};
-    fewest = std::min(fewest, mesh.faces.size());
-  }
-  return mesh;
 }
 
 }  // namespace rlacd

@@ -1,7 +1,7 @@
 // Pieces of a solid: what a cut or a search for connected bodies leaves, each with its volume and its hull.
 //
 // Input:  a closed oriented triangle mesh.
-// Output: its sides below and above a plane, its connected pieces, or what it fills of a convex polytope; closed.
+// Output: its sides below and above a plane, or its connected pieces; closed.
 // Algorithm: cut by the plane and capped; bodies, with each cavity in the smallest shell around it.
 #pragma once
 
@@ -34,9 +34,5 @@ std::vector<Piece> halve(const Mesh& piece, const ConvexBody& hull, const std::v
 
 // Nothing if all is one piece.
 std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double least);
-
-// What is below all planes of a hull, cut by one after the other.
-// Empty if the solid crosses itself so often that cuts multiply its faces.
-Mesh inside_all(Mesh mesh, const ConvexPlanes& planes);
 
 }  // namespace rlacd

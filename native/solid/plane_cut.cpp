@@ -12,9 +12,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kOnPlane = 1e-13;  // relative to the mesh's largest coordinate: above the rounding of a height
-constexpr double kFlat = 1e-12;     // relative to the same: corners this close to a line or a plane lie in it
-
 class Cutter {
  public:
   Cutter(const Mesh& mesh, Vec3 normal, double offset)
@@ -25,7 +22,7 @@ class Cutter {
     for (const Vec3 p : points_) {
       const double height = dot(normal, p) - offset;
       heights_.push_back(height);
-      sides_.push_back(std::fabs(height) <= kOnPlane * farthest_ ? 0 : height < 0 ? -1 : 1);
+      sides_.push_back(std::fabs(height) <= kRounding * farthest_ ? 0 : height < 0 ? -1 : 1);
     }
   }
 
@@ -57,7 +54,11 @@ class Cutter {
         faces.push_back({polygon[k], polygon[k + 2], polygon[(k + 3) % 4]});
       }
     }
-    Loops loops = rims(net(std::move(in_plane)));
+    // Loops against the boundary's edges. Without loops the surface was not closed: its side stays open, with all its
+    // points.
+    std::vector<Edge> boundary = net(std::move(in_plane));
+    for (Edge& e : boundary) std::swap(e[0], e[1]);
+    Loops loops = loops_of(std::move(boundary)).value_or(Loops());
     straighten(faces, loops);
     return compacted(faces, loops);
   }
@@ -87,13 +88,6 @@ class Cutter {
       points_.push_back(p);
     }
     return known->second;
-  }
-
-  // Loops against the boundary's edges. Without loops the surface was not closed: its side stays open, with all its
-  // points.
-  static Loops rims(std::vector<Edge> boundary) {
-    for (Edge& e : boundary) std::swap(e[0], e[1]);
-    return loops_of(std::move(boundary)).value_or(Loops());
   }
 
   // Removes corners of the rims that lie on a straight line in a flat part of the surface, where its triangles met.
@@ -130,7 +124,7 @@ class Cutter {
 
   bool is_between(std::int32_t before, std::int32_t v, std::int32_t after) const {
     const Vec3 a = points_[v] - points_[before], b = points_[after] - points_[v], c = points_[after] - points_[before];
-    return dot(a, b) > 0 && norm(cross(a, b)) <= kFlat * farthest_ * norm(c);
+    return dot(a, b) > 0 && norm(cross(a, b)) <= kRounding * farthest_ * norm(c);
   }
 
   // Moves a point onto its neighbour on the rim, if the faces around it lie in a plane and none flips.
@@ -147,7 +141,7 @@ class Cutter {
       if (is_gone[f]) continue;
       RLACD_ASSERT(std::find(faces[f].begin(), faces[f].end(), v) != faces[f].end());
       for (const std::int32_t corner : faces[f])
-        if (std::fabs(dot(normal, points_[corner] - points_[v])) > kFlat * farthest_) return false;
+        if (std::fabs(dot(normal, points_[corner] - points_[v])) > kRounding * farthest_) return false;
       Triangle moved = faces[f];
       bool has_both = false;
       for (std::int32_t& corner : moved) {

@@ -10,16 +10,60 @@
 #include "core/stop.hpp"
 #include "solid/caps.hpp"
 #include "solid/plane_cut.hpp"
-#include "solid/touching.hpp"
 #include "solid/triangulate.hpp"
 
 namespace rlacd {
 
 namespace {
 
-constexpr double kSame = kCoincident;  // distance at which vertices are one, or on an edge
-constexpr double kFilm = 1e-9;         // thickness of the film over the solids by which the union's volume may differ
-constexpr int kDeepest = 8;            // times that an edge between stops may have stops: two, but for rounding
+constexpr double kCoincident = 1e-8;  // distance at which faces touch, and vertices are one or on an edge
+constexpr int kDeepest = 8;           // times that an edge between stops may have stops: two, but for rounding
+
+bool lies_in(const Plane& plane, const Corners& t) {
+  return std::all_of(t.begin(), t.end(), [&](Vec3 p) { return std::fabs(plane.depth(p)) <= kCoincident; });
+}
+
+struct Facet {
+  Corners corner;
+  Box box;
+  Plane plane;
+  double height;  // twice the area over the longest edge
+
+  explicit Facet(const Corners& t) : corner(t), box(Box::of(t)) {
+    const Vec3 normal = long_normal(t);
+    const double longest = norm(t[(longest_side(t) + 1) % 3] - t[longest_side(t)]);
+    plane = {normalized(normal), dot(normalized(normal), t[0])};
+    height = longest > 0 ? norm(normal) / longest : 0;
+  }
+  bool may_touch(const Facet& other) const {
+    return dot(plane.normal, other.plane.normal) < 0 && box.meets(other.box, kCoincident) &&
+           lies_in(plane, other.corner);
+  }
+};
+
+std::vector<Facet> facets_within(const Mesh& mesh, const Box& box) {
+  std::vector<Facet> found;
+  for (const Triangle& face : mesh.faces) {
+    const Facet facet(corners_of(mesh, face));
+    if (facet.height > kCoincident && facet.box.meets(box, kCoincident)) found.push_back(facet);
+  }
+  return found;
+}
+
+// Adds the planes in which faces of two solids may lie on each other, unless they are known.
+void add_touching_planes(std::vector<Plane>& planes, const Mesh& a, const Mesh& b) {
+  const std::vector<Facet> others = facets_within(b, box_of_faces(a));
+  std::vector<Facet> own = facets_within(a, box_of_faces(b));
+  // Large faces first: their planes are the most exact.
+  std::stable_sort(own.begin(), own.end(), [](const Facet& f, const Facet& g) { return f.height > g.height; });
+  for (const Facet& facet : own) {
+    poll_stop();
+    if (std::any_of(planes.begin(), planes.end(), [&](const Plane& plane) { return lies_in(plane, facet.corner); }))
+      continue;
+    if (std::any_of(others.begin(), others.end(), [&](const Facet& other) { return facet.may_touch(other); }))
+      planes.push_back(facet.plane);
+  }
+}
 
 class Reunion {
  public:
@@ -64,8 +108,8 @@ class Reunion {
               [&](std::int32_t a, std::int32_t b) { return std::pair{at(a).x, a} < std::pair{at(b).x, b}; });
     for (auto v = order.begin(); v != order.end(); ++v) {
       if (same[*v] != *v) continue;
-      for (auto w = v + 1; w != order.end() && at(*w).x <= at(*v).x + kSame; ++w)
-        if (same[*w] == *w && max_abs(at(*w) - at(*v)) <= kSame) same[*w] = *v;
+      for (auto w = v + 1; w != order.end() && at(*w).x <= at(*v).x + kCoincident; ++w)
+        if (same[*w] == *w && max_abs(at(*w) - at(*v)) <= kCoincident) same[*w] = *v;
     }
     std::size_t kept = 0;
     for (const Triangle& f : mesh_.faces) {
@@ -80,10 +124,8 @@ class Reunion {
     rims_.resize(planes_.size());
     std::size_t kept = 0;
     for (const Triangle& f : mesh_.faces) {
-      const auto own = std::find_if(planes_.begin(), planes_.end(), [&](const Plane& plane) {
-        return std::all_of(f.begin(), f.end(),
-                           [&](std::int32_t v) { return std::fabs(plane.depth(mesh_.vertices[v])) <= kCoincident; });
-      });
+      const auto own = std::find_if(planes_.begin(), planes_.end(),
+                                    [&](const Plane& plane) { return lies_in(plane, corners_of(mesh_, f)); });
       if (own == planes_.end()) {
         mesh_.faces[kept++] = f;
         continue;
@@ -110,12 +152,12 @@ class Reunion {
         const double length2 = norm2(along), low = std::min(a.x, a.x + along.x), high = std::max(a.x, a.x + along.x);
         if (stops_.count(undirected(e[0], e[1])) > 0) continue;
         std::vector<std::pair<double, std::int32_t>> stops;
-        for (auto v = std::lower_bound(by_x.begin(), by_x.end(), low - kSame,
+        for (auto v = std::lower_bound(by_x.begin(), by_x.end(), low - kCoincident,
                                        [&](std::int32_t i, double x) { return mesh_.vertices[i].x < x; });
-             v != by_x.end() && mesh_.vertices[*v].x <= high + kSame; ++v) {
+             v != by_x.end() && mesh_.vertices[*v].x <= high + kCoincident; ++v) {
           const Vec3 to = mesh_.vertices[*v] - a;
           const double t = dot(to, along) / length2;
-          if (*v != e[0] && *v != e[1] && t > 0 && t < 1 && norm2(to - t * along) <= kSame * kSame)
+          if (*v != e[0] && *v != e[1] && t > 0 && t < 1 && norm2(to - t * along) <= kCoincident * kCoincident)
             stops.push_back({t, *v});
         }
         if (!stops.empty()) note(e, std::move(stops));
@@ -248,7 +290,8 @@ std::optional<Mesh> reunited(const std::vector<Mesh>& solids) {
     volume += mesh_volume(solid);
     area += mesh_area(solid);
   }
-  if (std::fabs(mesh_volume(*united) - volume) > kFilm * area) return std::nullopt;
+  // A film over the solids of this thickness is the most by which the union's volume may differ.
+  if (std::fabs(mesh_volume(*united) - volume) > kHair * area) return std::nullopt;
   return united;
 }
 

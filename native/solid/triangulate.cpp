@@ -11,7 +11,6 @@ namespace rlacd {
 
 namespace {
 
-constexpr double kFlat = 1e-12;     // sine of an angle: rounding
 constexpr std::size_t kFlips = 64;  // for each triangle; far more than any triangulation needs
 constexpr std::size_t kNone = ~std::size_t{0};
 
@@ -100,7 +99,7 @@ class Ring {
   // node whose inside holds the hole's next point.
   std::size_t bridge(PlanePoint h, PlanePoint after) const {
     std::size_t best = kNone, nearest = start_, node = start_;
-    double x = -std::numeric_limits<double>::infinity();
+    double x = -kInfinity;
     do {  // the edge met first by a ray to the left
       const PlanePoint p = at(node), q = at(nodes_[node].next);
       if (p == h && begins_inside(node, after)) return node;
@@ -118,7 +117,7 @@ class Ring {
     const PlanePoint corner = at(best), met = {x, h[1]};
     if (x == h[0]) return best;
     const double turn = corner[1] < h[1] ? 1 : -1;
-    double least = std::numeric_limits<double>::infinity();
+    double least = kInfinity;
     const std::size_t stop = best;
     node = stop;
     do {  // of the nodes that could hide the edge's end, the one nearest the ray
@@ -164,10 +163,10 @@ class Ring {
   // The node to clip where there is no ear: a flat one, or the least folded.
   std::size_t least_bad() const {
     std::size_t best = start_, node = start_;
-    double most = -std::numeric_limits<double>::infinity();
+    double most = -kInfinity;
     do {
       const PlanePoint a = at(nodes_[node].previous), b = at(node), c = at(nodes_[node].next);
-      const double slack = kFlat * std::max(distance2(a, b), distance2(b, c));
+      const double slack = kRounding * std::max(distance2(a, b), distance2(b, c));
       if (is_ear(node, slack)) return node;
       if (const double area = doubled_area(a, b, c); area > most) most = area, best = node;
       node = nodes_[node].next;
@@ -228,7 +227,7 @@ class Flipper {
     };
     const double sine = doubled_area(c, a, b) * cosine(a, b, d) + cosine(a, b, c) * doubled_area(d, b, a);
     const double size = distance2(a, c) * distance2(b, c) * distance2(a, d) * distance2(b, d);
-    return sine < -kFlat * std::sqrt(size);
+    return sine < -kRounding * std::sqrt(size);
   }
 
   void flip(std::size_t h, std::vector<std::size_t>& waiting) {

@@ -7,7 +7,6 @@
 //      choose, or nearly so.
 
 #include <algorithm>
-#include <array>
 
 #include "core/parallel.hpp"
 #include "core/stop.hpp"
@@ -15,14 +14,6 @@
 
 namespace rlacd {
 namespace {
-
-constexpr double kRounding = 1e-12;  // points this far outside a plane count as on it
-
-std::array<Corners, 2> halves(const Corners& corner) {
-  const int k = longest_side(corner);
-  const Vec3 p = corner[k], q = corner[(k + 1) % 3], tip = corner[(k + 2) % 3], middle = 0.5 * (p + q);
-  return {{{p, middle, tip}, {middle, q, tip}}};
-}
 
 constexpr int kLevels = 5;
 
@@ -108,8 +99,8 @@ class Cover {
 
   void take(const Corners& corner, Range candidates) {
     std::size_t best = candidates.first;
-    double least = std::numeric_limits<double>::infinity();  // growth of the hull that takes the whole triangle
-    Vec3 needed = {least, least, least};                     // growth for each corner, by whichever hull
+    double least = kInfinity;             // growth of the hull that takes the whole triangle
+    Vec3 needed = {least, least, least};  // growth for each corner, by whichever hull
     for (std::size_t i = candidates.first; i < candidates.last; ++i) {
       double most = 0;
       for (int k = 0; k < 3; ++k) {
@@ -166,12 +157,12 @@ std::vector<Branch> branches(const Bvh& bvh) {
 
 }  // namespace
 
-std::vector<std::vector<Vec3>> uncovered(const Mesh& mesh, const Bvh& bvh, const std::vector<const ConvexBody*>& hulls,
-                                         double reach, double grain, int threads) {
-  const std::vector<Branch> work = branches(bvh);
+std::vector<std::vector<Vec3>> Against::uncovered(const std::vector<const ConvexBody*>& hulls, double reach,
+                                                  double grain, int threads) const {
+  const std::vector<Branch> work = branches(surface_.bvh());
   std::vector<std::vector<std::vector<Vec3>>> taken(work.size());
   parallel_for(work.size(), threads, [&](std::size_t i) {
-    Cover cover(mesh, bvh, hulls, reach, grain);
+    Cover cover(solid_, surface_.bvh(), hulls, reach, grain);
     cover.visit(work[i]);
     taken[i] = cover.taken();
   });

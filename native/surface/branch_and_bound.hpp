@@ -38,14 +38,14 @@ struct Sample {
 struct SubTriangle {
   Corners corner;
   std::array<Sample, 3> sample;
-  double upper = std::numeric_limits<double>::infinity();
+  double upper = kInfinity;
 };
 
 struct Goal {
-  double tolerance;                                       // stop once the interval is this narrow
-  double pass = 0;                                        // values certainly no larger than this need not be resolved
-  double rough = 0;                                       // nor values up to this be exact, in the interval's lower end
-  double fail = std::numeric_limits<double>::infinity();  // stop once the maximum is certainly larger
+  double tolerance;         // stop once the interval is this narrow
+  double pass = 0;          // values certainly no larger than this need not be resolved
+  double rough = 0;         // nor values up to this be exact, in the interval's lower end
+  double fail = kInfinity;  // stop once the maximum is certainly larger
 };
 
 // Cells examined before giving up with the interval reached so far; far above what real surfaces need.
@@ -83,7 +83,7 @@ double upper_bound(const Field& field, const SubTriangle& cell) {
     ++rows;
   }
   if (rows == 1) return std::max({row[0][0], row[0][1], row[0][2]});
-  double best = std::numeric_limits<double>::infinity();
+  double best = kInfinity;
   for (int i = 0; i < rows; ++i)
     for (int k = i + 1; k < rows; ++k) best = std::min(best, best_mixture(row[i], row[k]));
   return best;
@@ -118,7 +118,7 @@ Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int th
   };
 
   Greatest found;
-  found.upper = std::numeric_limits<double>::infinity();
+  found.upper = kInfinity;
   const auto learn = [&](const Sample& sample, Vec3 at, double exact_above) {
     if (sample.value > exact_above && sample.value > found.lower) found.lower = sample.value, found.at = at;
   };

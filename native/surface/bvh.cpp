@@ -17,7 +17,7 @@ constexpr std::ptrdiff_t kAlone = 20'000;  // trees over no more triangles are m
 struct Ends {
   double least[6];
 
-  Ends() { std::fill(least, least + 6, std::numeric_limits<double>::infinity()); }
+  Ends() { std::fill(least, least + 6, kInfinity); }
   explicit Ends(Vec3 p) : least{p.x, p.y, p.z, -p.x, -p.y, -p.z} {}
   void extend(const Ends& other) {
     for (int i = 0; i < 6; ++i) least[i] = other.least[i] < least[i] ? other.least[i] : least[i];
@@ -101,7 +101,7 @@ Halves split(Items first, Items last, const Ends& centres, int depth) {
     count += counts[i];
     cost_above[i] = count > 0 ? count * above.half_area() : 0;
   }
-  double least = std::numeric_limits<double>::infinity();
+  double least = kInfinity;
   int cut = 0;
   for (int i = 1, count = 0; i < kBins; ++i) {
     if (counts[i - 1] > 0) below.extend(bins[i - 1].box);
@@ -279,17 +279,6 @@ Bvh::Hit Bvh::closest_near(Vec3 p, std::int32_t near) const {
   return closest(p);
 }
 
-void Bvh::within(Vec3 x, double radius, std::vector<std::int32_t>& found) const {
-  const std::size_t before = found.size();
-  const double most = radius * radius;
-  any_of([&](const Box& box) { return box.distance2(x) <= most; },
-         [&](std::int32_t slot) {
-           if (norm2(triangles_[slot].a - x) <= most) found.push_back(faces_[slot]);
-           return false;
-         });
-  std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
-}
-
 std::pair<std::vector<std::int64_t>, std::vector<std::int32_t>> points_within(const std::vector<Vec3>& points,
                                                                               const std::vector<Vec3>& centres,
                                                                               const std::vector<double>& radii,
@@ -302,7 +291,13 @@ std::pair<std::vector<std::int64_t>, std::vector<std::int32_t>> points_within(co
   for (std::size_t i = 0; i < centres.size() && found.size() <= most; ++i) {
     poll_stop(i);
     const std::size_t before = found.size();
-    tree.within(centres[i], radii[i], found);
+    const double enough = radii[i] * radii[i];
+    tree.any_of([&](const Box& box) { return box.distance2(centres[i]) <= enough; },
+                [&](std::int32_t slot) {
+                  if (norm2(tree.triangle(slot).a - centres[i]) <= enough) found.push_back(tree.face(slot));
+                  return false;
+                });
+    std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
     counts[i] = static_cast<std::int64_t>(found.size() - before);
   }
   return {std::move(counts), std::move(found)};

@@ -84,22 +84,18 @@ class Bvh {
   // Triangles are stored in the order of the leaves; a *slot* is a position in that order.
   struct Hit {
     Vec3 point;
-    double distance2 = std::numeric_limits<double>::infinity();
+    double distance2 = kInfinity;
     std::int32_t slot = -1;
   };
 
   // The closest point to p. A hint (the slot of a triangle expected to be near) only makes the query faster. The search
   // ends at the first triangle within `enough`: the distance is then at most `enough`, not the least. If no triangle is
   // nearer than `within`, the slot is -1.
-  Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0,
-              double within = std::numeric_limits<double>::infinity()) const;
+  Hit closest(Vec3 p, std::int32_t hint = -1, double enough = 0, double within = kInfinity) const;
 
   // The same closest point, found sooner if the triangle of a slot (-1: none is known) is near: its distance bounds the
   // search, with an allowance for rounding, so that the triangle found is the same without it.
   Hit closest_near(Vec3 p, std::int32_t near) const;
-
-  // Appends the faces whose first corners are at most `radius` away from x, ascending.
-  void within(Vec3 x, double radius, std::vector<std::int32_t>& found) const;
 
   double distance(std::int32_t slot, Vec3 p) const { return distance_to_triangle(triangles_[slot], p); }
   std::int32_t face(std::int32_t slot) const { return faces_[slot]; }

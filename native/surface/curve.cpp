@@ -45,10 +45,8 @@ std::vector<std::int32_t> order_along_a_curve(const std::vector<Vec3>& points, c
 std::vector<std::int32_t> order_of_faces(const Mesh& mesh) {
   std::vector<Vec3> middles;
   middles.reserve(mesh.faces.size());
-  for (const auto& [a, b, c] : mesh.faces) {
-    const Vec3 sum = mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c];
-    middles.push_back({sum.x / 3, sum.y / 3, sum.z / 3});
-  }
+  for (const auto& [a, b, c] : mesh.faces)
+    middles.push_back((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
   return order_along_a_curve(middles, Box::of(mesh.vertices));
 }
 

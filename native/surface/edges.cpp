@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <tuple>
 
 #include "core/elementary.hpp"
 #include "core/invariant.hpp"
@@ -46,10 +45,7 @@ struct Spoke {
   bool runs_forward;  // from the smaller vertex to the larger
 };
 
-Vec3 scaled_to_one(Vec3 a) {
-  const double length = std::max(norm(a), std::numeric_limits<double>::min());
-  return {a.x / length, a.y / length, a.z / length};
-}
+Vec3 scaled_to_one(Vec3 a) { return a / std::max(norm(a), std::numeric_limits<double>::min()); }
 
 // Angles of the faces around the edge from `low` to `high`. Any direction across the edge may be zero.
 void measure_angles(const Mesh& mesh, std::int32_t low, std::int32_t high, std::vector<Spoke>& ring) {
@@ -128,10 +124,7 @@ std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::siz
     if ((end - begin) % 2 != 0) return {};
     for (const Run* r = begin; r != end; r += 2) {
       const bool is_pair = r[0].high == r[1].high && (r + 2 == end || r[2].high != r[0].high);
-      const auto low = static_cast<std::int32_t>(v);
-      const bool ascends[2] = {faces[r[0].halfedge / 3][r[0].halfedge % 3] == low,
-                               faces[r[1].halfedge / 3][r[1].halfedge % 3] == low};
-      if (!is_pair || ascends[0] == ascends[1]) return {};
+      if (!is_pair || ascends(faces, v, r[0]) == ascends(faces, v, r[1])) return {};
       mate[r[0].halfedge] = r[1].halfedge;
       mate[r[1].halfedge] = r[0].halfedge;
     }
@@ -179,20 +172,17 @@ std::pair<std::int64_t, std::vector<std::int64_t>> Groups::labels() {
   return {count, std::move(label)};
 }
 
-ClosedBodies closed_bodies(const Mesh& mesh) {
+std::optional<ClosedBodies> closed_bodies(const Mesh& mesh) {
   const std::vector<std::uint32_t> mate = mates_of(mesh.faces, mesh.vertices.size());
-  ClosedBodies found;
-  if (mate.empty()) return found;
+  if (mate.empty()) return std::nullopt;
   Groups groups(mesh.faces.size());
   for (std::size_t h = 0; h < mate.size(); ++h)
     if (mate[h] < h) groups.join(static_cast<std::int64_t>(h / 3), mate[h] / 3);
-  std::tie(found.count, found.body) = groups.labels();
+  const auto [count, body_of] = groups.labels();
+  ClosedBodies found{body_of, std::vector<double>(count), std::vector<double>(count), std::vector<Box>(count)};
   found.has_no_pinch = are_fans(mesh.faces, mate, mesh.vertices.size());
-  found.volume.resize(found.count);
-  found.area.resize(found.count);
-  found.box.resize(found.count);
-  std::vector<Vec3> normals(mesh.faces.size()), apex(found.count);
-  double height2 = std::numeric_limits<double>::infinity();
+  std::vector<Vec3> normals(mesh.faces.size()), apex(count);
+  double height2 = kInfinity;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     poll_stop(f);
     const auto [a, b, c] = mesh.faces[f];

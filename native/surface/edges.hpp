@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -45,6 +46,11 @@ Buckets<Run> sorted_halfedges(const std::vector<Triangle>& faces, std::size_t ve
 
 // Halfedge 3 f + c runs from corner c of face f to its next corner.
 
+// Whether a halfedge runs from the smaller of its edge's vertices to the larger.
+inline bool ascends(const std::vector<Triangle>& faces, std::size_t low, const Run& run) {
+  return faces[run.halfedge / 3][run.halfedge % 3] == static_cast<std::int32_t>(low);
+}
+
 // The other halfedge along the same edge; empty if there are not always two, in opposite directions.
 std::vector<std::uint32_t> mates_of(const std::vector<Triangle>& faces, std::size_t vertices);
 
@@ -72,8 +78,7 @@ class Groups {
 
 // A mesh all of whose edges join two faces that run along them in opposite directions.
 struct ClosedBodies {
-  std::int64_t count = 0;          // of sets of faces that share edges, numbered by their first faces
-  std::vector<std::int64_t> body;  // [F]
+  std::vector<std::int64_t> body;  // [F], the sets of faces that share edges, numbered by their first faces
   std::vector<double> volume, area;
   std::vector<Box> box;
   // No vertex at which faces meet that are not neighbours around it.
@@ -81,8 +86,8 @@ struct ClosedBodies {
   double least_height = 0;  // of a face
   double least_fold = 2;    // the least length of the sum of two neighbours' unit normals; 0 if one is folded back
 };
-// No count if there are other edges.
-ClosedBodies closed_bodies(const Mesh& mesh);
+// Nothing if there are other edges, or none.
+std::optional<ClosedBodies> closed_bodies(const Mesh& mesh);
 
 // The wedges of space around the edges, and which sides of faces bound each. n log n time.
 using Pair = std::array<std::int64_t, 2>;

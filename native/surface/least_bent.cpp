@@ -45,7 +45,7 @@ std::vector<Triangle> least_bent(const Loop& loop) {
     for (int i = 0; i + span < n; ++i) {
       const int k = i + span;
       Chord best;
-      best.cost = std::numeric_limits<double>::infinity();
+      best.cost = kInfinity;
       best.length = chord(i, k).length;
       best.middle = i + 1;  // where costs overflow
       for (int j = i + 1; j < k; ++j) {
@@ -53,8 +53,8 @@ std::vector<Triangle> least_bent(const Loop& loop) {
         double cost = before.cost + after.cost;
         if (cost >= best.cost) continue;
         Vec3 normal = cross(points[j] - points[i], points[k] - points[i]);
-        const double twice = norm(normal), length = std::max(twice, std::numeric_limits<double>::min());
-        normal = {normal.x / length, normal.y / length, normal.z / length};
+        const double twice = norm(normal);
+        normal = normal / std::max(twice, std::numeric_limits<double>::min());
         cost += per_area * twice;
         if (cost >= best.cost) continue;
         cost += before.length * angle(normal, before.normal);

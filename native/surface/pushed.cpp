@@ -22,7 +22,7 @@ Pushed pushed(const Bvh& surface, std::vector<Vec3> points, const std::vector<Ve
       at = at + (steps[i] / (distance > 0 ? distance : 1)) * (away - 2 * dot(away, against[i]) * against[i]);
     }
   };
-  parallel_for(result.ends.size(), threads, push, 8);
+  parallel_for(result.ends.size(), threads, push, kSlower);
   return result;
 }
 
@@ -45,7 +45,7 @@ std::vector<double> held_balls(const Bvh& surface, const std::vector<Vec3>& poin
       near = hit.slot, radius = smaller;
     }
   };
-  parallel_for(points.size(), threads, shrink, 8);
+  parallel_for(points.size(), threads, shrink, kSlower);
   return radii;
 }
 

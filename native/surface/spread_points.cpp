@@ -23,16 +23,12 @@ int steps(double length, double spacing) {
 
 // Calls take(point) for all points of one face.
 template <class Take>
-void spread_over(const Mesh& mesh, const Triangle& face, double spacing, bool corners_suffice, const Take& take) {
+void spread_over(const Mesh& mesh, const Triangle& face, double spacing, const Take& take) {
   // From a to b along the longest edge; rows are parallel to it.
   const Corners corners = corners_of(mesh, face);
   const int k = longest_side(corners);
   const Vec3 a = corners[k], b = corners[(k + 1) % 3], c = corners[(k + 2) % 3];
   const double base = norm(b - a);
-  if (corners_suffice && base <= spacing) {
-    for (const Vec3 corner : corners) take(corner);
-    return;
-  }
   const double height = norm(cross(b - a, c - a)) / std::max(base, std::numeric_limits<double>::min());
   const int columns = steps(base, spacing), rows = steps(height, spacing);
   for (int row = 0; row < rows; ++row) {
@@ -57,7 +53,7 @@ SpreadPoints spread_points(const Mesh& mesh, double spacing) {
   SpreadPoints spread;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     poll_stop(f);
-    spread_over(mesh, mesh.faces[f], spacing, false, [&](Vec3 point) { spread.points.push_back(point); });
+    spread_over(mesh, mesh.faces[f], spacing, [&](Vec3 point) { spread.points.push_back(point); });
     spread.faces.resize(spread.points.size(), static_cast<std::int32_t>(f));
   }
   return spread;
@@ -68,7 +64,7 @@ MarkedCells mark_cells(const Mesh& mesh, double spacing, double pitch, std::int6
   const auto for_each = [&](const auto& take) {
     for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
       poll_stop(f);
-      spread_over(mesh, mesh.faces[f], spacing, true, take);
+      spread_over(mesh, mesh.faces[f], spacing, take);
     }
   };
   Box box;

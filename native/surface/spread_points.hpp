@@ -21,8 +21,7 @@ SpreadPoints spread_points(const Mesh& mesh, double spacing);
 using Cell = std::array<std::int64_t, 3>;
 
 // A grid [X, Y, Z] of cells, the last axis fastest, of size `pitch`, the first of them around `origin`, with those
-// marked that hold any of these points: of faces no larger than the spacing, the corners are enough. `margin` cells
-// around them are free.
+// marked that hold any of these points. `margin` cells around them are free.
 struct MarkedCells {
   Vec3 origin;
   Cell shape = {0, 0, 0};

@@ -15,6 +15,8 @@ class Surface {
   const Winding& winding() const {
     return winding_.get([this]() -> const Bvh& { return bvh_; });
   }
+  // Whether a closed surface goes around a point.
+  bool holds(Vec3 p) const { return winding().of_closed(p) > 0.5; }
 
  private:
   Bvh bvh_;

@@ -27,9 +27,7 @@ bool is_even(const Triangle& f) { return (f[0] < f[1]) + (f[1] < f[2]) + (f[2] <
 
 // The corners of a face in ascending order.
 Triangle sorted(Triangle f) {
-  if (f[0] > f[1]) std::swap(f[0], f[1]);
-  if (f[1] > f[2]) std::swap(f[1], f[2]);
-  if (f[0] > f[1]) std::swap(f[0], f[1]);
+  std::sort(f.begin(), f.end());
   return f;
 }
 

@@ -25,11 +25,11 @@ double radius_around(Vec3 centre, const Box& box) {
 // The direction of rays: few edges or faces that people make are parallel to it.
 constexpr Vec3 kRay = {0.3713906763541037, 0.5570860145311556, 0.7427813527082074};
 
-// Products of lengths are known to this share of them; where that does not decide, the expansion does, to `kInDoubt`.
-constexpr double kRounding = 1e-13, kInDoubt = 4;
+// Where rounding could decide, the expansion does, to this accuracy.
+constexpr double kInDoubt = 4;
 
 bool meets(const Box& box, Vec3 p) {
-  double enter = 0, leave = std::numeric_limits<double>::infinity();
+  double enter = 0, leave = kInfinity;
   for (int i = 0; i < 3; ++i) {
     enter = std::max(enter, (box.lower[i] - p[i]) / kRay[i]);
     leave = std::min(leave, (box.upper[i] - p[i]) / kRay[i]);

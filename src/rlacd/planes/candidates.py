@@ -94,4 +94,5 @@ def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
 
 
 def _planes(component: Component, per_axis: int, edges: int) -> tuple[FloatArray, FloatArray]:
-    return _native.candidate_planes(component.vertices, component.faces, component.hull.body, per_axis, edges)
+    planes = _native.candidate_planes(component.vertices, component.faces, component.hull.body, per_axis, edges)
+    return np.ascontiguousarray(planes[:, :3]), np.ascontiguousarray(planes[:, 3])

@@ -53,7 +53,8 @@ class Reach:
         self._surface, self.pitch, self.radius = surface, 2.0 / resolution, radius
         margin = int(np.ceil(radius / self.pitch)) + 3
         marked = _native.mark_cells(surface.vertices, surface.faces, self.pitch / 2, self.pitch, margin)
-        self.origin, occupied = marked[0], np.frombuffer(marked[1], dtype=bool).reshape(marked[2])
+        self.origin: FloatArray = np.array(marked[0])
+        occupied = np.frombuffer(marked[1], dtype=bool).reshape(marked[2])
         poll_stop()
         label = label_cells(~_grown(occupied, radius / self.pitch)).reshape(occupied.shape)
         outside = label == label[0, 0, 0]

@@ -24,7 +24,7 @@ def mass_of(vertices: FloatArray, faces: IntArray, frame: Frame) -> Mass:
         unit = np.minimum(np.float64(1.0) / frame.scale, _GREATEST)
         return Mass(
             float(_times(volume, unit**3)),
-            frame.to_input(centre[None])[0],
+            frame.to_input(np.array([centre]))[0],
             _times(inertia, unit**5),
         )
 
