@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rlacd.errors import OptionError
-from rlacd.pool import Shared, WorkerDiedError
+from rlacd.pool import WorkerDiedError
 from tests.pool.test_pool import ask
 from tests.test_learn_train import assert_same_run, curves, meshes, run
 
@@ -36,13 +36,11 @@ def cluster() -> Iterator[Cluster]:
 
 @pytest.mark.slow
 def test_requests_over_ray_are_as_those_here(cluster: Cluster) -> None:
-    shared = {"network": Shared({"weights": b"1234"})}
     with RayPool("auto") as pool:
         assert pool.room == 2
-        asked = [pool.submit(ask(number=n, blobs={"a": b"x" * n}, shared=shared)) for n in range(6)]
+        asked = [pool.submit(ask(number=n, blobs={"a": b"x" * n})) for n in range(6)]
         for number, answer in enumerate(future.result() for future in asked):
             assert (answer.values["echo"]["number"], answer.blobs["a"]) == (number, b"x" * number)
-            assert answer.values["shared"] == {"network": {"weights": 4}}
         with pytest.raises(WorkerDiedError) as died:
             pool.submit(ask("die", tries=2)).result()
         assert (died.value.reason, died.value.last_words) == ("its process died of SIGKILL", "last words")
