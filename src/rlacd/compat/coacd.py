@@ -20,8 +20,8 @@ from rlacd.decompose_mesh import decompose
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write.target import checked_place
-from rlacd.options import LENGTHS
 from rlacd.options.fields import flag, integer, number, one_of, read
+from rlacd.options.ranges import LENGTHS
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 
