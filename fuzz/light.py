@@ -333,7 +333,7 @@ def _decomposed(shape: Shape, options: Options) -> tuple[str, list[str], int]:
     try:
         result = rlacd.decompose((shape.vertices, shape.faces), **options)
     except (rlacd.MeshDataError, rlacd.EmptyMeshError) as error:
-        usable = np.isfinite(shape.vertices).all(axis=1)[shape.faces].all(axis=1).any()
+        usable = np.isfinite(shape.vertices[shape.faces]).all(axis=(1, 2)).any()
         return ("wrong", [f"refused: {error}"], 0) if usable else ("refused", [], 0)
     except MemoryError as error:
         return "memory", [repr(error)], 0

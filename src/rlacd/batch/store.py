@@ -44,7 +44,7 @@ class Store:
         """That file as written by runs of all meshes and by shards, the latest last."""
         there = [self.folder / name, *self.folder.glob(f"{PRIVATE}/shard-*.{name}")]
         with output_errors(self.folder):
-            latest = sorted((file for file in there if file.is_file()), key=lambda file: file.stat().st_mtime_ns)
+            latest = sorted((file for file in there if file.exists()), key=lambda file: file.stat().st_mtime_ns)
         return [file.relative_to(self.folder).as_posix() for file in latest]
 
     def write(self, name: str, data: bytes) -> None:
