@@ -105,6 +105,20 @@ def test_the_buffers_of_a_gltf_file_in_its_folder_are_part_of_the_mesh_and_other
     assert content_hash(asset.files()) != before
 
 
+def test_a_robot_depends_on_each_file_that_its_meshes_are_read_from_and_on_no_result(tmp_path: Path) -> None:
+    root = tmp_path / "in"
+    touch(root, "r/robot.urdf", "r/meshes/l.obj", "r/meshes/l.mtl", "out/r/l.obj", "r/other.obj")
+    (root / "r/robot.urdf").write_text('<robot><mesh filename="package://r/meshes/l.obj"/></robot>')
+    before = []
+    for name in ("r/meshes/l.obj", "r/meshes/l.mtl", "r/robot.urdf", "out/r/l.obj", "r/other.obj"):
+        with (root / name).open("a") as file:
+            file.write("\nmtllib l.mtl\n" if name.endswith("l.obj") else " ")
+        (robot,) = find_assets(root, "*.urdf", root / "out")
+        before.append(content_hash(robot.files()))
+    assert len(set(before)) == 3
+    assert len(set(before[2:])) == 1
+
+
 def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
     policies = [tmp_path / "here.npz", tmp_path / "there" / "p.npz"]
     policies[1].parent.mkdir()

@@ -8,8 +8,8 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
@@ -49,6 +49,8 @@ class Asset:
     """The file."""
     place: str
     """Name of its result, relative to the folder of results, without an ending."""
+    around: Mapping[str, Sequence[str]] = field(default_factory=dict, compare=False, repr=False)
+    """All files of the folder of assets, by the last part of their names."""
 
     def files(self) -> dict[str, bytes]:
         """Read every file the mesh depends on, by name relative to its folder; the mesh file comes first.
@@ -64,12 +66,12 @@ class Asset:
         if not self.is_robot:
             return files
         root = self.path.parents[self.name.count("/")]
-        there = sorted(path for path in root.rglob("*") if path.is_file())
-        wanted, read = _names_in(files[self.path.name]), {self.path}
-        while found := [path for path in there if path.name in wanted and path not in read]:
-            for path in found:
-                files |= {path.relative_to(root).as_posix(): content for content in mesh_files(path).values()}
-                wanted |= _names_in(path.read_bytes()) if path.suffix.lower() in ROBOTS else set()
+        wanted, read = _names_in(files[self.path.name]), {self.name}
+        while found := sorted({name for word in wanted for name in self.around.get(word, ())} - read):
+            for name in filter(lambda name: (root / name).is_file(), found):
+                content = mesh_files(root / name, name)
+                files |= {f"{name}:{beside}": data for beside, data in content.items()}
+                wanted |= _names_in(next(iter(content.values()))) if name.lower().endswith(ROBOTS) else set()
             read.update(found)
         return files
 
@@ -131,7 +133,8 @@ def scan(folder: Path, leave_out: Path | None, ending: str) -> tuple[list[Asset]
     if not folder.is_dir():
         raise MeshFileError(f"{folder} is not a folder; give the folder that holds the meshes.")
     skipped = None if leave_out is None else leave_out.resolve()
-    names, others = [], {}
+    names, others = [], dict[str, str]()
+    around: dict[str, list[str]] = {}
     for at, folders, files in os.walk(folder, onerror=_refuse):
         here = Path(at)
         folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != skipped]
@@ -139,6 +142,7 @@ def scan(folder: Path, leave_out: Path | None, ending: str) -> tuple[list[Asset]
         for file in (file for file in files if not file.startswith(".")):
             path, kind = here / file, PurePosixPath(file).suffix.lower()
             name = path.relative_to(folder).as_posix()
+            around.setdefault(file, []).append(name)
             if not (kind in (*ENDINGS, ".urdf") or (kind == ".xml" and _root(path) == "mujoco")):
                 others[name] = kind or "no ending"
             elif file in hulls or _is_written(path):
@@ -146,7 +150,8 @@ def scan(folder: Path, leave_out: Path | None, ending: str) -> tuple[list[Asset]
             else:
                 names.append(name)
     # Results are named among all meshes of the folder, not only the selected ones: the same in every run.
-    return [Asset(name, folder / name, place) for name, place in sorted(_places(names, ending).items())], others
+    places = sorted(_places(names, ending).items())
+    return [Asset(name, folder / name, place, around) for name, place in places], others
 
 
 _COMMENT, _TAG = re.compile(rb"<!--.*?-->", re.DOTALL), re.compile(rb"<([A-Za-z_][\w.:-]*)")
