@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import trimesh
@@ -17,7 +16,7 @@ from benchmarks.methods import Method, make_method
 from benchmarks.metrics import measure
 from benchmarks.store import Row, load_hulls, save_hulls
 from rlacd.io.read.load import load_mesh
-from rlacd.pool import Server
+from rlacd.pool import Blobs, Server
 from rlacd.pool.process import peak_memory
 from rlacd.repair.repair import repair
 
@@ -26,7 +25,7 @@ def make_server(folder: Path) -> Server:
     """Answers tasks: ``mesh``, ``method``, ``setting``, ``threads``, and ``hulls``, the file that keeps them."""
     warm: set[str] = set()
 
-    def answer(task: Row, *_: Any) -> tuple[Row, dict[str, bytes]]:
+    def answer(task: Row, _: Blobs) -> tuple[Row, dict[str, bytes]]:
         try:
             return _row(task, warm), {}
         except MemoryError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,7 +28,7 @@ class Model:
     polygons: Sequence[Sequence[int]]
     color: Sequence[float] | None = None
     below: int = -1
-    properties: dict[str, Sequence[float]] = field(default_factory=dict)
+    properties: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
 def fbx(
@@ -51,7 +51,7 @@ def fbx(
         objects.append(("Model", [node, f"{model.name}\0\1Model", "Mesh"], [("Properties70", [], placed)]))
         links += [("C", ["OO", shape, node], []), ("C", ["OO", node, 100 + model.below if model.below >= 0 else 0], [])]
         if model.color is not None:
-            painted = ("Properties70", [], [_property("DiffuseColor", "Color", *model.color)])
+            painted: Tree = ("Properties70", [], [_property("DiffuseColor", "Color", *model.color)])
             objects.append(("Material", [paint, "paint\0\1Material", ""], [painted]))
             links.append(("C", ["OO", paint, node], []))
     tree: list[Tree] = [("FBXHeaderExtension", [], [("FBXVersion", [7400], [])])]

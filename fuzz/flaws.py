@@ -89,7 +89,7 @@ def _patches(faces: Ints, share: float, random: np.random.Generator) -> Ints:
     for seed in random.permutation(len(faces)):
         if left == 0:
             break
-        patch, border = [], [int(seed)]
+        patch, border = list[int](), [int(seed)]
         while border and len(patch) < min(PATCH, left):
             face = border.pop(0)
             if not taken[face]:

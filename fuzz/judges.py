@@ -222,7 +222,7 @@ def filled_solid(where: Floats, faces: Ints) -> manifold3d.Manifold | None:
     """The closed input as a solid without cavities; None if manifold3d does not accept it."""
     solid = manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(where), faces.astype(np.uint64)))
     kept = triangles_of(solid)[0]
-    if len(kept) == 0 or cKDTree(kept).query(where[np.unique(faces)])[0].max() > ROUNDING:
+    if len(kept) == 0 or np.max(cKDTree(kept).query(where[np.unique(faces)])[0]) > ROUNDING:
         return None  # manifold3d drops bodies without volume, which repair turns into slabs
     pieces = solid.decompose()
     if any(abs(piece.volume()) < THIN * piece.surface_area() for piece in pieces):
@@ -310,7 +310,7 @@ def free_space(case: Case, solid: manifold3d.Manifold, hulls: list[Polytope], ra
         return []
     assert space.radius is not None
     assert space.tolerance is not None
-    radius, tolerance = space.radius, space.tolerance
+    radius, tolerance = float(space.radius), float(space.tolerance)
     if radius >= 2 or "max_hulls" in case.options:
         return []
     vertices, faces = triangles_of(solid)

@@ -15,7 +15,6 @@ import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,7 +32,7 @@ from fuzz.recipes import Shape, concatenated, make_shape
 from fuzz.trials import Trial
 from fuzz.watched import Watched, end_of
 from rlacd.io.read.load import load_mesh
-from rlacd.pool import Blobs, ProcessLimits, Server, Shared, WorkerDiedError
+from rlacd.pool import Blobs, ProcessLimits, Server, Values, WorkerDiedError
 from rlacd.solid.input_mesh import InputMesh
 
 KINDS = {"read": 0.91, "small": 0.09}
@@ -188,7 +187,8 @@ class WarmTrials(LightTrials):
     def __init__(self, seed: int, seeds: dict[str, list[Seed]], cpu_seconds: float = CPU_SECONDS) -> None:
         self._scratch = TemporaryDirectory(prefix="rlacd-light-")
         super().__init__(seed, seeds, Path(self._scratch.name))
-        self._given = {"seeds": Shared({"seeds": pickle.dumps((seed, seeds))})}
+        self._given = Path(self._scratch.name, "seeds")
+        self._given.write_bytes(pickle.dumps((seed, seeds)))
         self._process, self._life = Watched(LIMITS, cpu_seconds), 0
 
     def trial(self, number: int) -> Trial:
@@ -210,9 +210,9 @@ class WarmTrials(LightTrials):
 
     def _ask(self, trial: Trial, *request: Any) -> Trial:
         self._life += 1
-        given = {"blobs": {"request": pickle.dumps(request)}, "shared": self._given, "fresh": self._life % LIFE == 0}
+        given = {"blobs": {"request": pickle.dumps(request)}, "fresh": self._life % LIFE == 0}
         try:
-            answer = self._process.ask("fuzz.light:make_server", {}, **given)
+            answer = self._process.ask("fuzz.light:make_server", {"seeds": str(self._given)}, **given)
         except WorkerDiedError as error:
             end, said = end_of(error)
             return replace(trial, end=end, said=said, counts=Counter(files=int(trial.kind == "read")))
@@ -225,9 +225,10 @@ def make_server(folder: Path) -> Server:
     enter_worker()
     light: list[LightTrials] = []
 
-    def answer(_: Any, blobs: Blobs, shared: Mapping[str, Shared]) -> tuple[dict[str, Any], dict[str, bytes]]:
+    def answer(values: Values, blobs: Blobs) -> tuple[dict[str, Any], dict[str, bytes]]:
         if not light:
-            light.append(LightTrials(*pickle.loads(shared["seeds"].blobs["seeds"]), folder))
+            seed, seeds = pickle.loads(Path(values["seeds"]).read_bytes())
+            light.append(LightTrials(seed, seeds, folder))
         method, *given = pickle.loads(blobs["request"])
         return {}, {"trial": pickle.dumps(getattr(light[0], method)(*given))}
 
@@ -332,7 +333,7 @@ def _decomposed(shape: Shape, options: Options) -> tuple[str, list[str], int]:
     try:
         result = rlacd.decompose((shape.vertices, shape.faces), **options)
     except (rlacd.MeshDataError, rlacd.EmptyMeshError) as error:
-        usable = np.isfinite(shape.vertices).all(axis=1)[shape.faces].all(axis=1).any()
+        usable = np.isfinite(shape.vertices[shape.faces]).all(axis=(1, 2)).any()
         return ("wrong", [f"refused: {error}"], 0) if usable else ("refused", [], 0)
     except MemoryError as error:
         return "memory", [repr(error)], 0

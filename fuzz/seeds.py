@@ -25,6 +25,7 @@ LARGEST_SEED = 60_000
 SMALL_MESHES = 12
 
 CASES = Path(__file__).parents[1] / "tests" / "cases"
+GMSH = CASES / "gmsh"
 
 URDF = (
     '<?xml version="1.0"?>\n<robot name="r">\n<link name="a">\n<collision name="c">\n<origin xyz="0 0 1"/>\n'
@@ -99,6 +100,7 @@ def written(mesh: trimesh.Trimesh) -> Iterator[tuple[str, Seed]]:
     counts = np.array([len(mesh.vertices), 0, 0, len(mesh.faces)], "<i4").tobytes()
     msh = counts + mesh.vertices.astype("<f4").tobytes() + mesh.faces.astype("<i4").tobytes()
     yield "msh", Seed(msh)
+    yield from (("msh", Seed(path.read_bytes())) for path in sorted(GMSH.glob("*.msh")))
     yield "urdf", Seed(URDF.encode(), {"box.stl": mesh.export(file_type="stl")})
     yield "xml", Seed(MJCF.encode(), {"parts.xml": MJCF_PARTS.encode(), "box.msh": msh})
 

@@ -131,9 +131,9 @@ class Laboratory:
         """Run a trial."""
         trial = Trial(self.seed, number, self.kind(number))
         start = time.thread_time()
-        trial = getattr(self, f"_{trial.kind}")(trial, np.random.default_rng([self.seed, number, 11]))
-        trial.cpu = round(trial.cpu + time.thread_time() - start, 4)
-        return trial
+        done: Trial = getattr(self, f"_{trial.kind}")(trial, np.random.default_rng([self.seed, number, 11]))
+        done.cpu = round(done.cpu + time.thread_time() - start, 4)
+        return done
 
     def shape(self, number: int) -> tuple[Shape, dict[str, Any]]:
         """Shape and options of a trial of the kinds ``shape``, ``mesh`` and ``fault``."""
@@ -230,7 +230,7 @@ class Laboratory:
             del options["preset"]  # its files have another format
         ending = str(random.choice([*FORMATS, "mjcf", "folder"]))
         space = options.get("criterion")
-        if isinstance(space, NavigableSpace) and space.radius is not None and space.radius < 0.1:
+        if isinstance(space, NavigableSpace) and space.radius is not None and float(space.radius) < 0.1:
             del options["criterion"]  # would give tens of thousands of parts
         spec = JobSpec.of(options, file_type=None if ending == "folder" else ending, folders=ending == "folder")
         trial = replace(trial, story=[*shape.steps, ending], options=options)

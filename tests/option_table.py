@@ -15,10 +15,11 @@ from typing import Any
 
 from rlacd.decompose_mesh import decompose
 from rlacd.io.robots import rewrite_robot
-from rlacd.options import RUN, Options
+from rlacd.options import Options
 from rlacd.options.fields import About
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
+from rlacd.options.ranges import RUN
 from rlacd.options.robots import RobotOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "options.md"

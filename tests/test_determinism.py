@@ -53,7 +53,7 @@ def test_a_batch_of_real_meshes_writes_what_decompose_writes(
         shutil.copy(corpus / name, assets)
     order = JobSpec.of({"quality": "fast", "threads": 1}, file_type=file_type)
     with InProcessPool() as pool:
-        Batch(assets, str(tmp_path / "out"), order).run(pool, mock.Mock())
+        Batch(assets, tmp_path / "out", order).run(pool, mock.Mock())
     for mesh in assets.iterdir():
         decompose(mesh, quality="fast", threads=3).save(alone / f"{mesh.stem}.{ending}", up="z")
     assert tree(alone) == tree(tmp_path / "out", TIMES, "manifest.jsonl", ".rlacd/lock")

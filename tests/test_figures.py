@@ -16,7 +16,7 @@ import pytest
 from benchmarks.runner import find_meshes
 
 import rlacd
-from rlacd.options import with_criterion
+from rlacd.options.criterion import with_criterion
 from rlacd.planes.sweep import SLIVER
 from rlacd.report import Report
 from rlacd.solid.component import DENSE

@@ -189,7 +189,6 @@ def test_a_benchmark_names_its_command_and_date(text: str) -> None:
     ("hidden", "extra", "words"),
     [
         ("ray", "fleet", "batch FOLDER -o OUT --ray local"),
-        ("fsspec", "fleet", "batch FOLDER -o memory://out"),
         ("torch", "train", "train FOLDER --run OUT --preset one-mesh"),
     ],
 )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -22,6 +23,7 @@ from rlacd.planes.sweep import Sweep
 from rlacd.policies.learned import KIND, LEAST_GAIN, NAMES
 from rlacd.policies.network import Network
 from rlacd.policies.plane_features import plane_features
+from rlacd.solid.arrays import FloatArray
 
 HIDDEN, EPOCHS, RATE, DECAY, DROPOUT, AT_ONCE = (64, 32), 15, 2e-3, 0.1, 0.2, 64
 FOLDS = 5
@@ -37,6 +39,13 @@ class Labels:
     mesh: NDArray[np.intp]
 
 
+def features_of(shard: dict[str, Any], here: slice, info: FloatArray, length: float | None) -> FloatArray:
+    """What a network sees of the planes of a component of a shard."""
+    candidates = Candidates(shard["D"][here], shard["O"][here][:, None])
+    scored = Sweep(candidates, *shard["F"][here].T.astype(np.float64))
+    return plane_features(scored, shard["valid"][here], info[0], info[1], info[2:5], length)
+
+
 def read(folder: Path) -> Labels:
     """Read the shards of a folder."""
     features, parts, sizes, meshes = [], [], [], []
@@ -50,11 +59,7 @@ def read(folder: Path) -> Labels:
             if len(rows) < 2:
                 continue
             here = slice(end - shard["planes"][i], end)
-            candidates = Candidates(shard["D"][here], shard["O"][here][:, None])
-            scored = Sweep(candidates, *shard["F"][here].T.astype(np.float64))
-            length = None if info[9] else float(info[8])
-            found = plane_features(scored, shard["valid"][here], info[0], info[1], info[2:5], length)
-            features.append(found[rows[:, 1]])
+            features.append(features_of(shard, here, info, None if info[9] else float(info[8]))[rows[:, 1]])
             parts.append(np.log(rows[:, 2]))
             sizes.append(len(rows))
             meshes.append(number.setdefault(str(shard["files"][i]), len(number)))

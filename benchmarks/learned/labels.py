@@ -103,6 +103,38 @@ def parts_after(component: Component, plane: Plane, criterion: Criterion) -> int
     return None if any(left for _, left in ends) else sum(len(done) for done, _ in ends)
 
 
+def listed(meshes: Path, faces: tuple[int, int]) -> list[dict[str, str]]:
+    """Rows of the index of meshes: those of the split train with so many triangles, in an order of chance."""
+    with open(meshes / "index.csv", encoding="utf-8") as file:
+        rows = [r for r in csv.DictReader(file) if r["split"] == "train" and faces[0] <= int(r["faces"]) <= faces[1]]
+    return [rows[i] for i in np.random.default_rng(7).permutation(len(rows))]
+
+
+def component(s: Sweep, valid: NDArray[np.bool_], info: list[Any], rows: list[Any]) -> dict[str, Any]:
+    """What a shard keeps of a component: what a network may see of all planes, and the counts of those labelled."""
+    scores = [getattr(s, name) for name in list(Sweep.__dataclass_fields__)[1:]]
+    return {
+        "F": np.stack(scores, axis=1).astype(np.float32),
+        "D": np.repeat(s.candidates.directions, s.candidates.offsets.shape[1], 0).astype(np.float32),
+        "O": s.candidates.offsets.ravel().astype(np.float32),
+        "valid": valid,
+        "info": np.array(info),
+        "rows": np.array(rows),
+    }
+
+
+def save(path: Path, found: list[dict[str, Any]], **more: NDArray[Any]) -> None:
+    """Write a shard: its components one after the other, the rows with the number of theirs."""
+    shard = {"planes": np.array([len(d["F"]) for d in found], np.int64), **more}
+    if found:
+        shard["info"] = np.stack([d["info"] for d in found])
+        shard["rows"] = np.concatenate([np.c_[np.full(len(d["rows"]), j), d["rows"]] for j, d in enumerate(found)])
+        shard |= {key: np.concatenate([d[key] for d in found]) for key in ("F", "D", "O", "valid")}
+    partial = path.with_suffix(".part.npz")
+    np.savez(partial, allow_pickle=False, **shard)
+    os.replace(partial, path)
+
+
 def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Label planes of a few components of a mesh."""
     kind = KINDS[rng.integers(len(KINDS))]
@@ -132,55 +164,34 @@ def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
             continue
         box = [*np.ptp(node.box, axis=0), *node.box.mean(axis=0)]
         info = [node.hull.volume, node.volume, *box, threshold, kind == "navigable", len(node.faces)]
-        scores = [getattr(s, name) for name in list(Sweep.__dataclass_fields__)[1:]]
-        found.append(
-            {
-                "F": np.stack(scores, axis=1).astype(np.float32),
-                "D": np.repeat(s.candidates.directions, s.candidates.offsets.shape[1], 0).astype(np.float32),
-                "O": s.candidates.offsets.ravel().astype(np.float32),
-                "valid": valid,
-                "info": np.array(info),
-                "rows": np.array(rows),
-            }
-        )
+        found.append(component(s, valid, info, rows))
     return found
 
 
-def shard(meshes: Path, names: list[str], number: int) -> dict[str, NDArray[Any]]:
+def shard(meshes: Path, names: list[str], number: int, path: Path) -> None:
     """Label the meshes of a shard."""
-    got: list[tuple[str, dict[str, Any]]] = []
+    got: list[dict[str, Any]] = []
+    files: list[str] = []
     for i in range(A_SHARD):
         name = names[(number * A_SHARD + i) % len(names)]
         try:
-            got += [(name, found) for found in labels_of(meshes / name, np.random.default_rng([number, i]))]
+            got += labels_of(meshes / name, np.random.default_rng([number, i]))
         except (RlacdError, ValueError):  # flat or empty
             continue
-    if not got:
-        return {}
-    return {
-        "files": np.array([name for name, _ in got]),
-        "planes": np.array([len(d["F"]) for _, d in got]),
-        "info": np.stack([d["info"] for _, d in got]),
-        "rows": np.concatenate([np.c_[np.full(len(d["rows"]), j), d["rows"]] for j, (_, d) in enumerate(got)]),
-        **{key: np.concatenate([d[key] for _, d in got]) for key in ("F", "D", "O", "valid")},
-    }
+        files += [name] * (len(got) - len(files))
+    save(path, got, files=np.array(files))
 
 
 def main() -> None:
     """Write shards until the CPU time is spent."""
     meshes, out, limit = Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3])
     out.mkdir(parents=True, exist_ok=True)
-    with open(meshes / "index.csv", encoding="utf-8") as file:
-        listed = [r for r in csv.DictReader(file) if r["split"] == "train"]
-    listed = [r for r in listed if FACES[0] <= int(r["faces"]) <= FACES[1]]
-    names = [listed[i]["file"] for i in np.random.default_rng(7).permutation(len(listed))]
+    names = [row["file"] for row in listed(meshes, FACES)]
     number = int(sys.argv[4]) if len(sys.argv) > 4 else 0
     while time.process_time() < limit:
         path = out / f"{number:05d}.npz"
         if not path.exists():
-            partial = out / f"{number:05d}.part.npz"
-            np.savez(partial, allow_pickle=False, **shard(meshes, names, number))
-            os.replace(partial, path)
+            shard(meshes, names, number, path)
         number += 1
 
 

@@ -17,8 +17,6 @@ its own completion and by the other. `compare.py` deploys what is written to FOL
 from __future__ import annotations
 
 import argparse
-import csv
-import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -29,15 +27,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from benchmarks.learned.fit import FOLDS, Labels, fit
-from benchmarks.learned.labels import leaves, valid_of
+from benchmarks.learned.fit import FOLDS, Labels, features_of, fit
+from benchmarks.learned.labels import component, leaves, listed, save, valid_of
 from rlacd.criteria import Concavity
 from rlacd.cut import CutCache, CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.merge.numbered import NumberedParts
 from rlacd.merge.unite import _ByGrowth, _united
-from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, all_planes
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, all_planes
 from rlacd.planes.sweep import Sweep, sweep
 from rlacd.policies import Greedy, Policy
 from rlacd.policies.greedy import excess_norm, hull_sum, paper_planes_and_edges
@@ -209,27 +207,14 @@ def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
             len(done),
             len(node.faces),
         ]
-        scores = [getattr(s, name) for name in list(Sweep.__dataclass_fields__)[1:]]
-        found.append(
-            {
-                "F": np.stack(scores, axis=1).astype(np.float32),
-                "D": np.repeat(s.candidates.directions, s.candidates.offsets.shape[1], 0).astype(np.float32),
-                "O": s.candidates.offsets.ravel().astype(np.float32),
-                "valid": valid,
-                "info": np.array([*info, root.hull.volume]),
-                "rows": np.array(rows),
-            }
-        )
+        found.append(component(s, valid, [*info, root.hull.volume], rows))
     return found
 
 
 def names_of(meshes: Path, held_out: str) -> list[str]:
     """Meshes in the order they are labelled: every third is of the collection held out."""
-    with open(meshes / "index.csv", encoding="utf-8") as file:
-        listed = [r for r in csv.DictReader(file) if r["split"] == "train" and FACES[0] <= int(r["faces"]) <= FACES[1]]
-    listed = [listed[i] for i in np.random.default_rng(7).permutation(len(listed))]
-    inside = [r["file"] for r in listed if r["set"] == held_out]
-    others = [r["file"] for r in listed if r["set"] != held_out]
+    rows = listed(meshes, FACES)
+    inside, others = ([r["file"] for r in rows if (r["set"] == held_out) is here] for here in (True, False))
     names = [name for i, one in enumerate(inside) for name in (*others[2 * i : 2 * i + 2], one)]
     return names + others[2 * len(inside) :]
 
@@ -248,13 +233,7 @@ def label(meshes: Path, out: Path, minutes: float, held_out: str) -> None:
             got = labels_of(meshes / name, np.random.default_rng([11, number]))
         except (RlacdError, ValueError):  # flat or empty
             got = []
-        shard: dict[str, Any] = {"mesh": np.array(name), "planes": np.array([len(d["F"]) for d in got], np.int64)}
-        if got:
-            numbered = [np.c_[np.full(len(d["rows"]), j), d["rows"]] for j, d in enumerate(got)]
-            shard |= {"info": np.stack([d["info"] for d in got]), "rows": np.concatenate(numbered)}
-            shard |= {key: np.concatenate([d[key] for d in got]) for key in ("F", "D", "O", "valid")}
-        np.savez(path.with_suffix(".part.npz"), allow_pickle=False, **shard)
-        os.replace(path.with_suffix(".part.npz"), path)
+        save(path, got, mesh=np.array(name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,10 +261,7 @@ class Whole:
                 if len(rows) == 1:
                     continue
                 here = slice(end - shard["planes"][i], end)
-                candidates = Candidates(shard["D"][here], shard["O"][here][:, None])
-                scored = Sweep(candidates, *shard["F"][here].T.astype(np.float64))
-                found = plane_features(scored, shard["valid"][here], info[0], info[1], info[2:5], THRESHOLD)
-                features.append(found[rows[:, 0]])
+                features.append(features_of(shard, here, info, THRESHOLD)[rows[:, 0]])
                 counts.append(rows[:, 1:].reshape(-1, 2, 3))
                 sizes.append(len(rows))
                 of.append(len(names) - 1)

@@ -18,12 +18,12 @@ from rlacd.errors import OptionError as OptionError
 from rlacd.errors import OutputError as OutputError
 from rlacd.errors import RlacdError as RlacdError
 from rlacd.io.robots import RewrittenRobot as RewrittenRobot
-from rlacd.options import DetailName, OpeningsName, QualityName, RelativeTo, UnitName, VolumeOf
 from rlacd.options.names import PrimitiveKind
 from rlacd.options.navigable import NavigableSpace as NavigableSpace
 from rlacd.options.presets import PRESETS as PRESETS
 from rlacd.options.presets import Preset as Preset
 from rlacd.options.presets import PresetName
+from rlacd.options.ranges import DetailName, OpeningsName, QualityName, RelativeTo, UnitName, VolumeOf
 from rlacd.options.robots import PairKind, Per
 from rlacd.planes.sweep import Sweep as Sweep
 from rlacd.planes.sweep import SweepCache as SweepCache

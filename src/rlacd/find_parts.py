@@ -15,7 +15,8 @@ from rlacd.criteria import Criterion, Filled, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
 from rlacd.merge import grow_cover, grown_parts, may_grow
-from rlacd.options import FAST, Options
+from rlacd.options import Options
+from rlacd.options.ranges import FAST
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
 from rlacd.proxy.model import Model

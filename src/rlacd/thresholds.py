@@ -20,9 +20,10 @@ from rlacd.find_parts import Reached, find_parts_under
 from rlacd.finish.finish import cleaned_parts
 from rlacd.fit import ANY, Unit
 from rlacd.io.read.load import load_mesh
-from rlacd.options import FAST, Options
+from rlacd.options import Options
 from rlacd.options.fields import about, check_callback
 from rlacd.options.lengths import read_lengths
+from rlacd.options.ranges import FAST
 from rlacd.run import ProgressCallback, Run
 from rlacd.solid.distance import hull_distances
 from rlacd.solid.input_mesh import InputMesh

@@ -14,7 +14,7 @@ import pytest
 
 from rlacd.batch import Batch, JobSpec
 from rlacd.errors import OptionError
-from rlacd.pool import ProcessLimits, Shared, WorkerDiedError
+from rlacd.pool import ProcessLimits, WorkerDiedError
 from rlacd.pool.local import LocalPool
 from tests.batch.test_batch import TIMES, rows
 from tests.batch.trouble import make_trouble, tree, write_ell
@@ -37,7 +37,7 @@ def counter(at: int = -1, then: Any = None) -> Any:
 @pytest.mark.nightly
 def test_a_cluster_that_is_not_there_is_reported() -> None:
     assert not ray.is_initialized(), "comes before the cluster of the other tests"
-    with pytest.raises(OptionError, match="jobs belongs"):
+    with pytest.raises(OptionError, match="for one machine"):
         RayPool("auto", 2)
     with pytest.raises(OptionError, match=r"no Ray cluster at 127\.0\.0\.1:1"):
         RayPool("127.0.0.1:1")
@@ -69,13 +69,11 @@ def _dies(node: Any) -> bool:
 
 @pytest.mark.slow
 def test_requests_over_ray_are_as_those_here(cluster: Cluster) -> None:
-    shared = {"network": Shared({"weights": b"1234"})}
     with RayPool("auto") as pool:
         assert pool.room == 2
-        asked = [pool.submit(ask(number=n, blobs={"a": b"x" * n}, shared=shared)) for n in range(6)]
+        asked = [pool.submit(ask(number=n, blobs={"a": b"x" * n})) for n in range(6)]
         for number, answer in enumerate(future.result() for future in asked):
             assert (answer.values["echo"]["number"], answer.blobs["a"]) == (number, b"x" * number)
-            assert answer.values["shared"] == {"network": {"weights": 4}}
         with pytest.raises(WorkerDiedError) as died:
             pool.submit(ask("die", tries=2)).result()
         assert (died.value.reason, died.value.last_words) == ("its process died of SIGKILL", "last words")
@@ -97,35 +95,33 @@ def test_a_node_dies_half_way_and_the_results_are_those_of_one_machine(cluster: 
 
     killing = threading.Thread(target=lambda: cluster.remove_node(doomed, allow_graceful=False))
     watch = counter(at=3, then=killing.start)
-    over_ray = Batch(assets, str(tmp_path / "ray"), spec, limits).run(RayPool("auto"), watch)
+    over_ray = Batch(assets, tmp_path / "ray", spec, limits).run(RayPool("auto"), watch)
     killing.join()
     assert over_ray.status == {"done": 8, "fallback": 1, "failed": 1}
     assert _dies(doomed), "the node outlived the batch"
 
     with LocalPool(1) as pool:
-        here = Batch(assets, str(tmp_path / "here"), spec, limits).run(pool, counter())
+        here = Batch(assets, tmp_path / "here", spec, limits).run(pool, counter())
     assert here.status == over_ray.status
     assert tree(tmp_path / "ray", TIMES) == tree(tmp_path / "here", TIMES)
     assert rows(tmp_path / "ray", TIMES)["deep/dies.obj"]["attempts"] == 2
 
     again = counter()
-    assert Batch(assets, str(tmp_path / "ray"), spec, limits).run(RayPool("auto"), again).passed_over == 10
+    assert Batch(assets, tmp_path / "ray", spec, limits).run(RayPool("auto"), again).passed_over == 10
     again.finished.assert_not_called()
 
 
 @pytest.mark.nightly
-def test_a_custom_network_and_a_shared_address_reach_the_nodes(cluster: Cluster, tmp_path: Path) -> None:
+def test_a_custom_network_reaches_the_nodes(cluster: Cluster, tmp_path: Path) -> None:
     write_ell(tmp_path / "assets" / "a.obj")
     policy = tmp_path / "own.npz"
     from fuzz.networks import q_network
 
     policy.write_bytes(q_network())
     spec = JobSpec.of({"policy": str(policy), "threshold": 0.1})
-    # "local:" is fsspec's own word for files; unlike a plain folder it is taken for an address that all nodes reach.
-    out = f"local://{tmp_path}/shared"
-    summary = Batch(tmp_path / "assets", out, spec).run(RayPool("auto"), counter())
+    summary = Batch(tmp_path / "assets", tmp_path / "ray", spec).run(RayPool("auto"), counter())
     assert summary.status == {"done": 1}
-    here = Batch(tmp_path / "assets", str(tmp_path / "here"), spec)
+    here = Batch(tmp_path / "assets", tmp_path / "here", spec)
     with LocalPool(1) as pool:
         assert here.run(pool, counter()).status == {"done": 1}
-    assert (tmp_path / "shared" / "a.glb").read_bytes() == (tmp_path / "here" / "a.glb").read_bytes()
+    assert (tmp_path / "ray" / "a.glb").read_bytes() == (tmp_path / "here" / "a.glb").read_bytes()

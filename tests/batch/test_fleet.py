@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 import rlacd
 from rlacd import NavigableSpace
-from rlacd.batch import JobSpec, find_assets
+from rlacd.batch import Asset, JobSpec, find_assets
 from rlacd.batch.assets import _places, content_hash
 from rlacd.batch.manifest import Ledger
-from rlacd.batch.store import FolderStore, ResultStore, open_store
+from rlacd.batch.store import Store
 from rlacd.cli.batch import COMMAND
 from rlacd.decomposition import Decomposition
 from rlacd.errors import OutputError
@@ -105,6 +105,20 @@ def test_the_buffers_of_a_gltf_file_in_its_folder_are_part_of_the_mesh_and_other
     assert content_hash(asset.files()) != before
 
 
+def test_a_robot_depends_on_each_file_that_its_meshes_are_read_from_and_on_no_result(tmp_path: Path) -> None:
+    root = tmp_path / "in"
+    touch(root, "r/robot.urdf", "r/meshes/l.obj", "r/meshes/l.mtl", "out/r/l.obj", "r/other.obj")
+    (root / "r/robot.urdf").write_text('<robot><mesh filename="package://r/meshes/l.obj"/></robot>')
+    before = []
+    for name in ("r/meshes/l.obj", "r/meshes/l.mtl", "r/robot.urdf", "out/r/l.obj", "r/other.obj"):
+        with (root / name).open("a") as file:
+            file.write("\nmtllib l.mtl\n" if name.endswith("l.obj") else " ")
+        (robot,) = find_assets(root, "*.urdf", root / "out")
+        before.append(content_hash(robot.files()))
+    assert len(set(before)) == 3
+    assert len(set(before[2:])) == 1
+
+
 def test_all_that_decides_the_bytes_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
     policies = [tmp_path / "here.npz", tmp_path / "there" / "p.npz"]
     policies[1].parent.mkdir()
@@ -165,16 +179,12 @@ def test_an_order_survives_the_way_to_another_process() -> None:
 # --- places for results -----------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=["folder", "memory"])
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> ResultStore:
-    if request.param == "folder":
-        return open_store(str(tmp_path / "out"))
-    fsspec = pytest.importorskip("fsspec", reason="the extra fleet is not installed")
-    fsspec.filesystem("memory").store.clear()
-    return open_store("memory://bucket/out")
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "out")
 
 
-def test_files_go_in_and_come_out(store: ResultStore) -> None:
+def test_files_go_in_and_come_out(store: Store) -> None:
     assert store.read("a/b.bin") is None
     assert store.size("a/b.bin") is None
     store.write("a/b.bin", b"one")
@@ -186,7 +196,7 @@ def test_files_go_in_and_come_out(store: ResultStore) -> None:
 
 
 @pytest.mark.promise("batch-resumes")
-def test_rows_outlive_a_run_that_never_ended(store: ResultStore) -> None:
+def test_rows_outlive_a_run_that_never_ended(store: Store) -> None:
     first = Ledger(store, "m.jsonl")
     first.add({"mesh": "b", "n": 1})
     first.add({"mesh": "a", "n": 1})
@@ -201,7 +211,7 @@ def test_rows_outlive_a_run_that_never_ended(store: ResultStore) -> None:
     assert store.read("m.jsonl") == before
 
 
-def test_a_row_removes_the_files_that_only_its_forerunner_had_and_none_of_another_mesh(store: ResultStore) -> None:
+def test_a_row_removes_the_files_that_only_its_forerunner_had_and_none_of_another_mesh(store: Store) -> None:
     for name in ("a.obj", "a_000.obj", "a_001.obj"):
         store.write(name, b"x")
     ledger = Ledger(store, "m.jsonl")
@@ -215,14 +225,13 @@ def test_a_row_removes_the_files_that_only_its_forerunner_had_and_none_of_anothe
 
 
 def test_half_a_line_is_cut_off_and_a_damaged_one_is_reported(tmp_path: Path) -> None:
-    store = FolderStore(tmp_path)
-    journal = tmp_path / ".rlacd" / "m.jsonl"
-    journal.parent.mkdir()
+    store = Store(tmp_path)
+    journal = tmp_path / "m.jsonl"
     journal.write_bytes(b'{"mesh": "a"}\n{"mesh": "b')
     with Ledger(store, "m.jsonl") as ledger:
         assert [mesh for mesh in "abc" if ledger.get(mesh)] == ["a"]
         ledger.add({"mesh": "c"})
-    assert [json.loads(line)["mesh"] for line in (tmp_path / "m.jsonl").read_text().splitlines()] == ["a", "c"]
+    assert [json.loads(line)["mesh"] for line in journal.read_text().splitlines()] == ["a", "c"]
     journal.write_bytes(b'{"mesh": "a"}\n{"mesh": 1}\n')
     with pytest.raises(OutputError, match="line 2"):
         Ledger(store, "m.jsonl")
@@ -230,7 +239,7 @@ def test_half_a_line_is_cut_off_and_a_damaged_one_is_reported(tmp_path: Path) ->
 
 def test_two_runs_cannot_write_to_one_folder_and_the_next_sweeps_up_what_a_killed_one_left(tmp_path: Path) -> None:
     touch(tmp_path, "a/mesh.stl", "a/.rlacd-0123.tmp")
-    first, second = FolderStore(tmp_path), FolderStore(tmp_path)
+    first, second = Store(tmp_path), Store(tmp_path)
     first.open()
     with pytest.raises(OutputError, match="another run"):
         second.open()
@@ -238,3 +247,31 @@ def test_two_runs_cannot_write_to_one_folder_and_the_next_sweeps_up_what_a_kille
     second.open()
     second.close()
     assert os.listdir(tmp_path / "a") == ["mesh.stl"]
+
+
+def test_shards_work_beside_each_other_and_a_run_of_all_meshes_beside_none(tmp_path: Path) -> None:
+    first, second, whole = Store(tmp_path, (1, 2)), Store(tmp_path, (2, 2)), Store(tmp_path)
+    first.open()
+    touch(tmp_path, ".rlacd-0123.tmp")
+    second.open()
+    assert (tmp_path / ".rlacd-0123.tmp").exists(), "the other one may be writing it"
+    for other in (Store(tmp_path, (1, 2)), whole):
+        with pytest.raises(OutputError, match="another run"):
+            other.open()
+    second.close()
+    first.close()
+    whole.open()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rlacd.batch.store.LOCK_SECONDS", 0.1)
+        with pytest.raises(OutputError, match="another run"):
+            first.open()
+    whole.close()
+    first.open()
+    first.close()
+
+
+@given(st.sets(NAMES, min_size=1), st.integers(1, 20))
+def test_every_mesh_is_of_one_shard_whichever_others_there_are(names: set[str], parts: int) -> None:
+    shards = [[name for name in names if Asset(name, Path(name), name).is_of((k, parts))] for k in range(1, parts + 1)]
+    assert sorted(name for shard in shards for name in shard) == sorted(names)
+    assert all(Asset(name, Path("elsewhere"), "").is_of((k, parts)) for k, s in enumerate(shards, 1) for name in s)

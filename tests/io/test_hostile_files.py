@@ -20,7 +20,7 @@ from trimesh import creation
 
 from rlacd.batch.assets import Asset
 from rlacd.batch.manifest import Ledger
-from rlacd.batch.store import FolderStore
+from rlacd.batch.store import Store
 from rlacd.errors import MeshFileError, OutputError, RlacdError, TrainingError, WeightsError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.read.open_file import LARGEST_FILE
@@ -194,7 +194,7 @@ def test_a_manifest_of_others_removes_nothing_outside_of_the_results(row: Any, t
     out.mkdir()
     (out / "manifest.jsonl").write_text(json.dumps(row).replace("{precious}", str(precious)) + "\n")
     with pytest.raises(OutputError, match=r"line 1 of manifest\.jsonl is damaged"):
-        Ledger(FolderStore(out), "manifest.jsonl").add({"mesh": "a.stl", "outputs": {}})
+        Ledger(Store(out), "manifest.jsonl").add({"mesh": "a.stl", "outputs": {}})
     assert precious.read_text() == "mine"
 
 
@@ -203,12 +203,12 @@ def test_a_manifest_of_others_removes_nothing_outside_of_the_results(row: Any, t
 )
 def test_a_manifest_that_no_parser_survives_is_refused(line: bytes, says: str, tmp_path: Path) -> None:
     (tmp_path / "manifest.jsonl").write_bytes(line + b"\n")
-    check_refused(OutputError, says, Ledger, FolderStore(tmp_path), "manifest.jsonl")
+    check_refused(OutputError, says, Ledger, Store(tmp_path), "manifest.jsonl")
 
 
 def test_a_manifest_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "manifest.jsonl")
-    check_refused(OutputError, "pipe", Ledger, FolderStore(tmp_path), "manifest.jsonl")
+    check_refused(OutputError, "pipe", Ledger, Store(tmp_path), "manifest.jsonl")
 
 
 # --- weights and checkpoints ------------------------------------------------------------------------------------------

@@ -23,11 +23,12 @@ from rlacd.cli.options import decompose_options
 from rlacd.compat import coacd, vhacd
 from rlacd.errors import MeshFileError, OptionError, RlacdError, WeightsError
 from rlacd.learn.options import TrainOptions
-from rlacd.options import LENGTHS, OPTION_NAMES, Options
+from rlacd.options import OPTION_NAMES, Options
 from rlacd.options.fields import check_callback
 from rlacd.options.names import SCORES as SCORE_NAMES
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
+from rlacd.options.ranges import LENGTHS
 from rlacd.policies.greedy import SCORES
 
 

@@ -8,14 +8,13 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import psutil
 
 from rlacd.errors import OptionError
-from rlacd.pool import Blobs, Shared
+from rlacd.pool import Blobs
 
 SERVER = "tests.pool.obedient:Obedient"
 
@@ -25,9 +24,7 @@ class Obedient:
         assert staging.is_dir()
         self._staging = staging
 
-    def __call__(
-        self, values: dict[str, Any], blobs: Blobs, shared: Mapping[str, Shared]
-    ) -> tuple[dict[str, Any], dict[str, bytes]]:
+    def __call__(self, values: dict[str, Any], blobs: Blobs) -> tuple[dict[str, Any], dict[str, bytes]]:
         what = values.get("what", "echo")
         if what == "die once":
             mark = Path(values["mark"])
@@ -46,8 +43,7 @@ class Obedient:
             raise OptionError("that is too much; ask for less.")
         if what == "bug":
             raise ZeroDivisionError("a surprise")
-        seen = {name: {part: len(blob) for part, blob in given.blobs.items()} for name, given in shared.items()}
-        return {"pid": os.getpid(), "echo": values, "shared": seen}, dict(blobs)
+        return {"pid": os.getpid(), "echo": values}, dict(blobs)
 
 
 def pool_processes() -> list[psutil.Process]:

@@ -11,13 +11,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import psutil
 import pytest
 
 from rlacd.errors import OptionError
-from rlacd.pool import Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError, local, open_pool
+from rlacd.pool import Pool, ProcessLimits, Request, TimeLimitError, WorkerDiedError, open_pool
 from rlacd.pool.local import InProcessPool, LocalPool
 from tests.pool.obedient import SERVER, pool_processes
 
@@ -43,7 +42,7 @@ def one() -> Iterator[LocalPool]:
 
 def ask(what: str = "echo", **more: Any) -> Request:
     seconds = more.pop("seconds", 600)
-    kept = {name: more.pop(name) for name in ("blobs", "shared", "fresh", "tries") if name in more}
+    kept = {name: more.pop(name) for name in ("blobs", "fresh", "tries") if name in more}
     return Request(SERVER, {"what": what, **more}, **kept, limits=ProcessLimits(seconds=seconds))
 
 
@@ -53,12 +52,10 @@ def pid(pool: Pool, request: Request | None = None) -> int:
 
 def test_what_is_asked_is_answered_with_all_that_came_with_it(pool: Pool) -> None:
     blobs = {"nothing": b"", "a": os.urandom(3_000_000), "椅子": b"x"}
-    shared = {"network": Shared({"weights": b"1234"})}
-    futures = [pool.submit(ask(number=n, blobs=blobs, shared=shared)) for n in range(5)]
+    futures = [pool.submit(ask(number=n, blobs=blobs)) for n in range(5)]
     for number, future in enumerate(futures):
         answer = future.result()
         assert answer.values["echo"]["number"] == number
-        assert answer.values["shared"] == {"network": {"weights": 4}}
         assert answer.blobs == blobs
 
 
@@ -66,20 +63,6 @@ def test_refusals_are_raised_as_what_they_are(pool: Pool) -> None:
     with pytest.raises(OptionError, match="that is too much; ask for less"):
         pool.submit(ask("refuse")).result()
     assert pid(pool)
-
-
-def test_what_is_shared_reaches_a_process_once_and_again_when_it_changes(one: LocalPool) -> None:
-    first, second = Shared({"weights": b"1"}), Shared({"weights": b"22"})
-    with mock.patch.object(local, "send", wraps=local.send) as send:
-        seen = [
-            one.submit(ask(shared={"network": shared})).result().values["shared"]["network"]["weights"]
-            for shared in (first, first, second, second, first)
-        ]
-        given = [call.args[1]["shares"] for call in send.call_args_list]
-    assert seen == [1, 1, 2, 2, 1]
-    assert given.count("network") == 3
-    one.submit(ask("die")).exception()
-    assert one.submit(ask(shared={"network": first})).result().values["shared"] == {"network": {"weights": 1}}
 
 
 def test_a_death_is_reported_to_its_request_only(pool: Pool) -> None:

@@ -8,11 +8,10 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
-from typing import Literal
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read import READERS
@@ -26,8 +25,8 @@ ENDINGS = tuple(f".{ending}" for ending in READERS)
 ROBOTS = (".urdf", ".xml")
 """File endings of robots; an ``.xml`` is one only if it is MJCF."""
 
-RESERVED = ("manifest.jsonl", "timings.jsonl", ".rlacd")
-"""Names of the files that a batch writes beside its results."""
+MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
+"""Files that a batch writes beside its results."""
 
 EVERYTHING = "**"
 
@@ -50,6 +49,8 @@ class Asset:
     """The file."""
     place: str
     """Name of its result, relative to the folder of results, without an ending."""
+    around: Mapping[str, Sequence[str]] = field(default_factory=dict, compare=False, repr=False)
+    """All files of the folder of assets, by the last part of their names."""
 
     def files(self) -> dict[str, bytes]:
         """Read every file the mesh depends on, by name relative to its folder; the mesh file comes first.
@@ -65,14 +66,18 @@ class Asset:
         if not self.is_robot:
             return files
         root = self.path.parents[self.name.count("/")]
-        there = sorted(path for path in root.rglob("*") if path.is_file())
-        wanted, read = _names_in(files[self.path.name]), {self.path}
-        while found := [path for path in there if path.name in wanted and path not in read]:
-            for path in found:
-                files |= {path.relative_to(root).as_posix(): content for content in mesh_files(path).values()}
-                wanted |= _names_in(path.read_bytes()) if path.suffix.lower() in ROBOTS else set()
+        wanted, read = _names_in(files[self.path.name]), {self.name}
+        while found := sorted({name for word in wanted for name in self.around.get(word, ())} - read):
+            for name in filter(lambda name: (root / name).is_file(), found):
+                content = mesh_files(root / name, name)
+                files |= {f"{name}:{beside}": data for beside, data in content.items()}
+                wanted |= _names_in(next(iter(content.values()))) if name.lower().endswith(ROBOTS) else set()
             read.update(found)
         return files
+
+    def is_of(self, shard: tuple[int, int]) -> bool:
+        """Whether it is of this one, from 1, of so many parts of the meshes, whichever other meshes there are."""
+        return int(_digest(self.name), 16) % shard[1] == shard[0] - 1
 
     @property
     def is_robot(self) -> bool:
@@ -109,8 +114,7 @@ def find_assets(
         Folder to search. Hidden files and folders, links to folders, and files written by rlacd are skipped; links to
         files are followed.
     glob : str
-        Pattern to select meshes: matched against the name if it holds a slash, else against its last part. ``*``
-        matches slashes too.
+        Pattern that selects meshes; see `matches`.
     leave_out : Path, optional
         A folder inside `folder` to skip, such as the folder of results.
     ending : str
@@ -121,32 +125,33 @@ def find_assets(
     MeshFileError
         `folder` does not exist or is not a folder, or a folder in it cannot be read.
     """
-    # Results are named among all meshes of the folder, not only the selected ones: the same in every run.
-    names = sorted(name for name, kind in _files(folder, leave_out) if kind == "asset")
-    places = _places(names, ending)
-    return [Asset(name, folder / name, places[name]) for name in names if _matches(name, glob)]
+    return [asset for asset in scan(folder, leave_out, ending)[0] if matches(asset.name, glob)]
 
 
-def other_files(folder: Path, glob: str = EVERYTHING, leave_out: Path | None = None) -> Counter[str]:
-    """Count the files that `find_assets` skips though `glob` selects them, by their endings."""
-    kinds = {"ours": "written by rlacd", "other": ""}
-    files = [(name, kind) for name, kind in _files(folder, leave_out) if kind != "asset" and _matches(name, glob)]
-    return Counter(kinds[kind] or PurePosixPath(name).suffix.lower() or "no ending" for name, kind in files)
-
-
-def _files(folder: Path, leave_out: Path | None) -> Iterator[tuple[str, Literal["asset", "ours", "other"]]]:
+def scan(folder: Path, leave_out: Path | None, ending: str) -> tuple[list[Asset], dict[str, str]]:
+    """As `find_assets`, and what the other files are, by name: their ending, or that rlacd wrote them."""
     if not folder.is_dir():
         raise MeshFileError(f"{folder} is not a folder; give the folder that holds the meshes.")
     skipped = None if leave_out is None else leave_out.resolve()
+    names, others = [], dict[str, str]()
+    around: dict[str, list[str]] = {}
     for at, folders, files in os.walk(folder, onerror=_refuse):
         here = Path(at)
         folders[:] = [f for f in folders if not f.startswith(".") and (here / f).resolve() != skipped]
         hulls = _written_hulls(here, files)
         for file in (file for file in files if not file.startswith(".")):
-            path, ending = here / file, PurePosixPath(file).suffix.lower()
-            is_asset = ending in (*ENDINGS, ".urdf") or (ending == ".xml" and _root(path) == "mujoco")
-            is_ours = is_asset and (file in hulls or _is_written(path))
-            yield path.relative_to(folder).as_posix(), "ours" if is_ours else "asset" if is_asset else "other"
+            path, kind = here / file, PurePosixPath(file).suffix.lower()
+            name = path.relative_to(folder).as_posix()
+            around.setdefault(file, []).append(name)
+            if not (kind in (*ENDINGS, ".urdf") or (kind == ".xml" and _root(path) == "mujoco")):
+                others[name] = kind or "no ending"
+            elif file in hulls or _is_written(path):
+                others[name] = "written by rlacd"
+            else:
+                names.append(name)
+    # Results are named among all meshes of the folder, not only the selected ones: the same in every run.
+    places = sorted(_places(names, ending).items())
+    return [Asset(name, folder / name, place, around) for name, place in places], others
 
 
 _COMMENT, _TAG = re.compile(rb"<!--.*?-->", re.DOTALL), re.compile(rb"<([A-Za-z_][\w.:-]*)")
@@ -187,14 +192,13 @@ def _refuse(error: OSError) -> None:
     raise MeshFileError(f"{error.filename} cannot be read ({error.strerror}); check its permissions.") from error
 
 
-def _matches(name: str, glob: str) -> bool:
-    if glob == EVERYTHING:
-        return True
+def matches(name: str, glob: str) -> bool:
+    """Whether a pattern fits the name if it holds a slash, else its last part; ``*`` matches slashes too."""
     pattern = glob.removeprefix("**/")  # subfolders are always searched
-    return fnmatchcase(name if "/" in pattern else PurePosixPath(name).name, pattern)
+    return glob == EVERYTHING or fnmatchcase(name if "/" in pattern else PurePosixPath(name).name, pattern)
 
 
-def _places(names: Sequence[str], ending: str) -> dict[str, str]:
+def _places(names: Iterable[str], ending: str) -> dict[str, str]:
     """Name results: without the mesh's ending, or with it where two names would clash (``a.obj`` and ``a.stl``).
 
     A result clashes too with a folder that another one lies in (``a.obj``, and ``b.obj`` in the folder ``a.glb``).
@@ -206,16 +210,18 @@ def _places(names: Sequence[str], ending: str) -> dict[str, str]:
         results = {name: (place + result_ending(name, ending)).casefold() for name, place in places.items()}
         count = Counter(results.values())
         folders = {str(parent).casefold() for place in places.values() for parent in PurePosixPath(place).parents}
-        shared = [
-            name
+        fuller = {
+            name: _free(name) if places[name] != _free(name) else f"{name}-{_digest(name)[:8]}"
             for name, result in results.items()
             if count[result] > 1 or (result in folders and result_ending(name, ending))
-        ]
-        digests = {name: hashlib.sha256(os.fsencode(name)).hexdigest()[:8] for name in shared}
-        fuller = {n: _free(n) if places[n] != _free(n) else f"{n}-{digest}" for n, digest in digests.items()}
+        }
         if fuller.items() <= places.items():  # what still clashes is reported where it is written
             return places
         places |= fuller
+
+
+def _digest(name: str) -> str:
+    return hashlib.sha256(os.fsencode(name)).hexdigest()
 
 
 def result_ending(name: str, ending: str) -> str:
@@ -225,4 +231,4 @@ def result_ending(name: str, ending: str) -> str:
 
 
 def _free(place: str) -> str:
-    return f"_{place}" if place.partition("/")[0].casefold() in RESERVED else place
+    return f"_{place}" if place.partition("/")[0].casefold() in (MANIFEST, TIMINGS) else place

@@ -8,21 +8,19 @@ import time
 from collections import Counter, deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
-from rlacd.batch.assets import EVERYTHING, Asset, content_hash, find_assets, other_files
+from rlacd.batch.assets import EVERYTHING, MANIFEST, TIMINGS, Asset, content_hash, matches, scan
 from rlacd.batch.job_spec import JobSpec
 from rlacd.batch.manifest import Ledger, Row
 from rlacd.batch.mesh import FAILED, Outcome, Task, Work, process
-from rlacd.batch.store import FolderStore, ResultStore, open_store
+from rlacd.batch.store import Store
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.pool import Pool, ProcessLimits, WorkerDiedError
 from rlacd.report import kind_of
-
-MANIFEST, TIMINGS = "manifest.jsonl", "timings.jsonl"
 
 Redo = Literal["none", "failed", "all"]
 
@@ -57,8 +55,6 @@ class Summary:
 
     meshes: int
     """Number of meshes found."""
-    seen: list[str] = field(default_factory=list)
-    """Names of the meshes that have a result now."""
     passed_over: int = 0
     """Number of meshes whose result already existed, whatever its status; `status` counts them too."""
     status: Counter[str] = field(default_factory=Counter)
@@ -79,38 +75,37 @@ class Summary:
     """Number of files that are not meshes, by ending."""
 
 
-def _outcomes(work: Work, tasks: Iterator[Task]) -> Generator[tuple[Task, Outcome], None, None]:
+def _outcomes(work: Work, tasks: Iterator[Task], stop: threading.Event) -> Generator[tuple[Task, Outcome], None, None]:
     """Process tasks in any order, as the pool has room; an outcome is written before it is yielded.
 
     A mesh whose process died is tried again alone, after all others: on this machine they may have taken its memory.
     """
-    running: dict[Future[Outcome], tuple[Task, bool]] = {}  # whether it is being written
+    running: dict[Future[Outcome], Task] = {}
+    writing: dict[Future[Outcome], Task] = {}
     again: deque[tuple[Task, WorkerDiedError]] = deque()
     with ThreadPoolExecutor(1024) as threads:  # they start as needed, and wait for answers
         try:
             while True:
-                room = max(1, work.pool.room // work.spec.options["threads"])
-                while len(running) < room + WRITERS and sum(not writing for _, writing in running.values()) < room:
+                room = max(1, work.pool.room // work.batch.spec.options["threads"])
+                while len(running) < room and len(running) + len(writing) < room + WRITERS:
                     if (task := next(tasks, None)) is None:
                         break
-                    running[threads.submit(process, task, work)] = task, False
-                if not running and (not again or work.stop.is_set()):
-                    return
-                if not running or (again and work.pool.many_machines):
+                    running[threads.submit(process, task, work)] = task
+                if again and not stop.is_set() and (work.pool.many_machines or not (running or writing)):
                     task, death = again.popleft()
-                    running[threads.submit(process, task, work, death)] = task, False
+                    running[threads.submit(process, task, work, death)] = task
+                if not (running or writing):
+                    return
                 # Every second, since a cluster grows and shrinks.
-                for done in wait(running, 1.0, FIRST_COMPLETED).done:
-                    task, written = running.pop(done)
+                for done in wait([*running, *writing], 1.0, FIRST_COMPLETED).done:
+                    if done in writing:
+                        yield writing.pop(done), done.result()
+                        continue
+                    task = running.pop(done)
                     try:
-                        outcome = done.result()
+                        writing[threads.submit(done.result().put, work)] = task
                     except WorkerDiedError as died:
                         again.append((task, died))
-                        continue
-                    if written:
-                        yield task, outcome
-                    else:
-                        running[threads.submit(outcome.put, work)] = task, True
         except BaseException:
             work.pool.close()  # threads wait for it
             raise
@@ -129,12 +124,12 @@ def _kinds(warnings: Iterable[Sequence[str]]) -> Counter[str]:
 
 @dataclass(frozen=True)
 class Batch:
-    """A folder of meshes and the place of their results."""
+    """A folder of meshes and the folder of their results."""
 
     assets: Path
     """Folder of the meshes."""
-    out: str
-    """Folder or address of the results."""
+    out: Path
+    """Folder of the results."""
     spec: JobSpec
     """What is done to each mesh."""
     limits: ProcessLimits = field(default_factory=ProcessLimits)
@@ -145,6 +140,8 @@ class Batch:
     """Pattern that selects meshes; see `find_assets`."""
     redo: Redo = "none"
     """Which existing results are recomputed: none, those that failed, or all."""
+    shard: tuple[int, int] = (1, 1)
+    """Which one, from 1, of how many parts of the meshes is done."""
 
     def plan(self) -> list[tuple[Asset, bool]]:
         """List all meshes, and whether the result of each exists; writes nothing.
@@ -154,9 +151,9 @@ class Batch:
         RlacdError
             As for `run`.
         """
-        assets, store = self._find(), open_store(self.out)
+        store = Store(self.out, self.shard)
         manifest = Ledger(store, MANIFEST)
-        return [(asset, self._task(asset, manifest, store)[1]) for asset in assets]
+        return [(asset, self._task(asset, manifest, store)[1]) for asset in self._find()[0]]
 
     def run(self, pool: Pool, watcher: Watcher, stop: threading.Event | None = None) -> Summary:
         """Process all meshes whose result does not exist yet.
@@ -182,75 +179,63 @@ class Batch:
         OutputError
             The results cannot be written, or another run is writing there.
         """
-        assets, store = self._find(), open_store(self.out)
-        summary, start = Summary(len(assets)), time.monotonic()
-        stop = stop or threading.Event()
+        (assets, others), store = self._find(), Store(self.out, self.shard)
+        summary, start, stop = Summary(len(assets), others=others), time.monotonic(), stop or threading.Event()
+        seen: list[str] = []
         store.open()
-        try:
-            with Ledger(store, MANIFEST) as manifest, Ledger(store, TIMINGS) as timings, ExitStack() as threads:
-                shared = self.spec.shared()
-                work = Work(self.spec, self.limits, self.fallback, self.out, store, pool, manifest.owns, stop, shared)
-                watcher.begin(len(assets))
-                pending = self._pending(assets, work, manifest, watcher, summary)
-                for task, outcome in threads.enter_context(closing(_outcomes(work, pending))):
-                    row = self._row(task, outcome)
-                    timing = {"mesh": task.asset.name, **outcome.timing}
+        with closing(store), Ledger(store, MANIFEST) as manifest, Ledger(store, TIMINGS) as timings:
+
+            def pending() -> Iterator[Task]:
+                for asset in assets:
+                    if stop.is_set():
+                        return
+                    task, finished = self._task(asset, manifest, store)
+                    if finished:
+                        seen.append(asset.name)
+                        summary.passed_over += 1
+                        watcher.passed_over(asset)
+                    else:
+                        watcher.started(asset)
+                        yield task
+
+            watcher.begin(len(assets))
+            with closing(_outcomes(Work(self, store, pool, manifest.owns), pending(), stop)) as outcomes:
+                for task, outcome in outcomes:
+                    row, timing = self._row(task, outcome), {"mesh": task.asset.name, **outcome.timing}
                     timings.add(timing)
                     manifest.add(row)
                     watcher.finished(row, timing)
                     summary.slowest.append((task.asset.name, float(timing.get("seconds", 0.0))))
                     summary.slowest = sorted(summary.slowest, key=lambda entry: -entry[1])[:3]
-                    summary.seen.append(task.asset.name)
-        finally:
-            store.close()
-        rows = [found for name in sorted(summary.seen) if (found := manifest.get(name)) is not None]
+                    seen.append(task.asset.name)
+        rows = [found for name in sorted(seen) if (found := manifest.get(name)) is not None]
         summary.status = Counter(row["status"] for row in rows)
         summary.failures = [row for row in rows if row["status"] in FAILED]
         summary.uncovered = [row for row in rows if row["status"] == "uncovered"]
         summary.warnings = _kinds([row.get("warnings", ()) for row in rows])
-        summary.stopped = len(summary.seen) < len(assets)
-        summary.others = other_files(self.assets, self.glob, Path(self.out))
+        summary.stopped = len(seen) < len(assets)
         summary.seconds = time.monotonic() - start
         return summary
 
-    def _pending(
-        self, assets: list[Asset], work: Work, manifest: Ledger, watcher: Watcher, summary: Summary
-    ) -> Iterator[Task]:
-        """The meshes without a result, one after the other until the stop."""
-        for asset in assets:
-            if work.stop.is_set():
-                return
-            task, finished = self._task(asset, manifest, work.store)
-            if finished:
-                summary.seen.append(asset.name)
-                summary.passed_over += 1
-                watcher.passed_over(asset)
-            else:
-                watcher.started(asset)
-                yield task
-
-    def _find(self) -> list[Asset]:
-        store = open_store(self.out)
-        here = store.folder if isinstance(store, FolderStore) else None
-        if here is not None and here.resolve() == self.assets.resolve():
+    def _find(self) -> tuple[list[Asset], Counter[str]]:
+        """The meshes of this run, and how many other files `glob` selects, by kind."""
+        here = self.out.resolve()
+        if here == self.assets.resolve():
             raise OptionError(f"the results would lie among the meshes of {self.assets}; choose another folder.")
-        assets = find_assets(self.assets, self.glob, here, self.spec.ending)
+        every, others = scan(self.assets, here, self.spec.ending)
+        assets = [asset for asset in every if matches(asset.name, self.glob)]
         if not assets:
             which = "" if self.glob == EVERYTHING else f" whose name fits {self.glob!r}"
             raise MeshFileError(f"there is no mesh{which} in {self.assets}; give a folder with obj, stl, glb, … files.")
-        if here is not None:
-            self._refuse_results_over_meshes(assets, here)
-        return assets
-
-    def _refuse_results_over_meshes(self, assets: list[Asset], here: Path) -> None:
-        """Refuse results that would overwrite meshes; the folder of results may be above that of the meshes."""
-        places = {here.resolve() / asset.place for asset in assets}
-        for asset in assets if self.glob == EVERYTHING else find_assets(self.assets, EVERYTHING, here):
+        places = {here / asset.place for asset in assets}
+        for asset in every:  # the folder of results may be above that of the meshes
             for path in (asset.path, asset.path.resolve()):
                 if path.parent.resolve() / path.stem in places:
                     raise OptionError(f"a result would overwrite the input {asset.path}; choose another folder.")
+        kinds = Counter(kind for name, kind in others.items() if matches(name, self.glob))
+        return [asset for asset in assets if asset.is_of(self.shard)], kinds
 
-    def _task(self, asset: Asset, manifest: Ledger, store: ResultStore) -> tuple[Task, bool]:
+    def _task(self, asset: Asset, manifest: Ledger, store: Store) -> tuple[Task, bool]:
         """Return the mesh with the key of its result, and whether that result exists."""
         try:
             content = content_hash(asset.files())
@@ -259,7 +244,7 @@ class Batch:
         task = Task(asset, self.spec.key(content, asset.name))
         return task, self.redo != "all" and self._is_finished(task, manifest.get(asset.name), store)
 
-    def _is_finished(self, task: Task, row: Row | None, store: ResultStore) -> bool:
+    def _is_finished(self, task: Task, row: Row | None, store: Store) -> bool:
         if row is None or row.get("key") != task.key or row.get("place") != task.asset.place:
             return False  # the place of a result depends on the neighbouring meshes
         status = row.get("status")

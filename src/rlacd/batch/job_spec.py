@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from functools import cached_property
+from pathlib import PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -17,13 +18,12 @@ from rlacd.options import Options
 from rlacd.options.names import WEIGHTS_ENDING
 from rlacd.options.output import OutputOptions
 from rlacd.policies import make_policy
-from rlacd.pool import Shared
 
 WRITTEN = ("file_type", "density", "mass", "up", "one_mesh", "keep_input")
 """Options of the output that a batch takes."""
 
-POLICY = "policy"
-"""Name of the network that requests share, if the policy is a file."""
+NETWORK = "the policy"
+"""What a request calls the network, beside the files of the mesh."""
 
 
 @dataclass(frozen=True)
@@ -97,12 +97,10 @@ class JobSpec:
         decides = [__version__, content, stem, self.weights, options, self.ending, self.written]
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
-    def shared(self) -> dict[str, Shared]:
-        """Return what every process needs for these decompositions: the network, if the policy is a file."""
-        policy = str(self.options.get("policy", ""))
-        if not policy.endswith(WEIGHTS_ENDING):
-            return {}
-        return {POLICY: Shared({"network": Path(policy).read_bytes()}, key=self.weights)}
+    @cached_property
+    def network(self) -> dict[str, bytes]:
+        """The network as `NETWORK`, if the policy is a file: it may change during the batch."""
+        return {NETWORK: read_file(self.options["policy"])} if self.weights else {}
 
 
 def _weights(policy: str) -> str:

@@ -1,16 +1,15 @@
-"""One JSON row per mesh: appended to a journal during the run, written as a sorted file at its end."""
+"""One JSON row per mesh: appended during the run, sorted at its end."""
 
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Iterable
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from pathlib import PurePosixPath
 from types import TracebackType
 from typing import Any, TypeAlias
 
-from rlacd.batch.store import PRIVATE, ResultStore
+from rlacd.batch.store import Store
 from rlacd.errors import OutputError
 
 Row: TypeAlias = dict[str, Any]
@@ -18,7 +17,9 @@ Row: TypeAlias = dict[str, Any]
 
 
 class Ledger(AbstractContextManager["Ledger"]):
-    """The rows of a folder of results; rows of meshes outside this run are kept.
+    """The rows of a folder of results, the last one of each mesh; rows of meshes outside this run are kept.
+
+    A shard knows all rows and writes its own to a file of its own; a run of all meshes joins these files.
 
     Parameters
     ----------
@@ -29,18 +30,20 @@ class Ledger(AbstractContextManager["Ledger"]):
     Raises
     ------
     OutputError
-        A line is damaged.
+        A line is damaged. An incomplete one at the end is left by a kill, and dropped.
     """
 
-    def __init__(self, store: ResultStore, name: str) -> None:
-        self._store, self._name, self._journal = store, name, f"{PRIVATE}/{name}"
-        self._waiting: list[bytes] = []  # for the journal, at most `append_every` seconds
-        self._written = time.monotonic()
+    def __init__(self, store: Store, name: str) -> None:
+        self._store, self._file = store, store.own(name)
         self._rows: dict[str, Row] = {}
         self._owner: dict[str, str] = {}
-        kept = {name: store.read(name) or b"", f"the journal of {name}": store.appended(self._journal)}
-        for row in (row for where, content in kept.items() for row in _read(where, content.splitlines())):
-            self._put(row)
+        self._mine: set[str] = set()  # meshes whose rows this run writes
+        self._files = store.all_of(name)
+        for file in self._files:
+            for row in _read(file, store.read(file) or b""):
+                self._put(row)
+                if file == self._file or not store.shard:
+                    self._mine.add(row["mesh"])
 
     def get(self, mesh: str) -> Row | None:
         """The row of a mesh."""
@@ -56,24 +59,29 @@ class Ledger(AbstractContextManager["Ledger"]):
         for output in sorted(set(old.get("outputs", {})) - set(row.get("outputs", {}))):
             self._store.remove(output)
         self._put(row)
-        self._waiting.append(_line(row))
-        if time.monotonic() - self._written >= self._store.append_every:
-            self._write_journal()
+        self._mine.add(row["mesh"])
+        self._store.append(self._file, _line(row))
+
+    def __enter__(self) -> Ledger:
+        """Cut off an incomplete line, so that rows can be appended."""
+        content = self._store.read(self._file) or b""
+        if not content.endswith(b"\n"):
+            self._write(content[: content.rfind(b"\n") + 1])
+        return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Write the sorted file and remove the journal; after an error, leave the journal for the next run."""
+        """Write the sorted file, and remove those of shards it holds; after an error, leave all to the next run."""
         if error is not None:
-            return self._write_journal()
-        content = b"".join(_line(self._rows[mesh]) for mesh in sorted(self._rows))
-        if content != (self._store.read(self._name) or b""):
-            self._store.write(self._name, content)
-        self._store.remove_appended(self._journal)
+            return
+        self._write(b"".join(_line(self._rows[mesh]) for mesh in sorted(self._mine & self._rows.keys())))
+        if not self._store.shard:
+            for file in self._files:
+                if file != self._file:
+                    self._store.remove(file)
 
-    def _write_journal(self) -> None:
-        """Write the lines that wait."""
-        if self._waiting:
-            self._store.append(self._journal, b"".join(self._waiting))
-        self._waiting, self._written = [], time.monotonic()
+    def _write(self, content: bytes) -> None:
+        if content != (self._store.read(self._file) or b""):
+            self._store.write(self._file, content)
 
     def _put(self, row: Row) -> None:
         """Store a row, and drop the row of any other mesh (deleted since) that claims the same outputs."""
@@ -95,8 +103,8 @@ def _line(row: Row) -> bytes:
         return json.dumps(row, allow_nan=False).encode() + b"\n"
 
 
-def _read(where: str, lines: Iterable[bytes]) -> Iterable[Row]:
-    for number, line in enumerate(lines, 1):
+def _read(file: str, content: bytes) -> Iterator[Row]:
+    for number, line in enumerate(content.split(b"\n")[:-1], 1):
         try:
             row: Row = json.loads(line)
             if not isinstance(row["mesh"], str):
@@ -104,7 +112,7 @@ def _read(where: str, lines: Iterable[bytes]) -> Iterable[Row]:
             if not all(_is_inside(output) for output, _ in row.get("outputs", {}).items()):
                 raise ValueError("an output outside of the results")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            raise OutputError(f"line {number} of {where} is damaged ({error}); delete the line.") from error
+            raise OutputError(f"line {number} of {file} is damaged ({error}); delete the line.") from error
         yield row
 
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any, Literal
 
 from rlacd.batch.assets import Asset
-from rlacd.batch.job_spec import JobSpec
 from rlacd.batch.server import SERVER
-from rlacd.batch.store import ResultStore, put_files
+from rlacd.batch.store import Store
 from rlacd.errors import MeshFileError, OutputNameError
-from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared, TimeLimitError, WorkerDiedError
+from rlacd.pool import Pool, Request, TimeLimitError, WorkerDiedError
 from rlacd.report import COVERAGE_TOLERANCE
+
+if TYPE_CHECKING:
+    from rlacd.batch.batch import Batch
 
 Status = Literal["done", "warned", "uncovered", "fallback", "failed"]
 
@@ -28,26 +29,15 @@ HULL_SECONDS = 60.0
 
 @dataclass(frozen=True)
 class Work:
-    """What all meshes of a batch share."""
+    """What all meshes of a run share."""
 
-    spec: JobSpec
-    """What is done to a mesh."""
-    limits: ProcessLimits
-    """Limits for each mesh."""
-    fallback: bool
-    """Whether a mesh that fails gets its convex hull instead."""
-    out: str
-    """Folder or address of the results."""
-    store: ResultStore
-    """The store opened for `out`."""
+    batch: Batch
+    store: Store
+    """The folder of results."""
     pool: Pool
     """Where meshes are processed."""
     owns: Callable[[str], bool]
     """Tells of a file among the results whether an earlier run wrote it."""
-    stop: threading.Event
-    """Once set, no further mesh is started."""
-    shared: dict[str, Shared]
-    """What all processes need: the network, if the policy is a file."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +74,9 @@ class Outcome:
     def put(self, work: Work) -> Outcome:
         """Write the files; a name that cannot be used fails this mesh only."""
         try:
-            outputs = put_files(work.store, self.files, work.owns)
+            outputs = work.store.put(self.files, work.owns)
         except OutputNameError as error:
-            said = str(error).replace(f"{Path(work.out)}{os.sep}", "")  # the same wherever the results are
+            said = str(error).replace(f"{work.store.folder}{os.sep}", "")  # the same wherever the results are
             return Outcome("failed", error=said, name_taken=True, timing=self.timing)
         return replace(self, files={}, outputs=outputs)
 
@@ -106,17 +96,22 @@ def process(task: Task, work: Work, died: WorkerDiedError | None = None) -> Outc
     WorkerDiedError
         Its process died, and another attempt may succeed.
     """
-    if work.pool.many_machines and task.asset.is_robot:
+    elsewhere, spec = work.pool.many_machines, work.batch.spec
+    if elsewhere and task.asset.is_robot:
         return Outcome("failed", error="robots are not sent to other machines; leave out --ray", unusable=True)
     try:
-        request = _request(task, work)
+        path, files = (None, task.asset.files()) if elsewhere else (str(task.asset.path), {})
     except MeshFileError as error:
         return Outcome("failed", error=str(error), unusable=True)
-    outcome, last = _attempt(replace(request, fresh=died is not None), task, work)
-    if last is not None and died is None and not isinstance(last, MachineLostError | TimeLimitError):
+    name, stem = task.asset.name, PurePosixPath(task.asset.place).name
+    values = {"spec": asdict(spec), "path": path, "name": name, "stem": stem, "hull_only": False}
+    blobs = files | spec.network
+    request = Request(SERVER, values, blobs, work.batch.limits, spec.options["threads"], died is not None)
+    outcome, last = _attempt(request, task, work.pool)
+    if last is not None and died is None and not isinstance(last, TimeLimitError):
         raise last
-    if outcome.status == "failed" and not outcome.unusable and work.fallback:
-        outcome = _as_hull(outcome, replace(request, fresh=True), task, work, isinstance(last, TimeLimitError))
+    if outcome.status == "failed" and not outcome.unusable and work.batch.fallback:
+        outcome = _as_hull(outcome, request, task, work.pool, isinstance(last, TimeLimitError))
     deaths = [death for death in (died, last) if death is not None]
     if deaths:
         spent = outcome.timing.get("seconds", 0.0) + sum(death.seconds for death in deaths)
@@ -125,18 +120,10 @@ def process(task: Task, work: Work, died: WorkerDiedError | None = None) -> Outc
     return outcome
 
 
-def _request(task: Task, work: Work) -> Request:
-    """Make the request; for other machines it holds the mesh's files."""
-    brought, stem = work.pool.many_machines, PurePosixPath(task.asset.place).name
-    path, files = (None, task.asset.files()) if brought else (str(task.asset.path), {})
-    values = {"spec": asdict(work.spec), "path": path, "name": task.asset.name, "stem": stem, "hull_only": False}
-    return Request(SERVER, values, files, work.shared, work.limits, work.spec.options["threads"])
-
-
-def _attempt(request: Request, task: Task, work: Work) -> tuple[Outcome, WorkerDiedError | None]:
+def _attempt(request: Request, task: Task, pool: Pool) -> tuple[Outcome, WorkerDiedError | None]:
     """The outcome of one request, and how its process died."""
     try:
-        answer: Answer = work.pool.submit(request).result()
+        answer = pool.submit(request).result()
     except WorkerDiedError as died:
         return Outcome("failed", error=died.reason), died
     values = answer.values
@@ -154,11 +141,11 @@ def _status(report: dict[str, Any]) -> Status:
     return "warned" if report["warnings"] else "done"
 
 
-def _as_hull(failed: Outcome, request: Request, task: Task, work: Work, lost_time: bool) -> Outcome:
+def _as_hull(failed: Outcome, request: Request, task: Task, pool: Pool, lost_time: bool) -> Outcome:
     """The mesh as its convex hull; as it failed if that fails too."""
-    seconds = HULL_SECONDS if lost_time else max(work.limits.seconds, HULL_SECONDS)
-    limits, values = replace(work.limits, seconds=seconds), {**request.values, "hull_only": True}
-    hull, _ = _attempt(replace(request, values=values, limits=limits), task, work)
+    seconds = HULL_SECONDS if lost_time else max(request.limits.seconds, HULL_SECONDS)
+    limits, values = replace(request.limits, seconds=seconds), {**request.values, "hull_only": True}
+    hull, _ = _attempt(replace(request, values=values, limits=limits, fresh=True), task, pool)
     if hull.status == "failed":
         return failed
     return replace(hull, status="fallback", error=failed.error, timing={**hull.timing, **failed.timing})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from rlacd.batch.job_spec import POLICY, JobSpec
+from rlacd.batch.job_spec import NETWORK, JobSpec
 from rlacd.decompose_mesh import decompose, decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
@@ -26,7 +25,7 @@ from rlacd.io.robots.rewrite import rewrite
 from rlacd.io.robots.robot import Robot
 from rlacd.options.robots import RobotOptions
 from rlacd.plain_json import as_plain
-from rlacd.pool import Blobs, Shared
+from rlacd.pool import Blobs
 from rlacd.pool.process import peak_memory
 from rlacd.report import Report
 
@@ -35,55 +34,71 @@ SERVER = "rlacd.batch.server:MeshServer"
 STAND_IN = "The mesh was given its convex hull instead of a decomposition."
 
 
-def make(
-    spec: JobSpec, mesh: Path, stem: str, staging: Path, hull_only: bool
-) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Decompose a mesh file and write the requested files into a new folder.
+class MeshServer:
+    """Decomposes meshes; `staging` is a folder for temporary files."""
 
-    Parameters
-    ----------
-    spec : JobSpec
-    mesh : Path
-    stem : str
-        Name of the output file or folder.
-    staging : Path
-        An existing folder.
-    hull_only : bool
-        Compute the convex hull of all points instead, within the requested limits on hulls.
+    def __init__(self, staging: Path) -> None:
+        self._staging = staging
 
-    Returns
-    -------
-    dict
-        Facts about the result.
-    dict of bytes
-        The files by name relative to the staging folder; a file that refers to others comes last.
+    def __call__(self, values: dict[str, Any], blobs: Blobs) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Decompose a mesh; any error it causes becomes part of the answer.
 
-    Raises
-    ------
-    RlacdError
-        The mesh cannot be used, or its hulls cannot be written.
-    """
-    with TemporaryDirectory(dir=staging) as folder:
-        stage = robot_or_none(mesh) if spec.ending in STAGES and mesh.suffix.lower() in STAGES else None
-        if is_robot(mesh) or stage is not None:
-            ending = mesh.suffix if stage is None else spec.ending
-            facts = _robot(spec, stage or mesh, Path(folder, f"{stem}{ending}"), hull_only)
-            return facts, _files_in(Path(folder))
-        result = _hull(spec, mesh) if hull_only else decompose_quietly(mesh, **spec.options)
-        place = f"{folder}/{stem}{spec.ending or '/'}"
-        with warnings.catch_warnings(record=True) as doubts:
-            warnings.simplefilter("always", ImplausibleBodyWarning)
-            result.save(place, **spec.written)
-        files = _files_in(Path(folder))
+        Parameters
+        ----------
+        values : dict
+            ``spec``, as plain values; the mesh's ``path`` if it can be read from this machine; its ``name``, for
+            messages; the ``stem`` of its result, a file or a folder; and ``hull_only``, whether to compute the convex
+            hull of all points instead, within the limits on hulls that the options set.
+        blobs : dict of bytes
+            The files of the mesh (`rlacd.io.read.beside.mesh_files`), if it cannot be read from this machine; and
+            `JobSpec.network`.
+
+        Returns
+        -------
+        dict
+            ``report``; or ``error``, and ``unusable``, whether the mesh is at fault. Always ``seconds``, ``cpu`` and
+            ``peak_mb``, the peak of this process so far.
+        dict of bytes
+            The files to write, by name; a file that refers to others comes last.
+        """
+        wall, cpu = time.perf_counter(), time.process_time()
+        files: dict[str, bytes] = {}
+        with TemporaryDirectory(dir=self._staging) as source, TemporaryDirectory(dir=self._staging) as made:
+            laid = None if values["path"] else lay_out(blobs, Path(source))
+            path = (laid or Path(values["path"])).absolute()  # as messages name it
+            try:
+                spec = self._spec(values["spec"], blobs)
+                answer: dict[str, Any] = {"report": _write(spec, path, Path(made, values["stem"]), values["hull_only"])}
+                files = _files_in(Path(made))
+            except Exception as error:
+                said = sentence_of(error).replace(f"{path.parent}{os.sep}", values["name"].removesuffix(path.name))
+                said = said.replace(str(self._staging), "")
+                answer = {"error": said, "unusable": isinstance(error, MeshError)}
+        spent = {"seconds": round(time.perf_counter() - wall, 4), "cpu": round(time.process_time() - cpu, 4)}
+        return {**answer, **spent, "peak_mb": peak_memory() // 2**20}, files
+
+    def _spec(self, plain: dict[str, Any], blobs: Blobs) -> JobSpec:
+        spec = JobSpec(**plain)
+        if NETWORK not in blobs:
+            return spec
+        network = self._staging / f"{spec.weights}.npz"  # kept, so that it is read only once
+        if not network.exists():
+            network.write_bytes(blobs[NETWORK])
+        return replace(spec, options={**spec.options, "policy": str(network)})
+
+
+def _write(spec: JobSpec, mesh: Path, place: Path, hull_only: bool) -> dict[str, Any]:
+    """Decompose a mesh file and write its result to a place, which has no ending yet; returns facts about it."""
+    stage = robot_or_none(mesh) if spec.ending in STAGES and mesh.suffix.lower() in STAGES else None
+    if is_robot(mesh) or stage is not None:
+        ending = mesh.suffix if stage is None else spec.ending
+        return _robot(spec, stage or mesh, Path(f"{place}{ending}"), hull_only)
+    result = _hull(spec, mesh) if hull_only else decompose_quietly(mesh, **spec.options)
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always", ImplausibleBodyWarning)
+        result.save(f"{place}{spec.ending or '/'}", **spec.written)
     facts = _summary(result.report)
-    return facts | {"warnings": [*facts["warnings"], *(str(doubt.message) for doubt in doubts)]}, files
-
-
-def _files_in(folder: Path) -> dict[str, bytes]:
-    """Read all files, those in folders first: others refer to them."""
-    paths = sorted(path for path in folder.rglob("*") if path.is_file())
-    paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+    return facts | {"warnings": [*facts["warnings"], *(str(doubt.message) for doubt in doubts)]}
 
 
 def _robot(spec: JobSpec, robot: Path | Robot, place: Path, hull_only: bool) -> dict[str, Any]:
@@ -145,61 +160,8 @@ def _missed(report: Report) -> str | None:
     return None if missed is None else report.unit_in_frame.words(missed)
 
 
-class MeshServer:
-    """Decomposes meshes.
-
-    Parameters
-    ----------
-    staging : Path
-        A folder for temporary files.
-    """
-
-    def __init__(self, staging: Path) -> None:
-        self._staging = staging
-
-    def __call__(
-        self, values: dict[str, Any], blobs: Blobs, shared: Mapping[str, Shared]
-    ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Decompose a mesh; any error it causes becomes part of the answer.
-
-        Parameters
-        ----------
-        values : dict
-            ``spec``, as plain values; the mesh's ``path`` if it can be read from this machine; its ``name``, for
-            messages; the ``stem`` of its result, and ``hull_only``: see `make`.
-        blobs : dict of bytes
-            The files of the mesh (`rlacd.io.read.beside.mesh_files`), if it cannot be read from this machine.
-        shared : dict of Shared
-            See `JobSpec.shared`.
-
-        Returns
-        -------
-        dict
-            ``report``; or ``error``, and ``unusable``, whether the mesh is at fault. Always ``seconds``, ``cpu`` and
-            ``peak_mb``, the peak of this process so far.
-        dict of bytes
-            The files to write.
-        """
-        wall, cpu = time.perf_counter(), time.process_time()
-        files: dict[str, bytes] = {}
-        with TemporaryDirectory(dir=self._staging) as folder:
-            path = (lay_out(blobs, Path(folder)) if blobs else Path(values["path"])).absolute()  # as messages name it
-            try:
-                spec = self._spec(values["spec"], shared)
-                report, files = make(spec, path, values["stem"], self._staging, values["hull_only"])
-                answer: dict[str, Any] = {"report": report}
-            except Exception as error:
-                said = sentence_of(error).replace(f"{path.parent}{os.sep}", values["name"].removesuffix(path.name))
-                said = said.replace(str(self._staging), "")
-                answer = {"error": said, "unusable": isinstance(error, MeshError)}
-        spent = {"seconds": round(time.perf_counter() - wall, 4), "cpu": round(time.process_time() - cpu, 4)}
-        return {**answer, **spent, "peak_mb": peak_memory() // 2**20}, files
-
-    def _spec(self, plain: dict[str, Any], shared: Mapping[str, Shared]) -> JobSpec:
-        spec = JobSpec(**plain)
-        if POLICY not in shared:
-            return spec
-        network = self._staging / f"{shared[POLICY].key}.npz"  # kept, so that it is read only once
-        if not network.exists():
-            network.write_bytes(shared[POLICY].blobs["network"])
-        return replace(spec, options={**spec.options, "policy": str(network)})
+def _files_in(folder: Path) -> dict[str, bytes]:
+    """Read all files, those in folders first: others refer to them."""
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    paths.sort(key=lambda path: -len(path.relative_to(folder).parts))
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}

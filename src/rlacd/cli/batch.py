@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,12 +37,18 @@ class BatchOptions:
         flags=("--output", "-o"),
         metavar="OUT",
         usual="",
-        help="Where the results go: a folder, or an address that fsspec knows (s3://bucket/path). Required.",
+        help="The folder of the results. Required.",
     )
     glob: str = option(
         "**", usual="", help="Only meshes that match: 'chair_*.obj' in any folder, 'furniture/*' by the whole path."
     )
     fallback: bool = option(True, usual="fallback", help="Give a mesh that fails its convex hull.")
+    shard: str = option(
+        "1/1",
+        metavar="K/N",
+        usual="",
+        help="Only the K-th of N parts of the meshes: one run for each K, on machines that share a disk.",
+    )
     folders: bool = option(False, help="Write a folder for each mesh, with a file for each hull.")
     redo: Redo = option("none", one_of=Redo, help="Which meshes to do again: none, those that failed (failed), or all.")
     file_type: str | None = option(
@@ -55,11 +62,20 @@ class BatchOptions:
     dry_run: bool = option(False, help="List the meshes that would be decomposed, and write nothing.")
 
     def __post_init__(self) -> None:
-        if self.output in ("", "-"):
+        if self.output in ("", "-") or "://" in self.output:
             raise OptionError(
-                "a batch needs -o with a folder for its results, or an address; it is not written to stdout."
+                "a batch needs -o with a folder for its results; to stdout or an address it cannot write."
             )
         check_fields(self)
+        self.part()
+
+    def part(self) -> tuple[int, int]:
+        """K and N of the shard."""
+        found = re.fullmatch(r"([1-9]\d{0,8})/([1-9]\d{0,8})", self.shard)
+        part, parts = map(int, found.groups()) if found else (1, 0)
+        if part > parts:
+            raise OptionError(f"--shard is {self.shard!r}; it has to be K/N, from 1/N to N/N, such as 3/16.")
+        return part, parts
 
 
 def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
@@ -70,7 +86,7 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
       rlacd batch assets/ -o hulls/
       rlacd batch assets/ -o hulls/ --glob 'furniture/*.obj' --preset mujoco --jobs 8
       rlacd batch assets/ -o hulls/ --dry-run
-      rlacd batch assets/ -o s3://bucket/hulls --ray auto
+      rlacd batch assets/ -o hulls/ --shard 3/16
 
     A mesh whose process dies or needs too much memory is tried once more. If that fails too, or the mesh takes longer
     than --limit, it is given its convex hull. OUT/manifest.jsonl records the outcome of each mesh. To resume after an
@@ -88,7 +104,7 @@ def _batch(assets: Path, quiet: bool | None, **given: Any) -> None:
     written = {"file_type": own.file_type, **{name: given.pop(name) for name in WRITTEN}}
     options = decompose_options({**given, "threads": own.threads})
     spec = JobSpec.of(options, folders=own.folders, **written)
-    work = Batch(assets, own.output, spec, where.limits(), own.fallback, own.glob, own.redo)
+    work = Batch(assets, Path(own.output), spec, where.limits(), own.fallback, own.glob, own.redo, own.part())
     if own.dry_run:
         _print_plan(work)
     else:
@@ -120,7 +136,7 @@ def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
     ):
         summary = batch.run(pool, screen, stop)
     if not quiet:
-        say("\n".join(summary_lines(summary, batch.out)))
+        say("\n".join(summary_lines(summary, str(batch.out))))
     if summary.stopped:
         raise SystemExit(ExitCode.STOPPED_EARLY)
     if summary.failures:

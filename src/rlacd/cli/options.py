@@ -13,10 +13,12 @@ import click
 from rlacd._version import __version__
 from rlacd.cli.commands import Option, chosen, options_of
 from rlacd.errors import OptionError
-from rlacd.options import LENGTHS, OPTION_NAMES, RUN, Options, with_criterion
+from rlacd.options import OPTION_NAMES, Options
+from rlacd.options.criterion import with_criterion
 from rlacd.options.fields import check_fields, number, option, shown, stated
 from rlacd.options.lengths import read_lengths
 from rlacd.options.navigable import NavigableSpace
+from rlacd.options.ranges import LENGTHS, RUN
 
 if TYPE_CHECKING:
     from rlacd.pool import Pool, ProcessLimits

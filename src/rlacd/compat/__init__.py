@@ -21,11 +21,7 @@ def warn_unused(function: Callable[..., Any], given: Mapping[str, Any], reasons:
     """Warn about the options in `reasons` that differ from their default, each once per process."""
     for name, reason in reasons.items():
         default, known = inspect.signature(function).parameters[name].default, (function.__name__, name)
-        if not _same(given[name], default) and known not in _WARNED:
+        same = isinstance(given[name], (str, bool, int, float)) and given[name] == default  # an array never is
+        if not same and known not in _WARNED:
             _WARNED.add(known)
             warnings.warn(f"{function.__name__}: rlacd ignores {name}: {reason}.", UnusedOptionWarning, stacklevel=3)
-
-
-def _same(given: Any, default: Any) -> bool:
-    """Tell whether an option has its default value; an array never does."""
-    return isinstance(given, (str, bool, int, float)) and bool(given == default)

@@ -20,8 +20,8 @@ from rlacd.decompose_mesh import decompose
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write.target import checked_place
-from rlacd.options import LENGTHS
 from rlacd.options.fields import flag, integer, number, one_of, read
+from rlacd.options.ranges import LENGTHS
 
 __all__ = ["Mesh", "run_coacd", "set_log_level"]
 
@@ -29,10 +29,7 @@ UNUSED = {
     "preprocess_mode": "it repairs bodies that are not closed, and no others",
     "preprocess_resolution": "it does not remesh the input",
     "resolution": "it bounds distances instead of sampling them",
-    **dict.fromkeys(
-        ("mcts_nodes", "mcts_iterations", "mcts_max_depth"),
-        "it has no tree search; rlacd.decompose(quality='best') searches in another way",
-    ),
+    **dict.fromkeys(("mcts_nodes", "mcts_iterations", "mcts_max_depth"), "it searches by other means: quality='best'"),
     "pca": "it tries planes along the principal axes anyway",
 }
 
@@ -106,7 +103,6 @@ def run_coacd(
     warn_unused(run_coacd, locals(), UNUSED)
     apx_mode = read(one_of(("ch", "box")), "apx_mode", apx_mode)
     threshold = read(number(above=0), "threshold", threshold)
-    most_hulls = read(integer(-(2**31)), "max_convex_hull", max_convex_hull)
     decimate, real_metric = read(flag(), "decimate", decimate), read(flag(), "real_metric", real_metric)
     extrude, margin = read(flag(), "extrude", extrude), read(number(0.0), "extrude_margin", extrude_margin)
     result = decompose(
@@ -114,7 +110,9 @@ def run_coacd(
         criterion="concavity",
         threshold=None if real_metric else max(threshold, LENGTHS["threshold"][0]),
         threshold_abs=threshold if real_metric else None,
-        max_hulls=None if most_hulls < 1 else most_hulls,
+        max_hulls=most_hulls
+        if (most_hulls := read(integer(-(2**31)), "max_convex_hull", max_convex_hull)) > 0
+        else None,
         max_vertices=read(integer(4), "max_ch_vertex", max_ch_vertex) if decimate else None,
         overlap=min(2 * margin, LENGTHS["overlap"][1]) if extrude else 0.0,
         merge=merge,
@@ -129,7 +127,6 @@ def set_log_level(level: str) -> None:
 
 
 ENDINGS = (".obj", ".glb", ".ply", ".stl", ".off")
-"""Of the files that its command writes here."""
 
 FLAGS: dict[str, str] = {
     **{"-t --threshold": "threshold", "-pm --preprocess-mode": "preprocess_mode", "-r --resolution": "resolution"},

@@ -67,11 +67,10 @@ convexhullApproximation, physicsClientId
         Accepted but unused; a warning explains this once.
     """
     warn_unused(vhacd, locals(), _UNUSED)
-    concavity = read(number(0), "concavity", concavity)
     result = decompose(
         fileNameIn,
         criterion="volume",
-        volume_tolerance=min(max(concavity * _hull_share(fileNameIn), 1e-4), 10.0),
+        volume_tolerance=min(max(read(number(0), "concavity", concavity) * _hull_share(fileNameIn), 1e-4), 10.0),
         volume_of="whole",
         max_vertices=read(integer(4), "maxNumVerticesPerCH", maxNumVerticesPerCH),
     )

@@ -1,7 +1,6 @@
 """trimesh's convex decomposition, done by rlacd.
 
-trimesh offers no way to register a backend other than vhacdx. To make ``mesh.convex_decomposition()`` use rlacd
-throughout a program, replace its function once::
+To make ``mesh.convex_decomposition()`` use rlacd throughout a program, replace its function once::
 
     import trimesh.decomposition
     from rlacd.compat.trimesh import convex_decomposition
@@ -21,8 +20,6 @@ from rlacd.compat.vhacd import compute_vhacd
 from rlacd.decompose_mesh import decompose
 
 __all__ = ["convex_decomposition"]
-
-_VHACD = frozenset(inspect.signature(compute_vhacd).parameters)
 
 
 def convex_decomposition(mesh: trimesh.Trimesh, **kwargs: Any) -> list[dict[str, Any]]:
@@ -46,6 +43,6 @@ def convex_decomposition(mesh: trimesh.Trimesh, **kwargs: Any) -> list[dict[str,
     MeshError, OptionError
         As raised by those functions.
     """
-    if not _VHACD.isdisjoint(kwargs):
+    if kwargs.keys() & inspect.signature(compute_vhacd).parameters.keys():
         return [{"vertices": v, "faces": f} for v, f in compute_vhacd(mesh.vertices, mesh.faces, **kwargs)]
     return [{"vertices": np.array(hull.vertices), "faces": np.array(hull.faces)} for hull in decompose(mesh, **kwargs)]

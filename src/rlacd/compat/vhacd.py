@@ -18,11 +18,10 @@ from rlacd.options.fields import flag, integer, number, read
 __all__ = ["compute_vhacd"]
 
 _UNUSED = {
-    "resolution": "it uses no voxels",
+    **dict.fromkeys(("resolution", "minEdgeLength"), "it uses no voxels"),
     "maxRecursionDepth": "it cuts until every part is tight",
     "shrinkWrap": "its hulls lie on the mesh anyway",
     "fillMode": "it repairs meshes that are not closed",
-    "minEdgeLength": "it uses no voxels",
     "findBestPlane": "it always searches for the best plane",
 }
 
@@ -48,8 +47,7 @@ def compute_vhacd(
     points : array-like [V, 3]
         Vertices.
     faces : array-like [F, 3] or flat
-        Triangles; or one row of numbers: ``3, a, b, c, 3, a, b, c, ...`` as vhacdx takes them, or ``a, b, c, a, b, c,
-        ...`` as its README says (0.1.1 itself makes nothing useful of these).
+        Triangles; or one row: ``3, a, b, c, 3, ...`` as vhacdx takes them, or ``a, b, c, a, ...`` as its README says.
     maxConvexHulls : int
         Maximum number of hulls.
     maxNumVerticesPerCH : int

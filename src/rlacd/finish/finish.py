@@ -21,9 +21,9 @@ from rlacd.criteria.limited import limited_part
 from rlacd.find_parts import Reached
 from rlacd.finish.report import make_report
 from rlacd.fit import RESOLVED
-from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
+from rlacd.options.ranges import SIMPLE
 from rlacd.report import COVERAGE_TOLERANCE, Overlap, Report
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray

@@ -26,7 +26,6 @@ from rlacd.learn.rollouts import Rollouts
 from rlacd.policies.encoder import Encoder
 from rlacd.policies.network import KIND, Network
 from rlacd.policies.points import PointEncoder
-from rlacd.pool import Shared
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 
 HIDDEN, SHARED = (1024, 512, 256, 128), (128, 128)
@@ -196,11 +195,11 @@ class DQN:
         thousands = (self.env_steps - self.options.learning_starts) // 1000
         return 1.0 if thousands < 0 else self.options.epsilon * self.options.epsilon_decay**thousands
 
-    def acting(self) -> tuple[Shared | None, float]:
+    def acting(self) -> tuple[bytes | None, float]:
         """How new episodes are played; see `Rollouts.begin`."""
         if self.env_steps < self.options.learning_starts:
             return None, self.epsilon
-        return Shared({"network": plain(self.playing).to_bytes()}), self.epsilon
+        return plain(self.playing).to_bytes(), self.epsilon
 
     def learn_from(self, episode: Episode) -> None:
         """Keep an episode, and learn as often as its cuts ask for."""

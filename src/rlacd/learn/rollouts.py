@@ -25,7 +25,7 @@ from rlacd.learn.meshes import TURNS, Solids, turned
 from rlacd.learn.options import TrainOptions
 from rlacd.policies.encoder import Encoder
 from rlacd.policies.network import Network, parse_network
-from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, Shared, WorkerDiedError
+from rlacd.pool import Answer, Blobs, Pool, ProcessLimits, Request, WorkerDiedError
 from rlacd.solid.component import Component
 
 LOST_IN_A_ROW = 10
@@ -56,11 +56,11 @@ class Rollouts:
     ) -> None:
         self._pool, self._solids, self._names, self._options = pool, solids, names, options
         self._limits, self._say = limits, say
-        self._setting = Shared({"encoder": pickle.dumps(encoder), "options": pickle.dumps(options)})
+        self._setting = pickle.dumps((options, encoder))
         self._ahead: deque[tuple[int, str, Future[Answer]] | Episode] = deque()
         self._begun = self._without_cuts = self._lost = 0
 
-    def begin(self, network: Shared | None, epsilon: float) -> None:
+    def begin(self, network: bytes | None, epsilon: float) -> None:
         """Start episodes until the required number is ahead.
 
         `network` is the file of the one that chooses cuts, None for random cuts; a share `epsilon` is random anyway.
@@ -101,15 +101,15 @@ class Rollouts:
         self._begun, ahead, self._without_cuts = (int(count) for count in arrays["counts"])
         self._ahead = deque(Episode.from_bytes(arrays[f"ahead.{i}"].tobytes()) for i in range(ahead))
 
-    def _start(self, number: int, network: Shared | None, epsilon: float) -> tuple[int, str, Future[Answer]]:
+    def _start(self, number: int, network: bytes | None, epsilon: float) -> tuple[int, str, Future[Answer]]:
         options = self._options
         rng = np.random.default_rng([options.seed, 1, number])  # 1 draws the mesh, 2 the cuts
         name, axis, turn = self._names[int(rng.integers(len(self._names)))], int(rng.integers(3)), int(rng.integers(4))
         values = {"name": name, "axis": axis, "degrees": TURNS[turn] if options.rotate else 0.0}
         values |= {"epsilon": epsilon, "seed": [options.seed, 2, number]}
-        shared = {"setting": self._setting} | ({} if network is None else {"network": network})
-        blobs = {"solid": self._solids.packed(name)}
-        request = Request(SERVER, values, blobs, shared, self._limits, tries=2)
+        blobs = {"solid": self._solids.packed(name), "setting": self._setting}
+        blobs |= {} if network is None else {"network": network}
+        request = Request(SERVER, values, blobs, self._limits, tries=2)
         return number, name, self._pool.submit(request)
 
     def _played(self, episode: tuple[int, str, Future[Answer]] | Episode) -> Episode:
@@ -132,24 +132,22 @@ class RolloutServer:
     """Plays episodes in a process of the pool."""
 
     def __init__(self, staging: Path) -> None:
-        self._setting = self._key = ""
+        self._setting = self._weights = b""
         self._options: TrainOptions
         self._encoder: Encoder
         self._network: Network
         self._known: OrderedDict[str, tuple[Component, Memory]] = OrderedDict()
 
-    def __call__(
-        self, values: dict[str, Any], blobs: Blobs, shared: Mapping[str, Shared]
-    ) -> tuple[dict[str, Any], dict[str, bytes]]:
+    def __call__(self, values: dict[str, Any], blobs: Blobs) -> tuple[dict[str, Any], dict[str, bytes]]:
         """Play an episode of the ``solid``, packed by `Solids`; ``setting`` is pickled by the trainer itself."""
-        self._take_over(shared)
+        self._take_over(blobs)
         key = f"{values['name']} {values['axis'] if values['degrees'] else 0} {values['degrees']}"
         known = self._known.pop(key) if key in self._known else None
         component, memory = known or (turned(blobs["solid"], values["axis"], values["degrees"]), Memory())
         env = None if component is None else CutEnv(component, Concavity(self._options.threshold), memory)
         if component is None or env is None or not env.unfinished or len(env.all) > self._options.max_parts:
             return {}, {"episode": Episode.empty("nothing").to_bytes()}
-        network = self._network if "network" in shared else None
+        network = self._network if "network" in blobs else None
         rng = np.random.default_rng(values["seed"])
         episode = Player(env, self._options, self._encoder, network, values["epsilon"], rng).play()
         self._known[key] = component, memory
@@ -157,12 +155,12 @@ class RolloutServer:
             self._known.popitem(last=False)
         return {}, {"episode": episode.to_bytes()}
 
-    def _take_over(self, shared: Mapping[str, Shared]) -> None:
-        """Rebuild whatever changed in the shared data since the last request."""
-        setting = shared["setting"]
-        if setting.key != self._setting:
-            self._options, self._encoder = (pickle.loads(setting.blobs[name]) for name in ("options", "encoder"))
-            self._setting, self._key = setting.key, ""
+    def _take_over(self, blobs: Blobs) -> None:
+        """Rebuild whatever changed since the last request."""
+        if blobs["setting"] != self._setting:
+            self._setting, self._weights = blobs["setting"], b""
+            self._options, self._encoder = pickle.loads(self._setting)
             self._known.clear()
-        if "network" in shared and shared["network"].key != self._key:
-            self._network, self._key = parse_network(shared["network"].blobs["network"]), shared["network"].key
+        if blobs.get("network", self._weights) != self._weights:
+            self._weights = blobs["network"]
+            self._network = parse_network(self._weights)

@@ -9,137 +9,44 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, cast
+from typing import Any, Literal, cast
 
 from rlacd.errors import OptionError
-from rlacd.options.fields import (
-    about,
-    check_fields,
-    custom,
-    integer,
-    number,
-    one_of,
-    option,
-    read,
-    shown,
-    stated,
-)
+from rlacd.options.criterion import CRITERIA, CRITERION, OWN
+from rlacd.options.fields import check_fields, number, option, shown, stated
 from rlacd.options.keywords import check_names
 from rlacd.options.lengths import LENGTH, as_given, in_unit, read_lengths, relative, unit_of
-from rlacd.options.names import (
-    POLICIES,
-    PRIMITIVE_KINDS,
-    PrimitiveKind,
-    mesh_name,
-    policy_name,
-    read_meshes,
-    read_policy,
-    read_primitives,
-)
+from rlacd.options.names import PrimitiveKind, mesh_name, policy_name
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import OutputOptions
 from rlacd.options.presets import PRESETS, HullLimits, PresetName, find_preset
-
-CRITERIA = {
-    "concavity": ("threshold",),
-    "distance": ("threshold",),
-    "volume": ("volume_tolerance",),
-    "navigable": ("radius", "tolerance"),
-}
-"""Each criterion by its name, with the numbers that say how tight it is."""
-
-VolumeOf = Literal["part", "whole"]
-OpeningsName = Literal["auto", "small", "solid", "thin"]
-DetailName = Literal["simple", "full"]
-QualityName = Literal["fast", "balanced", "best"]
-RelativeTo = Literal["scene", "node", "mesh"]
-UnitName = Literal["mm", "cm", "m", "in", "file"]
-
-MeshLike: TypeAlias = Any
-"""Stands for what `rlacd.decompose` takes as a mesh."""
-
-Policy: TypeAlias = Any
-"""Stands for `rlacd.Policy`, an object with a method `choose`: policies are built on top of options."""
-
-SIMPLE: Literal["simple"] = "simple"
-FAST: Literal["fast"] = "fast"
-
-RESOLUTIONS = (20, 400)
-"""Fewest and most cells along a side of the grid on which repair looks for voids: with fewer, a wrap drawn onto the
-surface folds over itself; more would take over 4 GB."""
-
-GAPS = (0.01, 0.3)
-"""Where the longest side is 2: smaller balls would need more than `RESOLUTIONS` cells, larger ones close what a body is
-made of."""
-
-LENGTHS = {"threshold": (0.001, 2.0), "overlap": (0.0, 0.5)}
-"""Bounds, where the longest side is 2, of options that may also be given in the input's unit, under their name and
-``_abs``. A hull farther from its
-part than the largest threshold does not fit into the frame; hulls that overlap by more are hardly parts."""
-
-RADII = (0.004, 2.0)
-"""Bounds of the radius of a ball that has to pass, where the longest side is 2: narrower passages are not found."""
-
-TIGHT, LIMITS, METHOD, RUN = "How tight", "Limits", "Method", "Running"
-"""Headings of the command's help."""
-
-
-def _criterion(given: Any) -> Any:
-    if isinstance(given, Mapping):
-        return NavigableSpace(**given)
-    return given if isinstance(given, NavigableSpace) else one_of(NAMED).read(given)
-
-
-_OWN = {"threshold": ("threshold", "threshold_abs"), "volume_tolerance": ("volume_tolerance", "volume_of")}
-"""Options that only criteria with the number of that name take."""
-
-NAMED = tuple(name for name in CRITERIA if name != "navigable")
-"""Criteria whose numbers are options of a decomposition themselves."""
-
-_CRITERION = custom(f"{', '.join(NAMED)} or an `rlacd.NavigableSpace`", _criterion, " ".join(CRITERIA))
-_PRIMITIVES = custom(
-    f"all (True), or some of {', '.join(PRIMITIVE_KINDS)}", read_primitives, f"all {' '.join(PRIMITIVE_KINDS)}"
+from rlacd.options.ranges import (
+    AVOIDED,
+    CORNERS,
+    FACTOR,
+    FAST,
+    GAPS,
+    LENGTHS,
+    LIMITS,
+    METHOD,
+    OPENNESS,
+    POLICY,
+    PRIMITIVES,
+    RADII,
+    RESOLUTIONS,
+    RUN,
+    SECONDS,
+    SIMPLE,
+    TIGHT,
+    DetailName,
+    MeshLike,
+    OpeningsName,
+    Policy,
+    QualityName,
+    RelativeTo,
+    UnitName,
+    VolumeOf,
 )
-_POLICY = custom(
-    f"one of {', '.join(POLICIES)}, an .npz file, or (in Python) an object with a method `choose`",
-    read_policy,
-    "greedy navacd learned rl-acd FILE.npz …",
-)
-_AVOIDED = custom("a list of meshes or of paths of meshes", read_meshes)
-_CORNERS = integer(4, rule="an integer, at least 4 (a tetrahedron)")
-_OPENNESS = number(
-    *(0.1, 0.99),
-    rule="a number between 0.1 and 0.99, a share of each passage's radius; a radius is keep_open_abs "
-    "(--keep-open 2mm or --keep-open-abs)",
-    typed=str,
-)
-_SECONDS = number(above=0, rule="a positive number of seconds")
-_FACTOR = number(above=0, rule="a positive factor")
-
-
-def with_criterion(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Get arguments of `rlacd.decompose` from flat ones: the criterion by its name, the options of a space beside it.
-
-    Raises
-    ------
-    OptionError
-        There is no criterion of this name, or an option belongs to another.
-    """
-    own = {field.name for field in dataclasses.fields(NavigableSpace)}
-    space = {name: value for name, value in given.items() if name in own}
-    given = {name: value for name, value in given.items() if name not in own}
-    name = given.get("criterion")
-    if name is not None:
-        read(one_of(CRITERIA, rule="concavity, distance, volume or navigable"), "criterion", name)
-    if name == "navigable":
-        return given | {"criterion": NavigableSpace(**space)}
-    if name == "volume" and "tolerance" in space:
-        given["volume_tolerance"] = space.pop("tolerance")
-    for word, value in space.items():
-        yes, _, no = about(NavigableSpace, word).flags[0].partition("/")
-        needed = "volume or navigable" if word == "tolerance" else "navigable"
-        raise OptionError(f"{no if value is False else yes} needs --criterion {needed}.")
-    return given
 
 
 @stated()
@@ -156,7 +63,7 @@ class Options:
     criterion: Literal["concavity", "distance", "volume"] | NavigableSpace | None = option(
         None,
         TIGHT,
-        _CRITERION,
+        CRITERION,
         metavar="|".join(CRITERIA),
         usual="concavity; distance with a length as the threshold",
         help="""When a hull is tight enough: distance: its surface and the mesh's lie at most --threshold apart;
@@ -215,7 +122,7 @@ class Options:
     max_vertices: int | None = option(
         None,
         LIMITS,
-        _CORNERS,
+        CORNERS,
         help="""At most this many vertices per hull, such as 64 for PhysX on a GPU; a low limit takes up to
         twice the hulls, or exceeds the threshold and says so.
 
@@ -227,7 +134,7 @@ class Options:
     max_faces: int | None = option(
         None,
         LIMITS,
-        _CORNERS,
+        CORNERS,
         help="At most this many triangles per hull; a low limit acts as a low limit on vertices.",
     )
     detail: DetailName = option(
@@ -240,7 +147,7 @@ class Options:
     primitives: bool | Sequence[PrimitiveKind] = option(
         (),
         LIMITS,
-        _PRIMITIVES,
+        PRIMITIVES,
         metavar="all|box,sphere,…",
         usual="none",
         help="""Parts become a box, sphere, capsule or cylinder where one meets the criterion; written as such
@@ -265,7 +172,7 @@ class Options:
     keep_open: float | None = option(
         None,
         LIMITS,
-        _OPENNESS,
+        OPENNESS,
         metavar="NUMBER",
         usual="passages may close",
         help="""Passages stay open: in a hole, slot or mouth that holds a ball of at least --threshold in
@@ -286,7 +193,7 @@ class Options:
     avoid: Sequence[MeshLike] = option(
         (),
         LIMITS,
-        _AVOIDED,
+        AVOIDED,
         metavar="FILE",
         usual="nothing",
         repeated=True,
@@ -303,7 +210,7 @@ class Options:
     policy: str | Policy | None = option(
         None,
         METHOD,
-        _POLICY,
+        POLICY,
         metavar="NAME",
         usual="greedy; learned with --no-merge",
         help="""What chooses the next cut: navacd is the quickest, learned and rl-acd ask networks; FILE.npz is
@@ -358,7 +265,7 @@ class Options:
     timeout: float | None = option(
         None,
         RUN,
-        _SECONDS,
+        SECONDS,
         metavar="SECONDS",
         help="""Stop after this time and keep the result so far.
 
@@ -382,7 +289,7 @@ class Options:
     budget: float | None = option(
         None,
         METHOD,
-        _SECONDS,
+        SECONDS,
         usual="5 with --quality best",
         metavar="SECONDS",
         help="""How long the search may take.
@@ -436,7 +343,7 @@ class Options:
     scale: float | None = option(
         None,
         METHOD,
-        _FACTOR,
+        FACTOR,
         usual="1",
         help="""Multiply the mesh's coordinates by this.
 
@@ -476,7 +383,7 @@ class Options:
 
     def _overridden(self) -> Iterator[tuple[str, str]]:
         """Options that have no effect beside others, and what they have to be instead."""
-        for needed, names in _OWN.items():
+        for needed, names in OWN.items():
             instead = " and ".join(word.removeprefix("volume_") for word in self.numbers)
             if needed not in self.numbers:
                 yield from ((n, f"left out: the criterion {self.criterion_name} has {instead} instead") for n in names)
@@ -490,7 +397,7 @@ class Options:
         shares = [name for name in LENGTHS if getattr(self, f"{name}_abs") is None and getattr(self, name) > 0]
         if not self.per_node:
             yield "relative_to", "left out without per_node"
-        elif not [name for name in shares if name not in _OWN or name in self.numbers]:
+        elif not [name for name in shares if name not in OWN or name in self.numbers]:
             yield "relative_to", "left out: every length is in the mesh's unit"
         if self.quality == FAST:
             for name in ("budget", "search_steps"):
@@ -595,7 +502,7 @@ class Options:
         """
         of_scene, lengths = self.at_scale(scene), {}
         for name, (least, most) in LENGTHS.items():
-            if name in _OWN and name not in self.numbers:
+            if name in OWN and name not in self.numbers:
                 continue
             if self.relative_to == "scene" or getattr(self, f"{name}_abs") is not None:
                 lengths[name] = min(max(getattr(of_scene, name) * node / scene, least), most)

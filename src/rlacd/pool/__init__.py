@@ -10,7 +10,6 @@ the children of a process (pebble). Here every process has its own pipe, so that
 
 from __future__ import annotations
 
-import uuid
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -37,16 +36,6 @@ class ProcessLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
-    """Bytes that many requests need: each process receives them once."""
-
-    blobs: Blobs
-    """The bytes by name."""
-    key: str = field(default_factory=lambda: uuid.uuid4().hex)
-    """Identifies the content."""
-
-
-@dataclass(frozen=True, eq=False)
 class Request:
     """A job for a pool. It must be a pure function of its fields, since it may run twice."""
 
@@ -54,8 +43,6 @@ class Request:
     """``module:name`` of a factory that makes the `Server`."""
     values: Values
     blobs: Blobs = field(default_factory=dict)
-    shared: Mapping[str, Shared] = field(default_factory=dict)
-    """Inputs of the server; a process keeps shared data as long as requests name it."""
     limits: ProcessLimits = field(default_factory=ProcessLimits)
     """Limits; the process is ended when it exceeds them."""
     threads: int = 1
@@ -78,7 +65,7 @@ class Answer:
     """Process and machine."""
 
 
-Server: TypeAlias = Callable[[Values, Blobs, Mapping[str, Shared]], tuple[Values, dict[str, bytes]]]
+Server: TypeAlias = Callable[[Values, Blobs], tuple[Values, dict[str, bytes]]]
 """Answers requests. An `RlacdError` that it raises is passed on to the caller; any other exception ends its process."""
 
 MakeServer: TypeAlias = Callable[[Path], Server]
@@ -111,10 +98,6 @@ class WorkerDiedError(Exception):
 
 class TimeLimitError(WorkerDiedError):
     """A process was ended because it took too long: it would again, so it gets no second try."""
-
-
-class MachineLostError(WorkerDiedError):
-    """The request was lost with its machine, again and again."""
 
 
 class Pool(AbstractContextManager["Pool"]):

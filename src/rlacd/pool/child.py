@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO
 
 from rlacd.errors import DecompositionWarning, RlacdError
-from rlacd.pool import Blobs, MakeServer, Shared, Values
+from rlacd.pool import Blobs, MakeServer, Values
 
 READY = {"ready": True}
 """Header of the first message, sent when requests may come."""
@@ -99,16 +99,11 @@ def main() -> None:
     threading.Thread(target=listen, daemon=True).start()
     serve = find_server(sys.argv[1])(Path(sys.argv[2]))
     send(answers, READY, {})
-    shared: dict[str, Shared] = {}
     while True:
         header, blobs = messages.get()
-        if header["shares"]:
-            shared[header["shares"]] = Shared(blobs, header["key"])
-            continue
-        shared = {name: shared[name] for name in header["shared"]}
         faulthandler.dump_traceback_later(min(header["seconds"] + END_SECONDS, threading.TIMEOUT_MAX - 1), exit=True)
         try:
-            values, files = serve(header["values"], blobs, shared)
+            values, files = serve(header["values"], blobs)
         except RlacdError as error:
             send(answers, {"error": [type(error).__name__, str(error)]}, {})
         else:

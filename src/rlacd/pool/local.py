@@ -42,7 +42,6 @@ class _Child:
         temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), self.folder.name)  # a library's report of its crash too
         environment = {"OMP_NUM_THREADS": "1", **temporary}
         self.process = start(command, subprocess.PIPE, subprocess.PIPE, self.stderr, environment)
-        self.given: dict[str, str] = {}  # keys of the shared data it has
         self.messages: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
@@ -58,16 +57,11 @@ class _Child:
             self.messages.put(None)
 
     def send(self, request: Request) -> None:
-        """Send a request, after the shared data that the process does not have yet."""
+        """Send a request."""
         assert self.process.stdin is not None
         self.stderr.seek(0)
         self.stderr.truncate()
-        for name, shared in request.shared.items():
-            if self.given.get(name) != shared.key:
-                send(self.process.stdin, {"shares": name, "key": shared.key}, shared.blobs)
-        self.given = {name: shared.key for name, shared in request.shared.items()}
-        header = {"shares": "", "values": request.values, "shared": list(request.shared)}
-        send(self.process.stdin, {**header, "seconds": request.limits.seconds}, request.blobs)
+        send(self.process.stdin, {"values": request.values, "seconds": request.limits.seconds}, request.blobs)
 
     def receive(self, until: float, too_late: WorkerDiedError, memory: int) -> Message:
         """Wait for a message; raise EOFError if the process has ended instead."""
@@ -253,7 +247,7 @@ class InProcessPool(Pool):
         if request.server not in self._servers:
             self._servers[request.server] = find_server(request.server)(Path(self._folder.name))
         try:
-            values, blobs = self._servers[request.server](request.values, request.blobs, request.shared)
+            values, blobs = self._servers[request.server](request.values, request.blobs)
         except RlacdError as error:
             future.set_exception(error)
         else:

@@ -1,22 +1,21 @@
 """The pool of many machines: every request is a Ray task; Ray picks the machine, and another if that one is lost.
 
-On each machine a request runs as in a local pool: in a worker process with limits, watched by Ray's process. Data that
-requests share is put in the object store once; a machine fetches it for its first process that needs it.
+On each machine a request runs as in a local pool: in a worker process with limits, watched by Ray's process.
+
+Any Ray from 2.40 on will do. The tests keep to 2.46 (`constraints-dev.txt`), the last that can be told to wait longer
+than 15 seconds for a node to start.
 """
 
 from __future__ import annotations
 
 import os
 import socket
-import time
-import weakref
-from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
 from rlacd._version import __version__
 from rlacd.errors import OptionError, import_extra
-from rlacd.pool import Answer, MachineLostError, Pool, ProcessLimits, Request, Shared
+from rlacd.pool import Answer, Pool, ProcessLimits, Request, Values, WorkerDiedError
 from rlacd.pool.local import Worker
 
 LOCAL = "local"
@@ -26,7 +25,7 @@ MACHINES = 5
 """Times a request is resent after its machine was lost."""
 
 CLUSTER_SECONDS = 10.0
-"""Seconds allowed for a cluster to answer, and between two counts of its processors."""
+"""Seconds allowed for a cluster to answer."""
 
 
 class RayPool(Pool):
@@ -68,19 +67,15 @@ class RayPool(Pool):
                 raise OptionError(f"there is no Ray cluster at {address} ({reason}); use local.") from error
         self._remote = ray.remote(max_retries=MACHINES, retry_exceptions=False)(_do)
         self._running: set[Any] = set()
-        self._stored: weakref.WeakKeyDictionary[Shared, Any] = weakref.WeakKeyDictionary()
-        self._processors, self._counted = 0.0, -CLUSTER_SECONDS
 
     @property
     def room(self) -> int:
         """Single-threaded requests worth submitting at once; clusters grow and shrink."""
-        if time.monotonic() - self._counted > CLUSTER_SECONDS:
-            self._processors = self._ray.cluster_resources().get("CPU", 0)
-            self._counted = time.monotonic()
-        return max(1, int(2 * self._processors))  # one running, and one queued so that the processor never waits
+        processors = self._ray.cluster_resources().get("CPU", 0)
+        return max(1, int(2 * processors))  # one running, and one queued so that the processor never waits
 
     def submit(self, request: Request) -> Future[Answer]:
-        """See `Pool`; unshared data travels with every request, so share what is large.
+        """See `Pool`.
 
         Raises
         ------
@@ -88,10 +83,9 @@ class RayPool(Pool):
             No machine has enough processors.
         """
         self._require_processors(request.threads)
-        shared = {name: (given.key, [self._store(given)]) for name, given in request.shared.items()}
         plain = {name: getattr(request, name) for name in ("server", "values", "blobs", "fresh", "tries")}
         limits = (request.limits.seconds, request.limits.memory)
-        task = self._remote.options(num_cpus=request.threads).remote(__version__, plain, shared, limits)
+        task = self._remote.options(num_cpus=request.threads).remote(__version__, plain, limits)
         self._running.add(task)
         future: Future[Answer] = Future()
         future.set_running_or_notify_cancel()
@@ -114,14 +108,9 @@ class RayPool(Pool):
         except exceptions.RayTaskError as error:
             future.set_exception(getattr(error, "cause", None) or error)
         except exceptions.RayError:
-            future.set_exception(MachineLostError(f"it was lost with its machine {MACHINES + 1} times"))
+            future.set_exception(WorkerDiedError(f"it was lost with its machine {MACHINES + 1} times"))
         except BaseException as error:
             future.set_exception(error)
-
-    def _store(self, shared: Shared) -> Any:
-        if shared not in self._stored:
-            self._stored[shared] = self._ray.put(dict(shared.blobs))
-        return self._stored[shared]
 
     def _require_processors(self, threads: int) -> None:
         if threads == 1:
@@ -143,25 +132,11 @@ def _require_answer(address: str) -> None:
 
 
 _worker = Worker()
-_fetched: dict[str, Shared] = {}
 
 
-def _do(
-    version: str, plain: dict[str, Any], shared: Mapping[str, tuple[str, list[Any]]], limits: tuple[float, int]
-) -> tuple[dict[str, Any], dict[str, bytes], str]:
+def _do(version: str, plain: Values, limits: tuple[float, int]) -> tuple[Values, dict[str, bytes], str]:
     """Run a request on the current machine, with plain values in and out."""
-    global _fetched
     if version != __version__:
         raise OptionError(f"a machine of the cluster has rlacd {__version__}, not {version}: install the same.")
-    _fetched = {name: _fetch(name, *given) for name, given in shared.items()}
-    answer = _worker.ask(Request(**plain, shared=_fetched, limits=ProcessLimits(*limits)))
+    answer = _worker.ask(Request(**plain, limits=ProcessLimits(*limits)))
     return answer.values, answer.blobs, answer.worker
-
-
-def _fetch(name: str, key: str, stored: list[Any]) -> Shared:
-    """Fetch shared data from the object store unless this process has it; Ray does not fetch refs inside lists."""
-    import ray
-
-    if name in _fetched and _fetched[name].key == key:
-        return _fetched[name]
-    return Shared(ray.get(stored[0]), key)

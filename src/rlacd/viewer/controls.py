@@ -15,12 +15,14 @@ from rlacd.errors import OptionError
 from rlacd.io.read.load import load_mesh
 from rlacd.io.write import file_stem
 from rlacd.io.write.target import MODEL_OF
-from rlacd.options import CRITERIA, FAST, Options, with_criterion
+from rlacd.options import Options
+from rlacd.options.criterion import CRITERIA, with_criterion
 from rlacd.options.fields import shown
 from rlacd.options.lengths import read_lengths
 from rlacd.options.navigable import NavigableSpace
 from rlacd.options.output import Axis
 from rlacd.options.presets import PRESETS
+from rlacd.options.ranges import FAST
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.topology import compacted
 

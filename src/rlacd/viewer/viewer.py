@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rlacd.options import Options, with_criterion
+from rlacd.options import Options
+from rlacd.options.criterion import with_criterion
 from rlacd.viewer.controls import read_controls, read_subject
 from rlacd.viewer.picture import check_up
 from rlacd.viewer.server import Read, ViewServer

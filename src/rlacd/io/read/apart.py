@@ -35,7 +35,7 @@ def served(answer: Callable[[Values, Blobs], Answered]) -> MakeServer:
     """Make a server of a function."""
 
     def make(_: Path) -> Server:
-        return lambda values, blobs, shared: answer(values, blobs)
+        return answer
 
     return make
 

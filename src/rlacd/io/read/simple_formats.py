@@ -15,6 +15,7 @@ import numpy as np
 
 from rlacd.errors import MeshFileError
 from rlacd.io.read.contents import Contents, one_shape
+from rlacd.io.read.gmsh import read_gmsh
 from rlacd.io.read.open_file import OFF_KEYWORD
 from rlacd.io.read.polygons import triangles_of
 from rlacd.io.read.text import check_text, count_in, numbers_in, plain_text, rows_of, vectors_of, whole
@@ -75,13 +76,15 @@ def read_xyz(path: Path, content: bytes) -> Contents:
 def read_msh(path: Path, content: bytes) -> Contents:
     """Read MuJoCo's binary mesh: four counts, then points, normals and texture coordinates as float32, and faces.
 
+    Meshes of Gmsh have the same ending: see `rlacd.io.read.gmsh.read_gmsh`.
+
     Raises
     ------
     MeshFileError
         The counts are not those of a mesh, or do not fit the length of the file.
     """
-    if content.startswith(b"$MeshFormat"):
-        raise MeshFileError(f"{path} is a mesh of Gmsh, not of MuJoCo: convert it to glb, obj, stl or ply")
+    if content.startswith(b"$"):
+        return read_gmsh(path, content)
     counts = [int(count) for count in np.frombuffer(content[: len(content[:16]) // 4 * 4], "<i4")]
     if len(counts) < 4 or min(counts) < 0:
         raise ValueError("its header lacks the counts")

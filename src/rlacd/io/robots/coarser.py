@@ -13,7 +13,8 @@ from rlacd.errors import OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.decomposed import SHARE, check_options, fitting, options_of_bodies, with_lengths
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
-from rlacd.options import FAST, Options
+from rlacd.options import Options
+from rlacd.options.ranges import FAST
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Run
 from rlacd.solid.input_mesh import InputMesh

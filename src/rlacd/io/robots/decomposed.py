@@ -30,9 +30,10 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
 from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
-from rlacd.options import LENGTHS, DetailName, OpeningsName, Options
+from rlacd.options import Options
 from rlacd.options.fields import shown
 from rlacd.options.lengths import LONGEST_SIDE, in_unit, read_lengths, unit_of
+from rlacd.options.ranges import LENGTHS, DetailName, OpeningsName
 from rlacd.options.robots import RobotOptions
 from rlacd.run import Progress, ProgressCallback
 from rlacd.solid.frame import ROUNDING, Frame
