@@ -14,7 +14,7 @@ from typing import NamedTuple
 from rlacd.criteria import Criterion, Filled, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
-from rlacd.merge import grow_cover, grown_parts, may_grow
+from rlacd.merge import grow_cover, grown_parts
 from rlacd.options import FAST, Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
@@ -214,15 +214,12 @@ class _Decomposer:
     problem : _Problem
     model : Model
     run : Run
-    sweeps : SweepCache
-        The sweeps of the cuts, which the search goes on to use.
     tree : CutTree
     """
 
     problem: _Problem
     model: Model
     run: Run
-    sweeps: SweepCache
     tree: CutTree
 
     @classmethod
@@ -235,7 +232,7 @@ class _Decomposer:
         sweeps = SweepCache(seed=(options.seed,) if is_default and options.seed else None)
         second = Greedy("hull-sum", sweeps=sweeps) if is_default else None
         policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(problem.goal)))
-        return cls(problem, model, run, sweeps, CutTree(model.component, policy, run, second=second))
+        return cls(problem, model, run, CutTree(model.component, policy, run, second=second))
 
     def decompose(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         """Cut, merge, search and transfer.
@@ -282,7 +279,7 @@ class _Decomposer:
         The given parts if they are fewer, or as many and smaller, or if no bodies are found that meet the goal.
         """
         few = self.problem.root.sides <= FEW_SIDES * len(parts)
-        if self.model.proxy is not None or len(parts) == 1 or not few or not may_grow(goal):
+        if self.model.proxy is not None or len(parts) == 1 or not few or not math.isfinite(goal.outward_deviation):
             return parts
         run, found = self.run, list[Part]()
         with run.limited(max(run.work.done, EXACT_WORK)):
@@ -343,7 +340,7 @@ class _Decomposer:
                         states = [eliminate_parts(context, parts, run)]
             else:
                 with run.stage("search"):
-                    if goes_on and goal.eliminates and goal.obstacles is not None:
+                    if goes_on and goal.obstacles is not None:
                         states = [parts := eliminate_parts(context, parts, run)]
                     bound = run.start(partial(at_least, self.model.solid, parts, asked.outward_deviation, run))
                     enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
@@ -366,7 +363,7 @@ def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
 def _fills_slits(options: Options, goal: Criterion) -> bool:
     """Whether what next to nothing gets into may become solid: not where balls or meshes have to."""
     is_asked = options.openings == "thin" or options.keep_cavities or isinstance(goal, LimitedCriterion)
-    return not is_asked and may_grow(goal)
+    return not is_asked and math.isfinite(goal.outward_deviation)
 
 
 def _scale(criterion: Criterion) -> float | None:

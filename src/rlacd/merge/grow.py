@@ -51,20 +51,16 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]
     merged : list of Part
         Parts that meet the criterion; their members are the pieces.
     criterion : Criterion
+        If it does not bound how far hulls may reach beyond the solid, none can grow.
     run : Run
         The merged parts are returned when its work runs out.
     """
-    if not may_grow(criterion) or merged[0].whole.size > DENSE:
+    if not math.isfinite(criterion.outward_deviation) or merged[0].whole.size > DENSE:
         return merged
     if sum(map(_shares, merged)) < CROSSING * len(merged):
         return merged
     pieces = [member for part in merged for member in part.members]
     return grown_parts(pieces, WORTH * len(merged), criterion, run) or merged
-
-
-def may_grow(criterion: Criterion) -> bool:
-    """Whether a criterion bounds how far hulls may reach beyond the solid, and by nothing else."""
-    return criterion.obstacles is None and math.isfinite(criterion.outward_deviation)
 
 
 def _shares(part: Part) -> bool:

@@ -105,7 +105,6 @@ class Neighbourhood:
         self.best = list(parts)
         self.gained = time.perf_counter()
         self.steps = self.accepted = 0
-        self._near = min(context.criterion.reach, 2 * context.criterion.outward_deviation)
         self._around: dict[int, tuple[int, ...]] = {}
         self._chosen: deque[_Chosen] = deque()
         self._stale: list[Apart[Exchange | None]] = []  # may still be under way
@@ -157,7 +156,7 @@ class Neighbourhood:
         """The parts that each part may be divided among, in ascending order."""
         if not self._around:
             around: dict[int, list[int]] = {i: [] for i in self._now.parts}
-            for i, j in self._now.boxes.pairs([*around], self._near).tolist():
+            for i, j in self._now.boxes.pairs([*around], self._context.criterion.reach).tolist():
                 around[i].append(j)
                 around[j].append(i)
             self._around = {i: tuple(sorted(near)) for i, near in around.items()}

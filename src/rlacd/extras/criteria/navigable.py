@@ -182,6 +182,10 @@ class Navigable(Criterion):
         """The balls."""
         return self.balls
 
+    def credit(self, part: Part) -> float:
+        """The sum of the volumes of its pieces' hulls: what lies between a hull and the surface is no error."""
+        return sum(member.hull.volume for member in part.members) or part.hull.volume
+
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """The number of balls, how many gave way, and how deep the parts' hulls reach into them."""
         exceeding = [error for error in errors or () if error > 0]
