@@ -19,6 +19,7 @@ import rlacd
 from fuzz.geometry import Polytope, why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
+from rlacd.criteria.limited import limited_part
 from rlacd.extras.limit import few_enough
 from rlacd.finish.finish import limit_part
 from rlacd.merge.unite import united_in_turn
@@ -162,7 +163,7 @@ def test_redundant_corners_stay_if_the_threshold_needs_them() -> None:
     chamfer = np.ones(3) - 4e-7 * np.eye(3)
     hull = Hull.of(np.concatenate([cube[:-1], chamfer]))
     part = Component((hull.vertices, hull.faces))
-    simple = limit_part(part, NO_LIMITS)
+    simple = limited_part(part, NO_LIMITS)
     assert len(simple.hull.vertices) == 8 < len(hull.vertices)
     tight = Concavity(1e-7)  # the corner lies 4e-7 / sqrt(3) outside
     assert tight.is_met(part)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import trimesh
@@ -19,7 +19,8 @@ from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.criteria.limited import limited_part
 from rlacd.find_parts import Reached
-from rlacd.finish.report import NEARLY, make_report
+from rlacd.finish.report import make_report
+from rlacd.fit import RESOLVED
 from rlacd.options import SIMPLE
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
@@ -43,10 +44,6 @@ LARGEST = float(np.finfo(np.float64).max)
 """The largest coordinate."""
 
 
-Clean: TypeAlias = "Callable[[Reached, Run], tuple[list[Part], Seams | None]]"
-"""What cleans parts."""
-
-
 class Finished(NamedTuple):
     """Hulls in the input's unit, with what was measured."""
 
@@ -66,28 +63,27 @@ def misses_some(reached: Reached, run: Run) -> bool:
 def covers(parts: Sequence[Part], vertices: FloatArray, faces: IntArray, run: Run) -> bool:
     """Whether no point of a surface [V, 3], [F, 3] lies farther outside the hulls of parts than tolerated."""
     union = hull_union([part.hull for part in parts], run.threads)
-    return union.under(vertices, faces, NEARLY, run.threads, COVERAGE_TOLERANCE)[0] <= COVERAGE_TOLERANCE
+    return union.under(vertices, faces, RESOLVED, run.threads, COVERAGE_TOLERANCE)[0] <= COVERAGE_TOLERANCE
 
 
-def finish(reached: Reached, run: Run, clean: Clean | None = None) -> Finished:
-    """Clean the parts, carry them to the input's unit, and measure them; repeat if hulls have to grow.
+def finish(reached: Reached, run: Run, *, is_clean: bool = False) -> Finished:
+    """Clean the parts unless they are clean, carry them to the input's unit, and measure them; repeat if hulls grow.
 
-    `cleaned_parts` cleans them by default. What a state covers, every later state covers: a state that misses some of
-    the solid is not the result, the latest one that misses nothing is.
+    What a state covers, every later state covers: a state that misses some of the solid is not the result, the latest
+    one that misses nothing is.
     """
-    clean = clean or cleaned_parts
-    done, parts = _finished(reached, run, clean)
+    done, parts = _finished(reached, run, is_clean)
     under = done.report.hausdorff.missed
     if under is not None and under > COVERAGE_TOLERANCE:
         earlier = run.if_in_time(lambda: _covering(reached, parts, run), lambda: None)
         return done if earlier is None else finish(earlier, run)
-    if under is None or under <= NEARLY or run.stopped_by is not None:
+    if under is None or under <= RESOLVED or run.stopped_by is not None:
         return done
     with run.stage("finish"):
         grown = run.if_in_time(lambda: _taking_in(reached, parts, run), lambda: None)
     if grown is None:
         return done
-    again, _ = _finished(reached._replace(parts=grown), run, clean)
+    again, _ = _finished(reached._replace(parts=grown), run, is_clean)
     return again if run.stopped_by is None else done
 
 
@@ -100,7 +96,7 @@ def finish_twin(reached: Reached, like: Finished, twin: Similarity, run: Run) ->
         parts = twin.moved(corners, root, reached.solid.frame)
         if parts is not None and run.if_in_time(lambda: all(run.map(reached.goal.is_met, parts)), lambda: False):
             cleaned = reached._replace(parts=parts, before=(reached.parts,))
-            return finish(cleaned, run, lambda reached, _: (reached.parts, None))
+            return finish(cleaned, run, is_clean=True)
     return finish(reached, run)
 
 
@@ -114,13 +110,14 @@ def _covering(reached: Reached, finished: Sequence[Part], run: Run) -> Reached |
     return None
 
 
-def _finished(reached: Reached, run: Run, clean: Clean) -> tuple[Finished, list[Part]]:
+def _finished(reached: Reached, run: Run, is_clean: bool) -> tuple[Finished, list[Part]]:
     """The result, and the cleaned parts."""
     solid, goal = reached.solid, reached.goal
     with run.stage("finish"):
         limits = reached.options.hull_limits
         parts, seams = run.if_in_time(
-            lambda: clean(reached, run), lambda: ([limit_roughly(part, limits) for part in reached.parts], None)
+            lambda: (reached.parts, None) if is_clean else cleaned_parts(reached, run),
+            lambda: ([limit_roughly(part, limits) for part in reached.parts], None),
         )
         with run.shielded():
             hulls = run.map(lambda part: in_input(part.hull, solid.frame, limits), parts)
@@ -145,7 +142,7 @@ def _taking_in(reached: Reached, finished: Sequence[Part], run: Run) -> list[Par
         )
     )
     distance = hull_union(hulls, run.threads).distance(points, run.threads)
-    missed = points[(distance > NEARLY / 2) & (distance <= COVERAGE_TOLERANCE)]
+    missed = points[(distance > RESOLVED / 2) & (distance <= COVERAGE_TOLERANCE)]
     grown = take_in(reached.parts, missed, reached.goal) if len(missed) else reached.parts
     return None if all(new is old for new, old in zip(grown, reached.parts, strict=True)) else grown
 
@@ -263,18 +260,15 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
     return part
 
 
-def limit_part(
-    part: Part, limits: HullLimits, criterion: Criterion | None = None, sides: FloatArray = NO_SIDES
-) -> Part:
+def limit_part(part: Part, limits: HullLimits, criterion: Criterion, sides: FloatArray = NO_SIDES) -> Part:
     """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
 
-    Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
+    Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet the criterion.
     For `sides` see `limit_hull`; if no hull in them meets the criterion, the criterion comes first.
     """
-    enough = math.inf if criterion is None else criterion.of_facets.outward_deviation
-    limited = limited_part(part, limits, enough, sides=sides)
-    if limited is part or criterion is None:
-        return limited
+    limited = limited_part(part, limits, criterion.of_facets.outward_deviation, sides=sides)
+    if limited is part:
+        return part
     if (criterion if limited.exact is None else criterion.of_facets).is_met(limited):
         return limited
     if len(sides):

@@ -16,7 +16,6 @@ from rlacd import _native
 from rlacd.criteria.limited import FINEST_SHARE
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
-from rlacd.fit import RESOLVED
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.presets import Preset, find_preset
@@ -42,9 +41,6 @@ from rlacd.solid.solid import Solid
 
 if TYPE_CHECKING:
     from rlacd.extras.finish.overlap import Seams
-
-NEARLY = RESOLVED
-"""No point of the input should lie farther outside the hulls than this."""
 
 MOST_HOLES = 1000
 """Most holes that a report lists."""

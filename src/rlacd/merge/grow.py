@@ -14,13 +14,13 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.unite import merge_parts
+from rlacd.merge.unite import joint_part, merge_parts
 from rlacd.run import Run, work
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, heights
 from rlacd.solid.component import DENSE, Component, Part, Plane, is_thin
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
-from rlacd.solid.hull import TOLERANCE, Hull, is_sliver
+from rlacd.solid.hull import TOLERANCE, is_sliver
 
 CROSSING, SHARED = 0.4, 1.05
 """Bodies cross where in at least this share of the hulls the solid fills so many times the volume of their pieces: on
@@ -82,7 +82,7 @@ def grown_parts(pieces: Sequence[Component], most: float, criterion: Criterion, 
         chosen = _chosen(pieces, grown)
         if len(chosen) > most:  # samples show it
             return []
-        parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run, whole), run)
+        parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run), run)
         parts = drop_slivers(merge_parts(parts, criterion, run), run) if parts else []
     return [] if run.is_over or len(parts) > most else parts
 
@@ -114,9 +114,7 @@ def _held(points: FloatArray, spaces: FloatArray) -> IntArray:
     return held
 
 
-def _taken(
-    pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run, whole: Component
-) -> list[Part]:
+def _taken(pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run) -> list[Part]:
     """Parts of what each intersection of half-spaces holds, if they meet the criterion, and parts of the rest.
 
     Empty if most do not, or if the rest comes apart.
@@ -126,15 +124,10 @@ def _taken(
         if tried > 2 * (len(parts) + 1):  # grown hulls are mostly empty space
             return []
         inside, outside, units = _divided(rest, spaces)
-        hull = Hull.of(*(member.hull.vertices for member in inside)) if inside else None
         if not run.may_continue() or not run.work.pay(units):
             break
-        if hull is None:
-            continue
-        part = Part(hull, tuple(inside), whole)
-        if not run.work.pay(work.uniting(len(hull.vertices))):
-            break
-        if criterion.is_met(part):
+        part = joint_part(criterion, run.work, *inside) if inside else None
+        if part is not None:
             parts.append(part)
             rest = outside
         if len(rest) > 2 * len(pieces):  # what is beside grown hulls comes apart

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,22 +38,6 @@ class _Pair(NamedTuple):
     first: int
     second: int
     union: Part | None = None
-
-
-class _Rule(Protocol):
-    """Which pairs may be united, and at what cost."""
-
-    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> IntArray:
-        """Pairs [P, 2] of a new part and any other."""
-        ...
-
-    def bounds(self, alive: NumberedParts, pairs: IntArray, account: Work, threads: int) -> FloatArray | None:
-        """Lower bounds [P] of the costs; infinite for pairs that may not be united. None if that cannot be paid."""
-        ...
-
-    def cost(self, union: Part, bound: float) -> float:
-        """The cost of a union; infinite if it may not be."""
-        ...
 
 
 def merge_parts(parts: Sequence[Part], criterion: Criterion, run: Run, across: bool = True) -> list[Part]:
@@ -108,7 +92,7 @@ def united_in_turn(
     for reach in (FIRST_REACH, math.inf):
         if account.is_spent:
             return  # bounding all pairs would be in vain
-        for pair, number in _united(alive, _ByError(criterion, reach), account, run):
+        for pair, number in _united(alive, _ByError(criterion, across=False, reach=reach), account, run):
             errors[number] = pair.cost
             del errors[pair.first], errors[pair.second]
             yield alive.in_order(), max(errors.values())
@@ -126,10 +110,12 @@ class _ByGrowth:
     across: bool
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> IntArray:
+        """Pairs [P, 2] of a new part and any other that may be united."""
         is_any = self.across and len(alive.parts) <= FEW_TO_PAIR
         return alive.boxes.pairs(new, math.inf if is_any else self.criterion.reach, across=self.across)
 
     def bounds(self, alive: NumberedParts, pairs: IntArray, account: Work, threads: int) -> FloatArray | None:
+        """Lower bounds [P] of the costs; infinite for pairs that may not be united. None if that cannot be paid."""
         vertices, volumes, credits = alive.sums(pairs)
         if not account.pay(work.screening(vertices.sum(), len(pairs))):
             return None
@@ -140,14 +126,14 @@ class _ByGrowth:
         return np.asarray(joint - credits)
 
     def cost(self, union: Part, bound: float) -> float:
+        """The cost of a union; infinite if it may not be."""
         return bound if self.criterion.is_met(union) else math.inf
 
 
 @dataclass(frozen=True)
-class _ByError:
+class _ByError(_ByGrowth):
     """The error of the union, which the volumes alone tell some of."""
 
-    criterion: Criterion
     reach: float
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> IntArray:
@@ -161,7 +147,7 @@ class _ByError:
         return self.criterion.error(union)
 
 
-def _united(alive: NumberedParts, rule: _Rule, account: Work, run: Run) -> Iterator[tuple[_Pair, int]]:
+def _united(alive: NumberedParts, rule: _ByGrowth, account: Work, run: Run) -> Iterator[tuple[_Pair, int]]:
     """Unite the pair of least cost again and again; yield each and its union's number.
 
     Ends when no pair is left, the run is over or the account spent: unions are paid in their order, so that how many
@@ -205,7 +191,7 @@ def _united(alive: NumberedParts, rule: _Rule, account: Work, run: Run) -> Itera
         run.drop(begun.values())
 
 
-def _bounded(alive: NumberedParts, rule: _Rule, new: Sequence[int], account: Work, run: Run) -> list[_Pair]:
+def _bounded(alive: NumberedParts, rule: _ByGrowth, new: Sequence[int], account: Work, run: Run) -> list[_Pair]:
     """Pairs of a new part and another, as a heap; not all of them if the run ends or the account is spent."""
     found: list[_Pair] = []
     pairs = rule.pairs(alive, new)
@@ -219,9 +205,9 @@ def _bounded(alive: NumberedParts, rule: _Rule, new: Sequence[int], account: Wor
     return found
 
 
-def joint_part(first: Part, second: Part, criterion: Criterion, account: Work) -> Part | None:
-    """Unite two parts if the union meets the criterion and the account pays for deciding that."""
-    union = Part.joint(first, second)
+def joint_part(criterion: Criterion, account: Work, *parts: Part) -> Part | None:
+    """Unite parts if the union meets the criterion and the account pays for deciding that."""
+    union = Part.joint(*parts)
     return union if account.pay(work.uniting(len(union.hull.vertices))) and criterion.is_met(union) else None
 
 

@@ -30,10 +30,6 @@ LEAST_WORK, MOST_WORK = 0.15e6, 8e6
 WORK_OF_A_STEP = 1e5
 """Where only the number of steps is limited, the work allowed for each: far more than most take."""
 
-PATIENCE = 1.0
-"""Another start is tried when the search from the best one has saved nothing in this multiple of the work of the first
-pass: about what another start takes until it shows what it is worth."""
-
 STARTS = ("excess-norm", "hull-sum")
 """Scores of the greedy policy for further passes over the whole solid, in turn, each among other planes."""
 
@@ -186,9 +182,12 @@ class _Search:
             self._state, self._ahead = other, early
 
     def _improve(self, state: Neighbourhood, most: float) -> None:
-        """Search from a start until it saves nothing any more."""
+        """Search from a start until it has saved nothing in the work of the first pass.
+
+        That is about what another start takes until it shows what it is worth.
+        """
         steps, accepted = state.steps, state.accepted
-        state.improve(most - self.steps + steps, PATIENCE * self._context.first_pass)
+        state.improve(most - self.steps + steps, self._context.first_pass)
         self.steps += state.steps - steps
         self.accepted += state.accepted - accepted
         self._note(state)
