@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rlacd.criteria import Criterion, Filled, LimitedCriterion
 from rlacd.cut import CutTree
@@ -18,21 +18,22 @@ from rlacd.merge import grow_cover, grown_parts
 from rlacd.options import FAST, Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
-from rlacd.proxy.model import Model
 from rlacd.repair.repair import repair
 from rlacd.repair.slits import without_slits
 from rlacd.report import SearchSummary
 from rlacd.run import Run
-from rlacd.search import SearchContext, at_least, cost, eliminate_parts, search
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part
+from rlacd.search.at_least import at_least
+from rlacd.search.levels import eliminate_parts, search
+from rlacd.search.neighbourhood import SearchContext, cost
+from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.cover import cover, slabs
 from rlacd.solid.frame import ROUNDING
-from rlacd.solid.hull import NO_SIDES
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.resting import resting_sides
 from rlacd.solid.solid import Solid
 from rlacd.solid.twins import Similarity
+
+if TYPE_CHECKING:
+    from rlacd.proxy.simplify import Proxy
 
 COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
@@ -103,15 +104,15 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
         return Reached(solid, options, problem.goal, [root], None, root)
     decomposer = _Decomposer.of(problem, run)
     states, goal, found = decomposer.decompose(problem.goal)
-    limited, most, parts = problem.limited(goal), options.max_hulls, states[-1]
+    most, parts = options.max_hulls, states[-1]
     if most is not None and len(parts) > most:
         from rlacd.extras.limit import at_most
 
-        parts = at_most(most, decomposer.coarser(states, goal), root, limited, run)
+        parts = at_most(most, decomposer.coarser(states, goal), root, goal, options, run)
     elif any(options.hull_limits):
         from rlacd.extras.limit import cut_to_limits
 
-        parts = cut_to_limits(parts, limited, root, options, run)
+        parts = cut_to_limits(parts, goal, root, options, run)
     before = tuple(state for state in states if most is None or len(state) <= most)
     return Reached(solid, options, goal, parts, found, root, before)
 
@@ -130,7 +131,7 @@ def find_parts_under(source: InputMesh, options: Options, factors: Sequence[floa
             if any(options.hull_limits):
                 from rlacd.extras.limit import cut_to_limits
 
-                parts = cut_to_limits(parts, problem.limited(goal), problem.root, options, run)
+                parts = cut_to_limits(parts, goal, problem.root, options, run)
             if run.stopped_by is not None:
                 break
             yield Reached(problem.solid, options, goal, parts, found, problem.root)
@@ -171,31 +172,32 @@ class _Problem(NamedTuple):
         In its frame.
     root : Component
         The solid, to be cut.
-    sides : float64 [P, 4]
-        Half-spaces on whose planes it rests: limited hulls stay in them.
     """
 
     solid: Solid
     options: Options
     goal: Criterion
     root: Component
-    sides: FloatArray
 
     @classmethod
     def of(cls, source: InputMesh, options: Options, run: Run) -> _Problem:
         with run.stage("repair"):
-            solid = _repaired(source, options, run)
+            solid = repair(
+                source,
+                resolution=options.resolution,
+                open_bodies=options.openings,
+                gap=options.gap,
+                threads=run.threads,
+                keep_cavities=options.sees_cavities,
+            )
             options = options.at_scale(solid.frame.scale)
             goal = LimitedCriterion.prepare(options, solid, run)
-            if _fills_slits(options, goal):
+            # What next to nothing gets into may become solid, but not where balls or meshes have to.
+            is_asked = options.openings == "thin" or options.keep_cavities or isinstance(goal, LimitedCriterion)
+            if not is_asked and math.isfinite(goal.outward_deviation):
                 width = min(options.gap, SLIT * goal.outward_deviation)
                 solid = without_slits(solid, width, EXTENT * goal.outward_deviation)
-        root = Component(solid.shape, run.threads)
-        return cls(solid, options, goal, root, resting_sides(root) if any(options.hull_limits) else NO_SIDES)
-
-    def limited(self, goal: Criterion) -> LimitedCriterion:
-        """A goal that limited hulls have to meet, too."""
-        return LimitedCriterion(goal, self.options.hull_limits, sides=self.sides)
+        return cls(solid, options, goal, Component(solid.shape, run.threads))
 
 
 def covered(source: InputMesh, options: Options, run: Run) -> Reached:
@@ -207,32 +209,39 @@ def covered(source: InputMesh, options: Options, run: Run) -> Reached:
 
 @dataclass(frozen=True)
 class _Decomposer:
-    """Decomposes a model, under coarser and coarser goals, on the same tree of cuts.
+    """Decomposes a solid, under coarser and coarser goals, on the same tree of cuts.
 
     Attributes
     ----------
     problem : _Problem
-    model : Model
+    proxy : Proxy or None
+        What is cut in place of a dense solid.
     run : Run
     tree : CutTree
     """
 
     problem: _Problem
-    model: Model
+    proxy: Proxy | None
     run: Run
     tree: CutTree
 
     @classmethod
     def of(cls, problem: _Problem, run: Run) -> _Decomposer:
         """Prepare to decompose a solid."""
-        solid, options = problem.solid, problem.options
-        model = Model.of(problem.root, solid.pieces, problem.goal, run)
+        solid, options, goal, root = problem
+        proxy = None
+        if math.isfinite(goal.outward_deviation) and root.size >= DENSE:
+            from rlacd.proxy.simplify import simplify
+
+            with run.until_stopped(), run.stage("simplify"):
+                proxy = simplify(root, goal.outward_deviation, run.threads, solid.pieces)
         solid.pieces.clear()
         is_default = options.first_policy == options.default_policy
         sweeps = SweepCache(seed=(options.seed,) if is_default and options.seed else None)
         second = Greedy("hull-sum", sweeps=sweeps) if is_default else None
-        policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(problem.goal)))
-        return cls(problem, model, run, CutTree(model.component, policy, run, second=second))
+        policy = make_policy(options.first_policy, sweeps, _tighter(goal, proxy).outward_deviation)
+        tree = CutTree(root if proxy is None else proxy.component, policy, run, second=second)
+        return cls(problem, proxy, run, tree)
 
     def decompose(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         """Cut, merge, search and transfer.
@@ -252,18 +261,18 @@ class _Decomposer:
         return len(solid.surface[1]) if solid.is_sheets else math.inf
 
     def _cut(self, goal: Criterion) -> Pass:
-        most = PIECES_A_FACE * self._few
+        goal, most = _tighter(goal, self.proxy), PIECES_A_FACE * self._few
         return cut_and_merge(self.tree, goal, self.run, merge=self.problem.options.merge, most=most)
 
     def _decomposed(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         with self.run.limited():
-            done = self._cut(self.model.tighter(goal))
+            done = self._cut(goal)
             if done.is_too_many:
                 return [done.pieces], goal, None
             states, found = self._searched(done.parts, done.criterion, goal)
             best = states[-1]
             states = [parts for parts in states if parts is not best] + [best]
-            if self.model.proxy is None:
+            if self.proxy is None:
                 return states, done.criterion, found
             moved = [self._transferred(best, goal)]
             least = found.lower_bound if found is not None else 1
@@ -279,7 +288,7 @@ class _Decomposer:
         The given parts if they are fewer, or as many and smaller, or if no bodies are found that meet the goal.
         """
         few = self.problem.root.sides <= FEW_SIDES * len(parts)
-        if self.model.proxy is not None or len(parts) == 1 or not few or not math.isfinite(goal.outward_deviation):
+        if self.proxy is not None or len(parts) == 1 or not few or not math.isfinite(goal.outward_deviation):
             return parts
         run, found = self.run, list[Part]()
         with run.limited(max(run.work.done, EXACT_WORK)):
@@ -299,18 +308,23 @@ class _Decomposer:
         factor, begin = 1.0, self.run.work.done
         while self.run.stopped_by is None:
             factor *= COARSER if self.run.work.done - begin < MOST_CUTTING else COARSER**4
+            coarse = goal.scaled(factor)
             with self.run.limited():
-                done = self._cut(self.model.tighter(goal, factor))
+                done = self._cut(coarse)
             if not done.is_too_many:
-                yield self._transferred(done.parts, goal, factor)
+                yield self._transferred(done.parts, coarse)
             if len(done.parts) <= 1:
                 return
 
-    def _transferred(self, parts: list[Part], goal: Criterion, factor: float = 1.0) -> list[Part]:
-        if self.model.proxy is None:
+    def _transferred(self, parts: list[Part], goal: Criterion) -> list[Part]:
+        """Parts of the solid, which meet the goal there, for those of the proxy."""
+        if self.proxy is None:
             return parts
-        policy = make_policy(self.problem.options.first_policy, SweepCache(), _scale(goal))
-        return self.model.transfer(parts, goal, factor, policy, self.run, merge=self.problem.options.merge)
+        from rlacd.proxy.model import Transfer
+
+        options = self.problem.options
+        policy = make_policy(options.first_policy, SweepCache(), goal.outward_deviation)
+        return Transfer(self.problem.root, self.proxy, goal, policy, self.run).moved(parts, merge=options.merge)
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion
@@ -320,7 +334,7 @@ class _Decomposer:
         `asked` is the solid's unscaled goal.
         """
         options, run, found, states = self.problem.options, self.run, None, [parts]
-        policy, root = options.first_policy, self.model.component
+        policy, root = options.first_policy, self.tree.root
         context = SearchContext(root, goal, options.seed, run.work.done)
         assert options.quality is not None, "filled in by the options"
         most = math.inf if options.max_hulls is None else TIMES_TOO_MANY * options.max_hulls + TOO_MANY
@@ -342,30 +356,13 @@ class _Decomposer:
                 with run.stage("search"):
                     if goes_on and goal.obstacles is not None:
                         states = [parts := eliminate_parts(context, parts, run)]
-                    bound = run.start(partial(at_least, self.model.solid, parts, asked.outward_deviation, run))
+                    bound = run.start(partial(at_least, self.problem.root, parts, asked.outward_deviation, run))
                     enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
                     context = replace(context, enough=enough)
                     states, found = search(context, parts, run, options.quality, options.budget, options.search_steps)
         return states, found
 
 
-def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
-    return repair(
-        source,
-        resolution=options.resolution,
-        open_bodies=options.openings,
-        gap=options.gap,
-        threads=run.threads,
-        keep_cavities=options.sees_cavities,
-    )
-
-
-def _fills_slits(options: Options, goal: Criterion) -> bool:
-    """Whether what next to nothing gets into may become solid: not where balls or meshes have to."""
-    is_asked = options.openings == "thin" or options.keep_cavities or isinstance(goal, LimitedCriterion)
-    return not is_asked and math.isfinite(goal.outward_deviation)
-
-
-def _scale(criterion: Criterion) -> float | None:
-    """How far a hull may reach beyond its part, if the criterion bounds that: an input of networks."""
-    return criterion.outward_deviation if math.isfinite(criterion.outward_deviation) else None
+def _tighter(goal: Criterion, proxy: Proxy | None) -> Criterion:
+    """The goal for what is cut: parts of a proxy have to be tighter, so that those of the solid meet it."""
+    return goal if proxy is None else goal.alone.scaled(1 - proxy.margin(goal))

@@ -16,9 +16,11 @@ from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.run import Run, Work, work
-from rlacd.search import SearchContext, eliminate_parts
+from rlacd.search.levels import eliminate_parts
+from rlacd.search.neighbourhood import SearchContext
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import NO_SIDES
+from rlacd.solid.resting import resting_sides
 
 TIMES_PARTS = 2
 """Cutting on for fewer corners multiplies the parts by at most this."""
@@ -29,9 +31,6 @@ SHARE_OF_WORK, LEAST_SHARE = 0.3, 0.4e6
 PIECES = 2
 """Cutting on stops at so many times the parts that may be added: merging leaves half of them."""
 
-HULLS_A_PART = 3
-"""Limited hulls that are paid for before a part is cut on: more are made, but of smaller parts."""
-
 STILL_MANY = 1.5
 """Parts are not united if a coarser goal leaves more than so many times the hulls asked for: of 27 real meshes held to
 8 hulls none takes more than 2.9 times as long as without the limit, not 9 times; they fit 2% worse."""
@@ -40,15 +39,20 @@ NEARLY_EQUAL = 1.02
 """Errors within this factor are equal: they are measured to a fiftieth of the threshold."""
 
 
-def cut_to_limits(
-    parts: list[Part], limited: LimitedCriterion, solid: Component, options: Options, run: Run
-) -> list[Part]:
-    """Cut on parts whose hulls fail the criterion only because of the limits.
+def _limited(goal: Criterion, solid: Component, options: Options) -> LimitedCriterion:
+    """A goal that limited hulls have to meet, too; they stay within the sides on which the solid rests."""
+    sides = resting_sides(solid) if any(options.hull_limits) else NO_SIDES
+    return LimitedCriterion(goal, options.hull_limits, sides=sides)
+
+
+def cut_to_limits(parts: list[Part], goal: Criterion, solid: Component, options: Options, run: Run) -> list[Part]:
+    """Cut on parts whose hulls fail the goal only because of the limits.
 
     First with hulls kept within the sides on which the solid rests, then without: the criterion comes first.
     """
     most = int(min(TIMES_PARTS * len(parts), options.max_hulls or math.inf))
-    with run.stage("limit"):
+    with run.stage("limit"), run.until_stopped():
+        limited = _limited(goal, solid, options)
         for goal in (limited, replace(limited, sides=NO_SIDES)) if len(limited.sides) else (limited,):
             parts = _cut_for(goal, parts, most - len(parts), solid, options, run)
     return parts
@@ -70,7 +74,7 @@ def _cut_for(
         with run.limited(max(SHARE_OF_WORK * run.work.done, LEAST_SHARE)):
             pieces: dict[Part, list[Part]] = {}
             for part, is_met in sorted(zip(parts, met, strict=True), key=lambda item: len(item[0].hull.vertices)):
-                price = HULLS_A_PART * work.limiting(len(part.hull.vertices))
+                price = work.limiting(len(part.hull.vertices))
                 if not is_met and limited.criterion.is_met(part) and run.work.pay(price):
                     pieces[part] = _cut_on(part, limited, solid, options, run, extra)
             kept = {part: [part] for part in parts}
@@ -92,8 +96,7 @@ def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, 
     inside = solid.inside(part.hull)
     if inside is None:
         return []
-    scale = limited.outward_deviation if math.isfinite(limited.outward_deviation) else None
-    policy = make_policy(options.first_policy, SweepCache(), scale)
+    policy = make_policy(options.first_policy, SweepCache(), limited.outward_deviation)
     tree = CutTree(inside, policy, run)
     done = cut_and_merge(tree, limited, run, merge=options.merge, most=PIECES * (extra + 1), strict=True)
     is_done = not done.unmet and not run.is_over and len(done.parts) <= extra + 1
@@ -103,8 +106,9 @@ def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, 
 def at_most(
     most: int,
     decompositions: Iterable[Sequence[Part]],
-    whole: Part,
-    limited: LimitedCriterion,
+    whole: Component,
+    goal: Criterion,
+    options: Options,
     run: Run,
 ) -> list[Part]:
     """Get at most `most` parts whose largest error is least.
@@ -116,16 +120,19 @@ def at_most(
     decompositions : iterable of sequence of Part
         Under coarser and coarser goals. Their parts are united two at a time, and every state on the way counts, unless
         a coarser one has more than `STILL_MANY` times `most`.
-    whole : Part
+    whole : Component
         The solid, which is left as one part if there is no time.
-    limited : LimitedCriterion
-        Measures the error of the hulls that parts end with; parts are united by that of their exact hulls.
+    goal : Criterion
+        Measures the error of the hulls that parts end with, within the limits; parts are united by that of their exact
+        hulls.
+    options : Options
     run : Run
     """
-    best, least, errors = [whole], math.inf, dict[Part, float]()
+    best, least, errors = list[Part]([whole]), math.inf, dict[Part, float]()
     with run.until_stopped():
+        limited = _limited(goal, whole, options)
         for parts in itertools.chain([[whole]], few_enough(decompositions, most)):
-            for state, error in united_in_turn(parts, limited.criterion, Work(MOST_CUTTING), run):
+            for state, error in united_in_turn(parts, goal, Work(MOST_CUTTING), run):
                 if error > NEARLY_EQUAL * least:
                     break  # unions only make it larger
                 if len(state) > most:

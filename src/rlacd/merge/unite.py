@@ -175,7 +175,7 @@ def _united(alive: NumberedParts, rule: _ByGrowth, account: Work, run: Run) -> I
         return union, rule.cost(union, pair.cost)
 
     try:
-        while run.step(count - len(alive.parts), None, len(alive.parts)) and (pair := first()) is not None:
+        while run.step(count - len(alive.parts), len(alive.parts)) and (pair := first()) is not None:
             if pair.union is None:
                 union, cost = run.result(begun.pop(pair))
                 if not account.pay(work.uniting(len(union.hull.vertices))):

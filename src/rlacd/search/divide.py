@@ -159,7 +159,7 @@ class _Division:
 
     def _halves(self, piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
-            may_cut = self.run.step(0, None, len(self.now)) and self.run.work.pay(work.cutting(piece.component.size))
+            may_cut = self.run.step(0, len(self.now)) and self.run.work.pay(work.cutting(piece.component.size))
             piece.halves = [_Piece(half) for half in self._halved(piece.component)] if may_cut else []
         return piece.halves
 

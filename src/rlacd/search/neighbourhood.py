@@ -181,7 +181,7 @@ class Neighbourhood:
         run = self._run
         with run.until_stopped():
             try:
-                while goes_on() and run.step(self.steps, None, len(self.best)):
+                while goes_on() and run.step(self.steps, len(self.best)):
                     trial = due()
                     if trial is not None:
                         self._choose(trial)
