@@ -153,9 +153,9 @@ def test_no_option_leaves_any_of_the_surface_outside_all_hulls(shape: str, seed:
 
 
 STAGES: dict[str, Callable[..., Any]] = {
-    "rlacd.find_parts.cut_and_merge": lambda tree, *_, of: [(tree.root, of.pieces), (tree.root, of.parts)],
+    "rlacd.find_parts.cut_and_merge": lambda tree, *_, of: [(tree.root, of.pieces), (tree.root, of.parts or of.pieces)],
     "rlacd.proxy.model.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
-    "rlacd.extras.limit.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
+    "rlacd.extras.limit.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts or of.pieces)],
     "rlacd.find_parts.grow_cover": lambda parts, *_, of: [(parts[0].whole, of)],
     "rlacd.find_parts.eliminate_parts": lambda context, *_, of: [(context.root, of)],
     "rlacd.extras.limit.eliminate_parts": lambda context, *_, of: [(context.root, of)],
@@ -266,7 +266,8 @@ def test_a_transfer_without_time_leaves_hulls_that_cover_the_solid() -> None:
 
 PIECES: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(
-        ["rlacd.find_parts.cut_and_merge", "rlacd.search.levels.cut_and_merge"], lambda *_, of: [of.pieces, of.parts]
+        ["rlacd.find_parts.cut_and_merge", "rlacd.search.levels.cut_and_merge"],
+        lambda *_, of: [of.pieces, of.parts or of.pieces],
     ),
     **dict.fromkeys(["rlacd.find_parts.grow_cover", "rlacd.find_parts.eliminate_parts"], lambda *_, of: [of]),
     "rlacd.find_parts.search": lambda *_, of: of[0],

@@ -267,7 +267,7 @@ class _Decomposer:
     def _decomposed(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         with self.run.limited():
             done = self._cut(goal)
-            if done.is_too_many:
+            if not done.parts:
                 return [done.pieces], goal, None
             states, found = self._searched(done.parts, done.criterion, goal)
             best = states[-1]
@@ -311,9 +311,9 @@ class _Decomposer:
             coarse = goal.scaled(factor)
             with self.run.limited():
                 done = self._cut(coarse)
-            if not done.is_too_many:
+            if done.parts:
                 yield self._transferred(done.parts, coarse)
-            if len(done.parts) <= 1:
+            if len(done.parts) == 1:
                 return
 
     def _transferred(self, parts: list[Part], goal: Criterion) -> list[Part]:

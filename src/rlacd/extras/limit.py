@@ -99,8 +99,7 @@ def _cut_on(part: Part, limited: Criterion, solid: Component, options: Options, 
     policy = make_policy(options.first_policy, SweepCache(), limited.outward_deviation)
     tree = CutTree(inside, policy, run)
     done = cut_and_merge(tree, limited, run, merge=options.merge, most=PIECES * (extra + 1), strict=True)
-    is_done = not done.unmet and not run.is_over and len(done.parts) <= extra + 1
-    return done.parts if is_done else []
+    return done.parts if len(done.parts) <= extra + 1 and not run.is_over else []
 
 
 def at_most(

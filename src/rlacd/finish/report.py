@@ -13,7 +13,6 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from rlacd import _native
-from rlacd.criteria.limited import FINEST_SHARE
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.options import Options
@@ -96,8 +95,10 @@ def make_report(
         warnings += _unmeasured(solid) if has_surface and distances is None else []
         warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
         warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
-        warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
-        warnings += avoided.warnings_of(entered, _why_entered(run), solid.frame.told_in) if avoided and entered else []
+        is_stopped = run.stopped_by is not None
+        warnings += too_narrow(distances.narrowed, reached, is_stopped) if distances else []
+        if avoided and entered:
+            warnings += avoided.warnings_of(entered, solid.frame.told_in, is_stopped=is_stopped)
         if criterion.obstacles is not None and not is_cover:
             warnings += _out_of_the_box([part.hull for part in parts], solid)
         return Report(
@@ -126,13 +127,6 @@ def _hausdorff(distances: _Distances | None) -> Hausdorff:
     if distances is None:
         return Hausdorff()
     return Hausdorff(distances.over, max(distances.under, distances.left_out.distance))
-
-
-def _why_entered(run: Run) -> str:
-    """Why finer cuts did not help."""
-    if run.stopped_by is not None:
-        return "the work was stopped before"
-    return f"parts within {FINEST_SHARE:.0%} of the threshold, and those that limits leave no way, are cut no further"
 
 
 def _holes(solid: Solid) -> tuple[Hole, ...]:

@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rlacd import _native
-from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS, Candidates, all_planes, axis_and_principal
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS, Candidates, all_planes
 from rlacd.solid.arrays import BoolArray, FloatArray, heights
 from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
 from rlacd.solid.frame import ROUNDING
@@ -146,7 +146,7 @@ def paper_planes(component: Component) -> Candidates:
     Along a shorter side, the outer ones miss the component; they are not valid.
     """
     lower, upper = component.box
-    directions = axis_and_principal(component).directions
+    directions = all_planes(component, 1, 0).directions
     steps = (np.arange(OFFSETS_PER_AXIS) - OFFSETS_PER_AXIS // 2) / OFFSETS_PER_AXIS * float((upper - lower).max())
     return Candidates(directions, heights(directions, (lower + upper) / 2)[:, None] + steps)
 
