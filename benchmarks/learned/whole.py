@@ -37,7 +37,7 @@ from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
 from rlacd.learn.environment import CutCache
 from rlacd.merge.numbered import NumberedParts
-from rlacd.merge.unite import _ByGrowth, _united
+from rlacd.merge.unite import ByGrowth, united
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, Candidates, all_planes
 from rlacd.planes.sweep import Sweep, sweep
 from rlacd.policies import Greedy, Policy
@@ -143,7 +143,7 @@ def counts_of(pieces: list[Component]) -> list[int]:
     settled, counts = Concavity(THRESHOLD).settled(pieces), [len(pieces)]
     alive = NumberedParts(pieces, settled)
     for across in (False, True):  # as `merge_parts` does
-        for _ in _united(alive, _ByGrowth(settled, across), RUN.work, RUN):
+        for _ in united(alive, ByGrowth(settled, across), RUN.work, RUN):
             pass
         counts.append(len(alive.parts))
     return counts

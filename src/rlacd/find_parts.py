@@ -6,7 +6,7 @@ Transfer and limit cut again what fails; no other stage looks back.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -27,10 +27,8 @@ from rlacd.search.levels import eliminate_parts, search
 from rlacd.search.neighbourhood import SearchContext, cost
 from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.cover import cover, slabs
-from rlacd.solid.frame import ROUNDING
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.solid import Solid
-from rlacd.solid.twins import Similarity
 
 if TYPE_CHECKING:
     from rlacd.proxy.simplify import Proxy
@@ -96,13 +94,13 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     """Decompose a mesh until done or stopped."""
     problem = None
     with run.until_stopped():
-        problem = _Problem.of(source, options, run)
+        problem = Problem.of(source, options, run)
     if problem is None:
         return covered(source, options, run)
     solid, options, root = problem.solid, problem.options, problem.root
     if options.max_hulls == 1:
         return Reached(solid, options, problem.goal, [root], None, root)
-    decomposer = _Decomposer.of(problem, run)
+    decomposer = Decomposer.of(problem, run)
     states, goal, found = decomposer.decompose(problem.goal)
     most, parts = options.max_hulls, states[-1]
     if most is not None and len(parts) > most:
@@ -117,49 +115,7 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     return Reached(solid, options, goal, parts, found, root, before)
 
 
-def find_parts_under(source: InputMesh, options: Options, factors: Sequence[float], run: Run) -> Iterator[Reached]:
-    """Decompose a mesh under its goal scaled by each factor, on one tree of cuts, until one part is left.
-
-    Factors ascend from 1. Those that there is no time for are left out.
-    """
-    with run.until_stopped():
-        problem = _Problem.of(source, options, run)
-        decomposer = _Decomposer.of(problem, run)
-        options = problem.options
-        for factor in factors:
-            (*_, parts), goal, found = decomposer.decompose(problem.goal.scaled(factor))
-            if any(options.hull_limits):
-                from rlacd.extras.limit import cut_to_limits
-
-                parts = cut_to_limits(parts, goal, problem.root, options, run)
-            if run.stopped_by is not None:
-                break
-            yield Reached(problem.solid, options, goal, parts, found, problem.root)
-            if len(parts) <= 1:
-                break
-
-
-def find_parts_of_twin(
-    source: InputMesh, options: Options, like: Reached, twin: Similarity, run: Run
-) -> Reached | None:
-    """Take over what was reached for a mesh's twin; None if its parts do not meet the goal here, or on a stop.
-
-    The mesh is repaired and the parts are tested, so that nothing is taken for granted but their number.
-    """
-    with run.until_stopped():
-        problem = _Problem.of(source, options, run)
-        solid, goal, frame = problem.solid, problem.goal, like.solid.frame
-        parts = twin.moved([frame.to_input(part.hull.vertices) for part in like.parts], problem.root, solid.frame)
-        if parts is None or (options.max_hulls is None and not all(run.map(goal.is_met, parts))):
-            return None
-        found, same = like.found, twin.factor * like.goal.outward_deviation / frame.scale
-        if found is not None and goal.outward_deviation / solid.frame.scale > (1 + ROUNDING) * same:
-            found = replace(found, lower_bound=1)  # it holds for a tolerance that is smaller
-        return Reached(solid, problem.options, goal, parts, found, problem.root)
-    return None
-
-
-class _Problem(NamedTuple):
+class Problem(NamedTuple):
     """What is decomposed.
 
     Attributes
@@ -180,7 +136,8 @@ class _Problem(NamedTuple):
     root: Component
 
     @classmethod
-    def of(cls, source: InputMesh, options: Options, run: Run) -> _Problem:
+    def of(cls, source: InputMesh, options: Options, run: Run) -> Problem:
+        """Repair a mesh, and make the criterion that the options ask for."""
         with run.stage("repair"):
             solid = repair(
                 source,
@@ -208,25 +165,25 @@ def covered(source: InputMesh, options: Options, run: Run) -> Reached:
 
 
 @dataclass(frozen=True)
-class _Decomposer:
+class Decomposer:
     """Decomposes a solid, under coarser and coarser goals, on the same tree of cuts.
 
     Attributes
     ----------
-    problem : _Problem
+    problem : Problem
     proxy : Proxy or None
         What is cut in place of a dense solid.
     run : Run
     tree : CutTree
     """
 
-    problem: _Problem
+    problem: Problem
     proxy: Proxy | None
     run: Run
     tree: CutTree
 
     @classmethod
-    def of(cls, problem: _Problem, run: Run) -> _Decomposer:
+    def of(cls, problem: Problem, run: Run) -> Decomposer:
         """Prepare to decompose a solid."""
         solid, options, goal, root = problem
         proxy = None

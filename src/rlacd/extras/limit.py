@@ -5,19 +5,24 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from rlacd import _native
 from rlacd.criteria import Criterion, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, cut_and_merge
 from rlacd.merge import merge_parts
-from rlacd.merge.unite import united_in_turn
+from rlacd.merge.numbered import NumberedParts
+from rlacd.merge.unite import ByGrowth, united
 from rlacd.options import Options
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import make_policy
 from rlacd.run import Run, Work, work
 from rlacd.search.levels import eliminate_parts
 from rlacd.search.neighbourhood import SearchContext
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.component import Component, Part
 from rlacd.solid.hull import NO_SIDES
 from rlacd.solid.resting import resting_sides
@@ -37,6 +42,9 @@ STILL_MANY = 1.5
 
 NEARLY_EQUAL = 1.02
 """Errors within this factor are equal: they are measured to a fiftieth of the threshold."""
+
+FIRST_REACH = 0.05
+"""Where few hulls are asked for, parts within this (the longest side is 2) are united before all others."""
 
 
 def _limited(goal: Criterion, solid: Component, options: Options) -> LimitedCriterion:
@@ -141,6 +149,51 @@ def at_most(
                 if (error := max(errors[part] for part in state)) < least:
                     best, least = state, error
     return best
+
+
+def united_in_turn(
+    parts: Sequence[Part], criterion: Criterion, account: Work, run: Run
+) -> Iterator[tuple[list[Part], float]]:
+    """Unite parts, always the pair whose union has the least error, until one is left; yield each state and its error.
+
+    First neighbours are united, then any parts.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+    criterion : Criterion
+        Measures the errors; unions need not meet it.
+    account : Work
+        Pays for measuring. When it is spent, or the run ends, nothing is united any more.
+    run : Run
+    """
+    alive = NumberedParts(parts, criterion)
+    errors = dict(zip(alive.parts, run.map(criterion.error, parts), strict=True))
+    yield alive.in_order(), max(errors.values())
+    for reach in (FIRST_REACH, math.inf):
+        if account.is_spent:
+            return  # bounding all pairs would be in vain
+        for pair, number in united(alive, _ByError(criterion, across=False, reach=reach), account, run):
+            errors[number] = pair.cost
+            del errors[pair.first], errors[pair.second]
+            yield alive.in_order(), max(errors.values())
+
+
+@dataclass(frozen=True)
+class _ByError(ByGrowth):
+    """The error of the union, which the volumes alone tell some of."""
+
+    reach: float
+
+    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> IntArray:
+        return alive.boxes.pairs(new, self.reach)
+
+    def bounds(self, alive: NumberedParts, pairs: IntArray, account: Work, threads: int) -> FloatArray | None:
+        hulls = _native.joint_hull_volumes(alive.bodies, pairs, threads)
+        return np.array([*map(self.criterion.volume_error, alive.sums(pairs)[1].tolist(), hulls.tolist())])
+
+    def cost(self, union: Part, bound: float) -> float:
+        return self.criterion.error(union)
 
 
 def few_enough(decompositions: Iterable[Sequence[Part]], most: int) -> Iterator[Sequence[Part]]:

@@ -18,10 +18,10 @@ import trimesh
 from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.criteria.limited import limited_part
-from rlacd.find_parts import Reached
+from rlacd.find_parts import Reached, covered
 from rlacd.finish.report import make_report
 from rlacd.fit import RESOLVED
-from rlacd.options import SIMPLE
+from rlacd.options import SIMPLE, Options
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
 from rlacd.report import COVERAGE_TOLERANCE, Report
@@ -31,11 +31,11 @@ from rlacd.solid.component import DENSE, Part
 from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.resting import resting_sides, within_reach
 from rlacd.solid.solid import Solid
-from rlacd.solid.twins import Similarity
 
 if TYPE_CHECKING:
     from rlacd.extras.finish.overlap import Seams
@@ -52,18 +52,22 @@ class Finished(NamedTuple):
     balls: Balls | None = None
 
 
-def misses_some(reached: Reached, run: Run) -> bool:
-    """Whether a stop left parts that miss some of a small solid, as can happen where it crosses itself."""
-    if run.stopped_by is None or not 0 < len(reached.solid.faces) <= PLACES:
-        return False
-    with run.shielded():
-        return not covers(reached.parts, *reached.solid.mesh, run)
-
-
 def covers(parts: Sequence[Part], vertices: FloatArray, faces: IntArray, run: Run) -> bool:
     """Whether no point of a surface [V, 3], [F, 3] lies farther outside the hulls of parts than tolerated."""
     union = hull_union([part.hull for part in parts], run.threads)
     return union.under(vertices, faces, RESOLVED, run.threads, COVERAGE_TOLERANCE)[0] <= COVERAGE_TOLERANCE
+
+
+def whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> Reached:
+    """What was reached; a cover of the input if a stop left parts that miss some of it.
+
+    That can happen where a small solid crosses itself.
+    """
+    if run.stopped_by is None or not 0 < len(reached.solid.faces) <= PLACES:
+        return reached
+    with run.shielded():
+        is_whole = covers(reached.parts, *reached.solid.mesh, run)
+    return reached if is_whole else covered(source, options, run)
 
 
 def finish(reached: Reached, run: Run, *, is_clean: bool = False) -> Finished:
@@ -85,19 +89,6 @@ def finish(reached: Reached, run: Run, *, is_clean: bool = False) -> Finished:
         return done
     again, _ = _finished(reached._replace(parts=grown), run, is_clean)
     return again if run.stopped_by is None else done
-
-
-def finish_twin(reached: Reached, like: Finished, twin: Similarity, run: Run) -> Finished:
-    """Finish what was taken over from a mesh's twin with the finished hulls of that, if they meet the goal here."""
-    options, root = reached.options, reached.root
-    assert root is not None, "parts are taken over to a solid"
-    if not options.primitive_kinds and options.overlap == 0:
-        corners = [np.asarray(hull.vertices) for hull in like.hulls]
-        parts = twin.moved(corners, root, reached.solid.frame)
-        if parts is not None and run.if_in_time(lambda: all(run.map(reached.goal.is_met, parts)), lambda: False):
-            cleaned = reached._replace(parts=parts, before=(reached.parts,))
-            return finish(cleaned, run, is_clean=True)
-    return finish(reached, run)
 
 
 def _covering(reached: Reached, finished: Sequence[Part], run: Run) -> Reached | None:
