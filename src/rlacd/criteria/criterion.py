@@ -11,8 +11,8 @@ from rlacd import _native
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part
-from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 if TYPE_CHECKING:

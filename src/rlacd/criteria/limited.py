@@ -17,11 +17,11 @@ from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import NO_BALLS, Balls
 from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, keeps, limit_hull
 from rlacd.solid.passages import Density, passage_balls
-from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.resting import within_reach
 from rlacd.solid.solid import Solid
 

@@ -27,12 +27,12 @@ from rlacd.options.presets import HullLimits
 from rlacd.report import COVERAGE_TOLERANCE, Report
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import Balls
 from rlacd.solid.component import DENSE, Part
 from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
-from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
+from rlacd.solid.hull import NO_LIMITS, NO_SIDES, PRIMITIVE, TOLERANCE, Hull, keeps
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.primitive import PRIMITIVE, Balls
 from rlacd.solid.provenance import owners
 from rlacd.solid.resting import resting_sides, within_reach
 from rlacd.solid.solid import Solid

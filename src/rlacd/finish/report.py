@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,7 +14,7 @@ from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
-from rlacd.options.presets import Preset, find_preset
+from rlacd.options.presets import find_preset
 from rlacd.report import (
     COVERAGE_TOLERANCE,
     Hausdorff,
@@ -30,7 +29,7 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import Place, hull_distances, hull_union
 from rlacd.solid.frame import Frame
-from rlacd.solid.hull import Hull, is_sliver
+from rlacd.solid.hull import Hull
 from rlacd.solid.mass import mass_of
 from rlacd.solid.solid import Solid
 
@@ -90,13 +89,19 @@ def make_report(
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
         warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
-        warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
+        if any(options.hull_limits):
+            from rlacd.extras.finish.limits import stuck_out
+
+            warnings += stuck_out(parts, reached)
+        warnings += [*summary.warnings, *missed]
         is_stopped = run.stopped_by is not None
         warnings += too_narrow(distances.narrowed, reached, is_stopped) if distances else []
         if avoided and entered:
             warnings += avoided.warnings_of(entered, solid.frame.told_in, is_stopped=is_stopped)
         if criterion.obstacles is not None and not is_cover:
-            warnings += _out_of_the_box([part.hull for part in parts], solid)
+            from rlacd.extras.finish.limits import out_of_the_box
+
+            warnings += out_of_the_box([part.hull for part in parts], solid)
         return Report(
             options=options.as_plain(),
             complete=run.stopped_by is None,
@@ -181,24 +186,6 @@ def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) ->
     )
 
 
-def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
-    """How far hulls stick out because of limits on their vertices and triangles, where without them they would not."""
-    facets, limits, unit = reached.goal.of_facets, reached.options.hull_limits, reached.solid.frame.unit
-    if not math.isfinite(facets.outward_deviation):
-        return []
-    tight = [part for part in parts if part.exact and facets.is_met(part.with_hull(part.exact))]
-    beyond = [error for part in tight if (error := facets.error(part)) > facets.outward_deviation]
-    if not beyond:
-        return []
-    counts = zip(limits, ("vertices", "triangles"), strict=True)
-    most = " and ".join(f"{limit} {what}" for limit, what in counts if limit is not None)
-    farthest, allowed = unit.apart(max(beyond), facets.outward_deviation)
-    return [
-        f"{_hulls(len(beyond), 'sticks', 'stick')} out by up to {farthest}, more than {allowed}: "
-        f"with at most {most} they cannot fit closer unless there are many more."
-    ]
-
-
 def _unmeasured(solid: Solid) -> list[str]:
     sentences = ["There was no time to measure how far hulls and input are apart."]
     moved = max((body.deviation for body in solid.bodies), default=0.0)
@@ -215,19 +202,6 @@ def _coarse(solid: Solid) -> list[str]:
     return [
         f"So far from the origin, coordinates cannot resolve lengths below {finest}, so hulls thinner "
         "than that are made thicker: move the mesh to the origin."
-    ]
-
-
-def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
-    """Warn of limits that no tight hull can meet: the criterion cannot see it, as there are no balls so far out."""
-    lower, upper = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    beyond = max(float(max((lower - hull.box[0]).max(), (hull.box[1] - upper).max())) for hull in hulls)
-    if beyond <= COVERAGE_TOLERANCE:
-        return []
-    out = solid.frame.unit.words(beyond)
-    return [
-        f"The hulls extend up to {out} outside the solid's bounding box, where a ball may go: the limits on "
-        "vertices or faces allow no tighter ones."
     ]
 
 
@@ -254,7 +228,11 @@ def _early_end(run: Run) -> list[str]:
 def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
     """Say what hulls miss, and how far they reach out unless the criterion has reported that (`exceeds`)."""
     options, unit = reached.options, reached.solid.frame.unit
-    sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
+    sentences: list[str] = []
+    if options.preset is not None:
+        from rlacd.extras.finish.limits import engine_shortcomings
+
+        sentences += engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if options.quality == "best" and reached.found is None and options.max_hulls is not None and exceeds:
@@ -280,29 +258,3 @@ def _why_beyond(solid: Solid, options: Options) -> str:
     if filled and options.openings != "thin":
         return "repair closed openings (see `repair`), which --openings thin leaves open"
     return "repair moved the surface there (see `repair`)"
-
-
-def engine_shortcomings(engine: Preset, hulls: Sequence[Hull]) -> list[str]:
-    """One sentence for each limit of an engine that hulls exceed."""
-    sentences = []
-    for what, limit, counts in (
-        ("vertices", engine.max_vertices, [len(hull.vertices) for hull in hulls]),
-        ("triangles", engine.max_faces, [len(hull.faces) for hull in hulls]),
-    ):
-        over = [count for count in counts if limit is not None and count > limit]
-        if over:
-            sentences.append(
-                f"{_hulls(len(over), 'has', 'have')} up to {max(over)} {what}, more than {limit}, the limit for "
-                f"{engine.engine}."
-            )
-    thin = 0 if engine.slivers else sum(is_sliver(hull, 1 / 200) for hull in hulls)  # a ball is two radii thick
-    if thin:
-        sentences.append(
-            f"{_hulls(thin, 'is', 'are')} thinner than 1/100 of the largest extent, which {engine.engine} refuses or "
-            "handles on the CPU: thicken the mesh there."
-        )
-    return sentences
-
-
-def _hulls(count: int, one: str, many: str) -> str:
-    return f"1 hull {one}" if count == 1 else f"{count} hulls {many}"

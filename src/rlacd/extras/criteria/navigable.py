@@ -32,10 +32,10 @@ from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, dots, heights, length
+from rlacd.solid.balls import NO_BALLS, Balls
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.solid import Solid
 
 MOST_CELLS = 256
