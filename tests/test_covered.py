@@ -147,21 +147,21 @@ def options(draw: st.DrawFn) -> dict[str, Any]:
 def test_no_option_leaves_any_of_the_surface_outside_all_hulls(shape: str, seed: int, asked: dict[str, Any]) -> None:
     mesh = SHAPES[shape](seed)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rlacd.proxy.model.DENSE", FEW)
+        patch.setattr("rlacd.find_parts.DENSE", FEW)
         result = rlacd.decompose(mesh, **asked)
     assert outside(mesh, result.hulls) == 0
 
 
 STAGES: dict[str, Callable[..., Any]] = {
-    "rlacd.find_parts.cut_and_merge": lambda tree, *_, of: [(tree.root, of.pieces), (tree.root, of.parts)],
+    "rlacd.find_parts.cut_and_merge": lambda tree, *_, of: [(tree.root, of.pieces), (tree.root, of.parts or of.pieces)],
     "rlacd.proxy.model.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
-    "rlacd.extras.limit.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts)],
+    "rlacd.extras.limit.cut_and_merge": lambda tree, *_, of: [(tree.root, of.parts or of.pieces)],
     "rlacd.find_parts.grow_cover": lambda parts, *_, of: [(parts[0].whole, of)],
     "rlacd.find_parts.eliminate_parts": lambda context, *_, of: [(context.root, of)],
     "rlacd.extras.limit.eliminate_parts": lambda context, *_, of: [(context.root, of)],
     "rlacd.find_parts.search": lambda context, *_, of: [(context.root, parts) for parts in of[0]],
     "rlacd.proxy.model.Transfer.__call__": lambda self, *_, of: [(self.solid, of[0])],
-    "rlacd.find_parts.Model.transfer": lambda self, *_, of: [(self.solid, of)],
+    "rlacd.proxy.model.Transfer.moved": lambda self, *_, of: [(self.solid, of)],
     "rlacd.extras.limit.cut_to_limits": lambda parts, limited, solid, *_, of: [(solid, of)],
     "rlacd.extras.limit.at_most": lambda most, decompositions, whole, *_, of: [(whole, of)],
     "rlacd.extras.finish.overlap.overlap_parts": lambda parts, solid, *_, of: [(solid, of[0])],
@@ -195,7 +195,7 @@ def is_covered(root: Component, parts: Sequence[Part]) -> bool:
 def left(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[bool]]:
     """Whether each state that a stage leaves covers its solid, by the stage."""
     found: dict[str, list[bool]] = {}
-    monkeypatch.setattr("rlacd.proxy.model.DENSE", FEW)
+    monkeypatch.setattr("rlacd.find_parts.DENSE", FEW)
     watch(monkeypatch, STAGES, lambda path, state: found.setdefault(path, []).append(is_covered(*state)))
     return found
 
@@ -225,7 +225,7 @@ def test_a_state_that_misses_what_the_one_before_covers_is_not_the_result(
     dense: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mesh = spoon(0) if dense else table()
-    monkeypatch.setattr("rlacd.proxy.model.DENSE", FEW)
+    monkeypatch.setattr("rlacd.find_parts.DENSE", FEW)
     monkeypatch.setattr("rlacd.extras.limit.cut_to_limits", lambda parts, *_: parts[:1])
     result = rlacd.decompose(mesh, quality="fast", max_vertices=12, threads=1)
     assert outside(mesh, result.hulls) == 0
@@ -234,7 +234,7 @@ def test_a_state_that_misses_what_the_one_before_covers_is_not_the_result(
 
 
 def test_a_stopped_run_measures_its_parts_on_the_solid_not_on_the_copy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rlacd.proxy.model.DENSE", FEW)
+    monkeypatch.setattr("rlacd.find_parts.DENSE", FEW)
     monkeypatch.setattr("rlacd.run.run.FINISH", 60.0)  # enough on any machine
     mesh = spoon(3)
     frame = Frame.of(mesh.vertices)
@@ -266,7 +266,8 @@ def test_a_transfer_without_time_leaves_hulls_that_cover_the_solid() -> None:
 
 PIECES: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(
-        ["rlacd.find_parts.cut_and_merge", "rlacd.search.levels.cut_and_merge"], lambda *_, of: [of.pieces, of.parts]
+        ["rlacd.find_parts.cut_and_merge", "rlacd.search.levels.cut_and_merge"],
+        lambda *_, of: [of.pieces, of.parts or of.pieces],
     ),
     **dict.fromkeys(["rlacd.find_parts.grow_cover", "rlacd.find_parts.eliminate_parts"], lambda *_, of: [of]),
     "rlacd.find_parts.search": lambda *_, of: of[0],

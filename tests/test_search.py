@@ -208,7 +208,7 @@ def test_levels_are_ordered_where_a_proxy_is_searched(corpus: Path) -> None:
 
 @pytest.mark.nightly
 def test_time_does_not_make_the_best_level_worse_than_balanced(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = import_module("rlacd.search.levels")  # as an attribute, that name is the function
+    module = import_module("rlacd.search.levels")
     monkeypatch.setattr(module, "BEST_SECONDS", 0.01)
     balanced, best = (rlacd.decompose(corpus / SHAPES[0], quality=quality) for quality in ("balanced", "best"))
     assert len(best) <= len(balanced)

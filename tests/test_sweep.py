@@ -14,7 +14,7 @@ from rlacd import _native, cut
 from rlacd.criteria import Concavity
 from rlacd.cut import CutTree
 from rlacd.decompose_mesh import decompose
-from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, axis_and_principal
+from rlacd.planes.candidates import OFFSETS_PER_AXIS, Candidates, all_planes
 from rlacd.planes.sweep import SLIVERS, Sweep, SweepCache, least_excess, sweep
 from rlacd.policies import SCORES, Greedy
 from rlacd.policies.greedy import excess_norm, hull_sum
@@ -24,6 +24,13 @@ from rlacd.solid.component import Component, Plane
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.manifold import to_manifold
 from tests.shapes import box
+
+
+def axis_and_principal(component: Component) -> Candidates:
+    """The paper's directions, with all planes of one in a row."""
+    planes = all_planes(component, OFFSETS_PER_AXIS, 0)
+    directions = np.ascontiguousarray(planes.directions[::OFFSETS_PER_AXIS])
+    return Candidates(directions, planes.offsets.reshape(-1, OFFSETS_PER_AXIS))
 
 
 def from_trimesh(mesh: trimesh.Trimesh) -> Manifold:

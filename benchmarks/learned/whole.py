@@ -30,11 +30,12 @@ from numpy.typing import NDArray
 from benchmarks.learned.fit import FOLDS, Labels, features_of, fit
 from benchmarks.learned.labels import component, leaves, listed, save, valid_of
 from rlacd.criteria import Concavity
-from rlacd.cut import CutCache, CutTree
+from rlacd.cut import CutTree
 from rlacd.errors import RlacdError
 from rlacd.io.read.load import load_mesh
+from rlacd.learn.environment import CutCache
 from rlacd.merge.numbered import NumberedParts
-from rlacd.merge.unite import _ByGrowth, _united
+from rlacd.merge.unite import ByGrowth, united
 from rlacd.planes.candidates import EDGES_PER_COMPONENT, all_planes
 from rlacd.planes.sweep import Sweep, sweep
 from rlacd.policies import Greedy, Policy
@@ -114,7 +115,7 @@ class Completions:
     def parts(self, component: Component) -> list[Component]:
         """The parts that a component ends in."""
         if component not in self._known:
-            tree = CutTree(component, self._policy, RUN, self._cache)
+            tree = CutTree(component, self._policy, RUN)
             done, left = tree.cut_until(Concavity(THRESHOLD), MOST)
             self._known[component] = done + left
         return self._known[component]
@@ -140,7 +141,7 @@ def counts_of(pieces: list[Component]) -> list[int]:
     settled, counts = Concavity(THRESHOLD).settled(pieces), [len(pieces)]
     alive = NumberedParts(pieces, settled)
     for across in (False, True):  # as `merge_parts` does
-        for _ in _united(alive, _ByGrowth(settled, across), RUN.work, RUN):
+        for _ in united(alive, ByGrowth(settled, across), RUN.work, RUN):
             pass
         counts.append(len(alive.parts))
     return counts
@@ -149,7 +150,7 @@ def counts_of(pieces: list[Component]) -> list[int]:
 def planned(root: Component) -> list[Component]:
     """The parts if each component is cut by the plane after which greedy leaves the whole in fewest merged parts."""
     cache, rng, left, done = CutCache(), np.random.default_rng(0), [root], list[Component]()
-    greedy = Completions(CutTree(root, GREEDY, RUN, cache), GREEDY, cache)
+    greedy = Completions(CutTree(root, GREEDY, RUN), GREEDY, cache)
     while left:
         node = left.pop(int(np.argmax([c.hull.volume for c in left])))
         if Concavity(THRESHOLD).is_met(node):
@@ -176,7 +177,7 @@ def planned(root: Component) -> list[Component]:
 def labels_of(path: Path, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Label planes of a few components of a mesh."""
     root, cache = Component(repair(load_mesh(path), threads=1).shape), CutCache()
-    tree = CutTree(root, GREEDY, RUN, cache)
+    tree = CutTree(root, GREEDY, RUN)
     done, left = tree.cut_until(Concavity(THRESHOLD), PARTS[1])
     if left or not PARTS[0] <= len(done) <= PARTS[1]:
         return []

@@ -12,6 +12,7 @@ _NAMES = {
     "decomposition": "Decomposition",
     "errors": "RlacdError MeshError MeshFileError MeshDataError EmptyMeshError OptionError OutputError "
     "MissingExtraError DecompositionWarning ImplausibleBodyWarning",
+    "extras.primitive": "Primitive",
     "io.robots": "RewrittenRobot rewrite_robot",
     "options.navigable": "NavigableSpace",
     "options.presets": "PRESETS Preset",
@@ -20,7 +21,6 @@ _NAMES = {
     "report": "Report",
     "run": "Progress",
     "solid.component": "Component Plane",
-    "solid.primitive": "Primitive",
     "thresholds": "Tradeoff TradeoffRow tradeoff",
     "view_file": "view",
 }

@@ -17,6 +17,7 @@ from rlacd.errors import MissingExtraError as MissingExtraError
 from rlacd.errors import OptionError as OptionError
 from rlacd.errors import OutputError as OutputError
 from rlacd.errors import RlacdError as RlacdError
+from rlacd.extras.primitive import Primitive as Primitive
 from rlacd.io.robots import RewrittenRobot as RewrittenRobot
 from rlacd.options.names import PrimitiveKind
 from rlacd.options.navigable import NavigableSpace as NavigableSpace
@@ -33,7 +34,6 @@ from rlacd.run import Progress as Progress
 from rlacd.run import ProgressCallback
 from rlacd.solid.component import Component as Component
 from rlacd.solid.component import Plane as Plane
-from rlacd.solid.primitive import Primitive as Primitive
 from rlacd.thresholds import Tradeoff as Tradeoff
 from rlacd.thresholds import TradeoffRow as TradeoffRow
 from rlacd.thresholds import tradeoff as tradeoff

@@ -21,29 +21,6 @@ FAR_FEWER = 1 / 2
 """The second policy is abandoned at this share of the components, or of the work done for them."""
 
 
-class CutCache:
-    """Pieces and sides of components, computed once for all trees of cuts: they share their first levels."""
-
-    def __init__(self) -> None:
-        self._pieces: dict[Component, list[Component]] = {}
-        self._sides: dict[tuple[Component, Plane], list[Component]] = {}
-
-    def pieces(self, component: Component) -> list[Component]:
-        """Get the connected pieces of a component; ``[component]`` if it is connected."""
-        if component not in self._pieces:
-            pieces = component.pieces()
-            self._pieces[component] = pieces if len(pieces) > 1 else [component]
-        return self._pieces[component]
-
-    def sides(self, component: Component, plane: Plane) -> list[Component]:
-        """Get the sides below and above a plane; an empty list if one side would be empty."""
-        key = component, plane
-        if key not in self._sides:
-            below, above = component.cut(plane)
-            self._sides[key] = [] if below is None or above is None else [below, above]
-        return self._sides[key]
-
-
 class CutTree:
     """The tree of cuts that a policy makes of a solid, computed on demand.
 
@@ -57,26 +34,16 @@ class CutTree:
     policy : Policy
         Chooses the planes.
     run : Run
-    cache : CutCache, optional
-        Cuts shared with other trees.
     second : Policy, optional
         Takes over if it leaves far fewer components (`FAR_FEWER`).
     """
 
-    def __init__(
-        self,
-        root: Component,
-        policy: Policy,
-        run: Run,
-        cache: CutCache | None = None,
-        second: Policy | None = None,
-    ) -> None:
+    def __init__(self, root: Component, policy: Policy, run: Run, second: Policy | None = None) -> None:
         self.root = root
         self._policy = policy
         self._run = run
-        self._cache = cache or CutCache()
         self._children: dict[Component, list[Component]] = {}
-        self._second = None if second is None else CutTree(root, second, run, self._cache)
+        self._second = None if second is None else CutTree(root, second, run)
 
     def cut_until(
         self, criterion: Criterion, most: float = math.inf, units: float = math.inf
@@ -109,7 +76,7 @@ class CutTree:
                 verdicts = dict(zip(frontier, run.map(criterion.is_met, frontier), strict=True))
                 done += [c for c in frontier if verdicts[c]]
                 frontier = [c for c in frontier if not verdicts[c]]
-                if not run.step(len(done), None, len(done) + len(left) + len(frontier)):
+                if not run.step(len(done), len(done) + len(left) + len(frontier)):
                     break
                 count, spent = len(done) + len(left) + 2 * len(frontier), run.work.done - begin  # each becomes two
                 if count > most or spent > units:
@@ -147,13 +114,14 @@ class CutTree:
 
     def _divided(self, component: Component, threads: int) -> list[Component]:
         """The connected pieces of a component, or the sides of the plane that cuts it; empty if none does."""
-        pieces = self._cache.pieces(component)
-        if pieces != [component]:
+        pieces = component.pieces()
+        if len(pieces) > 1:
             return pieces
         plane = self._policy.choose(component, threads)
         if plane is None:
             return halves(component) if is_thin(component) else []
-        return self._cache.sides(component, plane)
+        below, above = component.cut(plane)
+        return [] if below is None or above is None else [below, above]
 
 
 def halves(sliver: Component) -> list[Component]:

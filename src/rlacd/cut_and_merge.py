@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rlacd.criteria import Criterion
 from rlacd.cut import CutTree
 from rlacd.merge import merge_parts
 from rlacd.run import Run
-from rlacd.solid.component import Component, Part
+from rlacd.solid.component import Part
 
 MOST_CUTTING, MOST_PER_FACE = 5e6, 300
 """Units of work (see `rlacd.run.work`), and units per triangle of the solid, after which cutting stops: five seconds
@@ -29,21 +28,16 @@ class Pass:
     ----------
     pieces : list of Part
         The parts after cutting.
-    unmet : list of Part
-        The pieces that do not meet the criterion.
     parts : list of Part
-        The merged pieces; the pieces themselves if merging was skipped.
+        The merged pieces; the pieces themselves if they were not to be merged. Empty if the pass was given up: cutting
+        left, or was about to leave, too many.
     criterion : Criterion
         The criterion used for merging: the requested one, settled on the pieces.
-    is_too_many : bool
-        Cutting left, or was about to leave, more parts than the most allowed; nothing was merged.
     """
 
     pieces: list[Part]
-    unmet: list[Part]
     parts: list[Part]
     criterion: Criterion
-    is_too_many: bool = False
 
 
 def cut_and_merge(
@@ -69,32 +63,25 @@ def cut_and_merge(
         Times the stages ``cut`` and ``merge``. When it stops, the parts reached so far are returned.
     merge : bool
     most : float
-        Stop as soon as it is clear that cutting leaves more parts than this.
+        Give up as soon as it is clear that cutting leaves more parts than this.
     strict : bool
-        Skip merging unless all pieces meet the criterion: the caller has no use for other passes.
+        Give up unless all pieces meet the criterion: the caller has no use for other passes.
     """
     with run.stage("cut"):
         most_work = math.inf if strict else MOST_CUTTING + MOST_PER_FACE * tree.root.size
         with run.limited(most_work, cuts=None if strict else "cut"):
             done, left = tree.cut_until(criterion, most)
         pieces: list[Part] = [*done, *left]
-        if len(pieces) + len(left) > most:  # each that is left would become two
-            return Pass(pieces, [*left], pieces, criterion, is_too_many=True)
+        if len(pieces) + len(left) > most or (strict and left):  # each that is left would become two
+            return Pass(pieces, [], criterion)
         if run.stopped_by is None:
             with run.until_stopped():
                 criterion = criterion.settled(pieces)
-        if run.stopped_by is not None and not strict:
-            left = _pieces(left, run)
-            pieces = [*done, *left]
-        unmet: list[Part] = [*left]
-    if not merge or (strict and unmet):
-        return Pass(pieces, unmet, pieces, criterion)
+        if run.stopped_by is not None:
+            with run.shielded():  # there was no time to cut these
+                pieces = [*done, *(piece for component in left for piece in component.pieces())]
+    if not merge:
+        return Pass(pieces, pieces, criterion)
     with run.stage("merge"), run.limited(MOST_MERGING, cuts=None if strict else "merge"):
         parts = merge_parts(pieces, criterion, run)
-    return Pass(pieces, unmet, parts, criterion)
-
-
-def _pieces(components: Sequence[Component], run: Run) -> list[Component]:
-    """The connected pieces of components that there was no time to cut."""
-    with run.shielded():
-        return [piece for component in components for piece in component.pieces()]
+    return Pass(pieces, parts, criterion)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
@@ -16,10 +14,9 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from rlacd.decomposition import Decomposition
-from rlacd.errors import DecompositionWarning, MissingExtraError, OptionError
-from rlacd.find_parts import Reached, covered, find_parts, find_parts_of_twin
-from rlacd.finish.finish import Finished, covers, finish, finish_twin, misses_some
-from rlacd.finish.report import joint_report, missed
+from rlacd.errors import DecompositionWarning, OptionError
+from rlacd.find_parts import Reached, find_parts
+from rlacd.finish.finish import Finished, finish, whole
 from rlacd.fit import Unit
 from rlacd.io.read.contents import USUAL, Fineness
 from rlacd.io.read.load import load_mesh
@@ -32,13 +29,9 @@ from rlacd.options.navigable import NavigableSpace
 from rlacd.policies import make_policy
 from rlacd.report import Provenance
 from rlacd.run import ProgressCallback, Run
-from rlacd.solid.frame import Frame
-from rlacd.solid.hull import Hull
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.provenance import owners
-from rlacd.solid.topology import compacted
-from rlacd.solid.twins import Similarity, twins
 
 MeshLike: TypeAlias = (
     "str | os.PathLike[str] | trimesh.Trimesh | trimesh.Scene | list[trimesh.Trimesh] | tuple[ArrayLike, ArrayLike]"
@@ -131,7 +124,12 @@ def decompose_quietly(
         if asked.per_node and not apart:
             alone = f"per_node had no effect: {source.name} was read as one node"
             source = replace(source, warnings=(*source.warnings, alone))
-        done = _each_node(source, asked, run) if apart else _as_one(source, asked, run, memory or Memory())
+        if apart:
+            from rlacd.extras.nodes.each_node import each_node
+
+            done = each_node(source, asked, run)
+        else:
+            done = _as_one(source, asked, run, memory or Memory())
     report = replace(
         done.report,
         name=Path(source.name).stem or "mesh" if isinstance(mesh, (str, os.PathLike)) else "mesh",
@@ -169,7 +167,7 @@ def _obstacle(mesh: MeshLike | Obstacle) -> Obstacle:
 
 def _as_one(source: InputMesh, options: Options, run: Run, memory: Memory) -> Finished:
     if memory.reached is None:
-        memory.reached = _whole(find_parts(source, options, run), source, options, run)
+        memory.reached = whole(find_parts(source, options, run), source, options, run)
     reached = memory.reached
     run.begin_finishing()
     done = finish(reached._replace(options=replace(reached.options, detail=options.detail)), run)
@@ -178,106 +176,6 @@ def _as_one(source: InputMesh, options: Options, run: Run, memory: Memory) -> Fi
         for hull, place in zip(done.hulls, places, strict=False):
             hull.metadata |= {"node": source.nodes[place].name, "node_index": place}
     return done
-
-
-def _whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> Reached:
-    """What was reached; a cover of the input if a stop left parts that miss some of it (see `misses_some`)."""
-    return covered(source, options, run) if misses_some(reached, run) else reached
-
-
-def _each_node(source: InputMesh, options: Options, run: Run) -> Finished:
-    """Decompose every node separately; lengths of the joint report are in the frame of the whole scene."""
-    frame = Frame.of(compacted(source.vertices, source.faces)[0], source.unit)
-    scale = frame.scale
-    assert source.node_of is not None
-    used = np.unique(source.node_of).tolist()
-    meshes = [source.of_node(index) for index in used]
-    each = [options.for_node(scale, Frame.of(mesh.vertices).scale) for mesh in meshes]
-    of_one_size = options.relative_to == "scene" or options.threshold_abs is not None
-    done = _finished_nodes(meshes, each, run, of_one_size=of_one_size)
-    names = [source.nodes[place].name for place in used]
-    said = [] if run.stopped_by is not None else _clear_of_each_other(names, meshes, each, done, run, source.unit)
-    bodies = 0
-    for place, one in zip(used, done, strict=True):
-        for hull in one.hulls:
-            body = hull.metadata["body"]
-            whose = {"node": source.nodes[place].name, "node_index": place}
-            hull.metadata |= whose | {"body": None if body is None else body + bodies}
-        bodies += len(one.report.repair)
-    report = joint_report(list(zip(names, (one.report for one in done), strict=True)), scale)
-    said, distances = [*report.warnings, *said], report.hausdorff
-    if distances.missed is not None:
-        found = [hull for part in done for h in part.hulls if (hull := Hull.of(frame.to_frame(h.vertices))) is not None]
-        left_out = missed(frame.to_frame(source.specks), found, frame, run)
-        distances = replace(distances, missed=max(distances.missed, left_out.distance))
-        said[len(report.warnings) : len(report.warnings)] = left_out.said
-    told = (*source.warnings, *said)
-    joint = replace(report, options=options.as_plain(), hausdorff=distances, warnings=told)
-    return Finished([hull for one in done for hull in one.hulls], joint)
-
-
-def _finished_nodes(
-    meshes: Sequence[InputMesh], options: Sequence[Options], run: Run, *, of_one_size: bool
-) -> list[Finished]:
-    """Decompose and finish nodes; those that are one mesh in several places (of one size) take over what one reached.
-
-    With meshes to avoid, places differ in more than that.
-    """
-    numbers = range(len(meshes))
-    leaders = numbers if options[0].avoid else twins(meshes, of_one_size=of_one_size)
-    reached: dict[int, Reached] = {}
-    taken: dict[int, Similarity] = {}
-    for number in sorted(numbers, key=lambda number: leaders[number] != number):
-        mesh, own, leader = meshes[number], options[number], leaders[number]
-        twin = None if leader == number or run.stopped_by else Similarity.between(meshes[leader], mesh)
-        like = twin and find_parts_of_twin(mesh, own, reached[leader], twin, run)
-        if twin and like and run.if_in_time(partial(covers, like.parts, *like.solid.mesh, run), lambda: False):
-            reached[number], taken[number] = like, twin
-        else:
-            reached[number] = _whole(find_parts(mesh, own, run), mesh, own, run)
-    run.begin_finishing()
-    done: dict[int, Finished] = {}
-    for number, one in reached.items():
-        twin = taken.get(number)
-        done[number] = finish(one, run) if twin is None else finish_twin(one, done[leaders[number]], twin, run)
-    return [done[number] for number in numbers]
-
-
-def _clear_of_each_other(
-    names: Sequence[str],
-    meshes: Sequence[InputMesh],
-    options: Sequence[Options],
-    done: list[Finished],
-    run: Run,
-    unit: Unit,
-) -> list[str]:
-    """Decompose nodes again whose hulls touch though they do not; returns what to say of those that still do."""
-    from rlacd.clear import Body, CrowdedError, Surface, at_rest, kept_clear, may_touch, warnings_of
-
-    def body(number: int) -> Body:
-        mesh, hulls = meshes[number], done[number].hulls
-        surfaces = [Surface(hull.vertices, hull.faces) for hull in hulls]
-        return Body(names[number], Surface(mesh.vertices, mesh.faces), surfaces)
-
-    def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
-        own = replace(options[number], avoid=(*options[number].avoid, *obstacles))
-        reached = find_parts(meshes[number], own, run)
-        if run.stopped_by is not None or len(reached.parts) > most:
-            return None
-        done[number] = finish(reached, run)
-        return body(number).hulls
-
-    bodies, rest = [body(number) for number in range(len(names))], at_rest(names)
-    try:
-        if not may_touch(bodies):
-            return []
-        with run.stage("clear"):
-            cleared = run.if_in_time(lambda: kept_clear(bodies, rest, redo), lambda: None)
-    except (MissingExtraError, CrowdedError) as error:
-        return [f"Nodes were not checked against each other: {error}"]
-    if cleared is None:
-        return ["There was no time to check nodes against each other."]
-    return warnings_of(cleared, rest, unit.words)
 
 
 def in_metres(source: InputMesh, options: Options) -> tuple[InputMesh, Options]:

@@ -6,34 +6,33 @@ Transfer and limit cut again what fails; no other stage looks back.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rlacd.criteria import Criterion, Filled, LimitedCriterion
 from rlacd.cut import CutTree
 from rlacd.cut_and_merge import MOST_CUTTING, Pass, cut_and_merge
-from rlacd.merge import grow_cover, grown_parts, may_grow
+from rlacd.merge import grow_cover, grown_parts
 from rlacd.options import Options
 from rlacd.options.ranges import FAST
 from rlacd.planes.sweep import SweepCache
 from rlacd.policies import AS_PUBLISHED, Greedy, make_policy
-from rlacd.proxy.model import Model
 from rlacd.repair.repair import repair
 from rlacd.repair.slits import without_slits
 from rlacd.report import SearchSummary
 from rlacd.run import Run
-from rlacd.search import SearchContext, at_least, cost, eliminate_parts, search
-from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import Component, Part
+from rlacd.search.at_least import at_least
+from rlacd.search.levels import eliminate_parts, search
+from rlacd.search.neighbourhood import SearchContext, cost
+from rlacd.solid.component import DENSE, Component, Part
 from rlacd.solid.cover import cover, slabs
-from rlacd.solid.frame import ROUNDING
-from rlacd.solid.hull import NO_SIDES
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.resting import resting_sides
 from rlacd.solid.solid import Solid
-from rlacd.solid.twins import Similarity
+
+if TYPE_CHECKING:
+    from rlacd.proxy.simplify import Proxy
 
 COARSER = 1.5
 """The threshold grows by this factor until one part is left, after `MOST_CUTTING` units of work by its fourth power:
@@ -96,70 +95,28 @@ def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
     """Decompose a mesh until done or stopped."""
     problem = None
     with run.until_stopped():
-        problem = _Problem.of(source, options, run)
+        problem = Problem.of(source, options, run)
     if problem is None:
         return covered(source, options, run)
     solid, options, root = problem.solid, problem.options, problem.root
     if options.max_hulls == 1:
         return Reached(solid, options, problem.goal, [root], None, root)
-    decomposer = _Decomposer.of(problem, run)
+    decomposer = Decomposer.of(problem, run)
     states, goal, found = decomposer.decompose(problem.goal)
-    limited, most, parts = problem.limited(goal), options.max_hulls, states[-1]
+    most, parts = options.max_hulls, states[-1]
     if most is not None and len(parts) > most:
         from rlacd.extras.limit import at_most
 
-        parts = at_most(most, decomposer.coarser(states, goal), root, limited, run)
+        parts = at_most(most, decomposer.coarser(states, goal), root, goal, options, run)
     elif any(options.hull_limits):
         from rlacd.extras.limit import cut_to_limits
 
-        parts = cut_to_limits(parts, limited, root, options, run)
+        parts = cut_to_limits(parts, goal, root, options, run)
     before = tuple(state for state in states if most is None or len(state) <= most)
     return Reached(solid, options, goal, parts, found, root, before)
 
 
-def find_parts_under(source: InputMesh, options: Options, factors: Sequence[float], run: Run) -> Iterator[Reached]:
-    """Decompose a mesh under its goal scaled by each factor, on one tree of cuts, until one part is left.
-
-    Factors ascend from 1. Those that there is no time for are left out.
-    """
-    with run.until_stopped():
-        problem = _Problem.of(source, options, run)
-        decomposer = _Decomposer.of(problem, run)
-        options = problem.options
-        for factor in factors:
-            (*_, parts), goal, found = decomposer.decompose(problem.goal.scaled(factor))
-            if any(options.hull_limits):
-                from rlacd.extras.limit import cut_to_limits
-
-                parts = cut_to_limits(parts, problem.limited(goal), problem.root, options, run)
-            if run.stopped_by is not None:
-                break
-            yield Reached(problem.solid, options, goal, parts, found, problem.root)
-            if len(parts) <= 1:
-                break
-
-
-def find_parts_of_twin(
-    source: InputMesh, options: Options, like: Reached, twin: Similarity, run: Run
-) -> Reached | None:
-    """Take over what was reached for a mesh's twin; None if its parts do not meet the goal here, or on a stop.
-
-    The mesh is repaired and the parts are tested, so that nothing is taken for granted but their number.
-    """
-    with run.until_stopped():
-        problem = _Problem.of(source, options, run)
-        solid, goal, frame = problem.solid, problem.goal, like.solid.frame
-        parts = twin.moved([frame.to_input(part.hull.vertices) for part in like.parts], problem.root, solid.frame)
-        if parts is None or (options.max_hulls is None and not all(run.map(goal.is_met, parts))):
-            return None
-        found, same = like.found, twin.factor * like.goal.outward_deviation / frame.scale
-        if found is not None and goal.outward_deviation / solid.frame.scale > (1 + ROUNDING) * same:
-            found = replace(found, lower_bound=1)  # it holds for a tolerance that is smaller
-        return Reached(solid, problem.options, goal, parts, found, problem.root)
-    return None
-
-
-class _Problem(NamedTuple):
+class Problem(NamedTuple):
     """What is decomposed.
 
     Attributes
@@ -172,31 +129,33 @@ class _Problem(NamedTuple):
         In its frame.
     root : Component
         The solid, to be cut.
-    sides : float64 [P, 4]
-        Half-spaces on whose planes it rests: limited hulls stay in them.
     """
 
     solid: Solid
     options: Options
     goal: Criterion
     root: Component
-    sides: FloatArray
 
     @classmethod
-    def of(cls, source: InputMesh, options: Options, run: Run) -> _Problem:
+    def of(cls, source: InputMesh, options: Options, run: Run) -> Problem:
+        """Repair a mesh, and make the criterion that the options ask for."""
         with run.stage("repair"):
-            solid = _repaired(source, options, run)
+            solid = repair(
+                source,
+                resolution=options.resolution,
+                open_bodies=options.openings,
+                gap=options.gap,
+                threads=run.threads,
+                keep_cavities=options.sees_cavities,
+            )
             options = options.at_scale(solid.frame.scale)
             goal = LimitedCriterion.prepare(options, solid, run)
-            if _fills_slits(options, goal):
+            # What next to nothing gets into may become solid, but not where balls or meshes have to.
+            is_asked = options.openings == "thin" or options.keep_cavities or isinstance(goal, LimitedCriterion)
+            if not is_asked and math.isfinite(goal.outward_deviation):
                 width = min(options.gap, SLIT * goal.outward_deviation)
                 solid = without_slits(solid, width, EXTENT * goal.outward_deviation)
-        root = Component(solid.shape, run.threads)
-        return cls(solid, options, goal, root, resting_sides(root) if any(options.hull_limits) else NO_SIDES)
-
-    def limited(self, goal: Criterion) -> LimitedCriterion:
-        """A goal that limited hulls have to meet, too."""
-        return LimitedCriterion(goal, self.options.hull_limits, sides=self.sides)
+        return cls(solid, options, goal, Component(solid.shape, run.threads))
 
 
 def covered(source: InputMesh, options: Options, run: Run) -> Reached:
@@ -207,36 +166,40 @@ def covered(source: InputMesh, options: Options, run: Run) -> Reached:
 
 
 @dataclass(frozen=True)
-class _Decomposer:
-    """Decomposes a model, under coarser and coarser goals, on the same tree of cuts.
+class Decomposer:
+    """Decomposes a solid, under coarser and coarser goals, on the same tree of cuts.
 
     Attributes
     ----------
-    problem : _Problem
-    model : Model
+    problem : Problem
+    proxy : Proxy or None
+        What is cut in place of a dense solid.
     run : Run
-    sweeps : SweepCache
-        The sweeps of the cuts, which the search goes on to use.
     tree : CutTree
     """
 
-    problem: _Problem
-    model: Model
+    problem: Problem
+    proxy: Proxy | None
     run: Run
-    sweeps: SweepCache
     tree: CutTree
 
     @classmethod
-    def of(cls, problem: _Problem, run: Run) -> _Decomposer:
+    def of(cls, problem: Problem, run: Run) -> Decomposer:
         """Prepare to decompose a solid."""
-        solid, options = problem.solid, problem.options
-        model = Model.of(problem.root, solid.pieces, problem.goal, run)
+        solid, options, goal, root = problem
+        proxy = None
+        if math.isfinite(goal.outward_deviation) and root.size >= DENSE:
+            from rlacd.proxy.simplify import simplify
+
+            with run.until_stopped(), run.stage("simplify"):
+                proxy = simplify(root, goal.outward_deviation, run.threads, solid.pieces)
         solid.pieces.clear()
         is_default = options.first_policy == options.default_policy
         sweeps = SweepCache(seed=(options.seed,) if is_default and options.seed else None)
         second = Greedy("hull-sum", sweeps=sweeps) if is_default else None
-        policy = make_policy(options.first_policy, sweeps, _scale(model.tighter(problem.goal)))
-        return cls(problem, model, run, sweeps, CutTree(model.component, policy, run, second=second))
+        policy = make_policy(options.first_policy, sweeps, _tighter(goal, proxy).outward_deviation)
+        tree = CutTree(root if proxy is None else proxy.component, policy, run, second=second)
+        return cls(problem, proxy, run, tree)
 
     def decompose(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         """Cut, merge, search and transfer.
@@ -256,18 +219,18 @@ class _Decomposer:
         return len(solid.surface[1]) if solid.is_sheets else math.inf
 
     def _cut(self, goal: Criterion) -> Pass:
-        most = PIECES_A_FACE * self._few
+        goal, most = _tighter(goal, self.proxy), PIECES_A_FACE * self._few
         return cut_and_merge(self.tree, goal, self.run, merge=self.problem.options.merge, most=most)
 
     def _decomposed(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:
         with self.run.limited():
-            done = self._cut(self.model.tighter(goal))
-            if done.is_too_many:
+            done = self._cut(goal)
+            if not done.parts:
                 return [done.pieces], goal, None
             states, found = self._searched(done.parts, done.criterion, goal)
             best = states[-1]
             states = [parts for parts in states if parts is not best] + [best]
-            if self.model.proxy is None:
+            if self.proxy is None:
                 return states, done.criterion, found
             moved = [self._transferred(best, goal)]
             least = found.lower_bound if found is not None else 1
@@ -283,7 +246,7 @@ class _Decomposer:
         The given parts if they are fewer, or as many and smaller, or if no bodies are found that meet the goal.
         """
         few = self.problem.root.sides <= FEW_SIDES * len(parts)
-        if self.model.proxy is not None or len(parts) == 1 or not few or not may_grow(goal):
+        if self.proxy is not None or len(parts) == 1 or not few or not math.isfinite(goal.outward_deviation):
             return parts
         run, found = self.run, list[Part]()
         with run.limited(max(run.work.done, EXACT_WORK)):
@@ -303,18 +266,23 @@ class _Decomposer:
         factor, begin = 1.0, self.run.work.done
         while self.run.stopped_by is None:
             factor *= COARSER if self.run.work.done - begin < MOST_CUTTING else COARSER**4
+            coarse = goal.scaled(factor)
             with self.run.limited():
-                done = self._cut(self.model.tighter(goal, factor))
-            if not done.is_too_many:
-                yield self._transferred(done.parts, goal, factor)
-            if len(done.parts) <= 1:
+                done = self._cut(coarse)
+            if done.parts:
+                yield self._transferred(done.parts, coarse)
+            if len(done.parts) == 1:
                 return
 
-    def _transferred(self, parts: list[Part], goal: Criterion, factor: float = 1.0) -> list[Part]:
-        if self.model.proxy is None:
+    def _transferred(self, parts: list[Part], goal: Criterion) -> list[Part]:
+        """Parts of the solid, which meet the goal there, for those of the proxy."""
+        if self.proxy is None:
             return parts
-        policy = make_policy(self.problem.options.first_policy, SweepCache(), _scale(goal))
-        return self.model.transfer(parts, goal, factor, policy, self.run, merge=self.problem.options.merge)
+        from rlacd.proxy.model import Transfer
+
+        options = self.problem.options
+        policy = make_policy(options.first_policy, SweepCache(), goal.outward_deviation)
+        return Transfer(self.problem.root, self.proxy, goal, policy, self.run).moved(parts, merge=options.merge)
 
     def _searched(
         self, parts: list[Part], goal: Criterion, asked: Criterion
@@ -324,7 +292,7 @@ class _Decomposer:
         `asked` is the solid's unscaled goal.
         """
         options, run, found, states = self.problem.options, self.run, None, [parts]
-        policy, root = options.first_policy, self.model.component
+        policy, root = options.first_policy, self.tree.root
         context = SearchContext(root, goal, options.seed, run.work.done)
         assert options.quality is not None, "filled in by the options"
         most = math.inf if options.max_hulls is None else TIMES_TOO_MANY * options.max_hulls + TOO_MANY
@@ -344,32 +312,15 @@ class _Decomposer:
                         states = [eliminate_parts(context, parts, run)]
             else:
                 with run.stage("search"):
-                    if goes_on and goal.eliminates and goal.obstacles is not None:
+                    if goes_on and goal.obstacles is not None:
                         states = [parts := eliminate_parts(context, parts, run)]
-                    bound = run.start(partial(at_least, self.model.solid, parts, asked.outward_deviation, run))
+                    bound = run.start(partial(at_least, self.problem.root, parts, asked.outward_deviation, run))
                     enough = cache(lambda: run.if_in_time(lambda: run.result(bound), lambda: 1))
                     context = replace(context, enough=enough)
                     states, found = search(context, parts, run, options.quality, options.budget, options.search_steps)
         return states, found
 
 
-def _repaired(source: InputMesh, options: Options, run: Run) -> Solid:
-    return repair(
-        source,
-        resolution=options.resolution,
-        open_bodies=options.openings,
-        gap=options.gap,
-        threads=run.threads,
-        keep_cavities=options.sees_cavities,
-    )
-
-
-def _fills_slits(options: Options, goal: Criterion) -> bool:
-    """Whether what next to nothing gets into may become solid: not where balls or meshes have to."""
-    is_asked = options.openings == "thin" or options.keep_cavities or isinstance(goal, LimitedCriterion)
-    return not is_asked and may_grow(goal)
-
-
-def _scale(criterion: Criterion) -> float | None:
-    """How far a hull may reach beyond its part, if the criterion bounds that: an input of networks."""
-    return criterion.outward_deviation if math.isfinite(criterion.outward_deviation) else None
+def _tighter(goal: Criterion, proxy: Proxy | None) -> Criterion:
+    """The goal for what is cut: parts of a proxy have to be tighter, so that those of the solid meet it."""
+    return goal if proxy is None else goal.alone.scaled(1 - proxy.margin(goal))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 import trimesh
@@ -14,10 +14,14 @@ from rlacd.options.fields import checked
 from rlacd.options.names import PRIMITIVE_KINDS
 from rlacd.options.output import Axis, OutputOptions
 from rlacd.report import Report, sizes_of
+from rlacd.solid.balls import Balls
 from rlacd.solid.frame import Frame
+from rlacd.solid.hull import PRIMITIVE
 from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.mass import mass_of
-from rlacd.solid.primitive import PRIMITIVE, Balls, Primitive
+
+if TYPE_CHECKING:
+    from rlacd.extras.primitive import Primitive
 
 Made = TypeVar("Made", bound="Result")
 
@@ -63,6 +67,10 @@ class Result:
     def primitives(self) -> list[Primitive | None]:
         """For each hull the box, sphere, capsule or cylinder that it stands for, in the input's unit; None if none."""
         plain = [hull.metadata.get(PRIMITIVE) for hull in self.hulls]
+        if not any(plain):
+            return [None] * len(plain)
+        from rlacd.extras.primitive import Primitive
+
         return [None if each is None else Primitive.of_plain(each) for each in plain]
 
     @overload

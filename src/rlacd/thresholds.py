@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rlacd._native import mesh_volume
 from rlacd.decompose_mesh import MeshLike, in_metres
 from rlacd.errors import OptionError
-from rlacd.find_parts import Reached, find_parts_under
+from rlacd.find_parts import Decomposer, Problem, Reached
 from rlacd.finish.finish import cleaned_parts
 from rlacd.fit import ANY, Unit
 from rlacd.io.read.load import load_mesh
@@ -151,10 +151,32 @@ def rows_of(
     Those behind a single hull are left out, and those that there is no time for.
     """
     rows = []
-    for factor, reached in zip(factors, find_parts_under(source, options, factors, run), strict=False):
+    for factor, reached in zip(factors, _reached(source, options, factors, run), strict=False):
         unit = 1.0 if options.threshold_abs is None else reached.solid.frame.scale
         rows.append(_row(finest * factor, reached, unit, run))
     return rows
+
+
+def _reached(source: InputMesh, options: Options, factors: Sequence[float], run: Run) -> Iterator[Reached]:
+    """Decompose a mesh under its goal scaled by each factor, on one tree of cuts, until one part is left.
+
+    Factors ascend from 1. Those that there is no time for are left out.
+    """
+    with run.until_stopped():
+        problem = Problem.of(source, options, run)
+        decomposer = Decomposer.of(problem, run)
+        options = problem.options
+        for factor in factors:
+            (*_, parts), goal, found = decomposer.decompose(problem.goal.scaled(factor))
+            if any(options.hull_limits):
+                from rlacd.extras.limit import cut_to_limits
+
+                parts = cut_to_limits(parts, goal, problem.root, options, run)
+            if run.stopped_by is not None:
+                break
+            yield Reached(problem.solid, options, goal, parts, found, problem.root)
+            if len(parts) <= 1:
+                break
 
 
 def _row(threshold: float, reached: Reached, unit: float, run: Run) -> TradeoffRow:

@@ -20,9 +20,8 @@ from fuzz.geometry import Polytope, why_not_convex
 from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.criteria.limited import limited_part
-from rlacd.extras.limit import few_enough
+from rlacd.extras.limit import few_enough, united_in_turn
 from rlacd.finish.finish import limit_part
-from rlacd.merge.unite import united_in_turn
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run, Work
 from rlacd.solid.component import Component

@@ -10,7 +10,7 @@ import trimesh
 
 import rlacd
 from fuzz.geometry import Polytope
-from rlacd.finish.report import engine_shortcomings
+from rlacd.extras.finish.limits import engine_shortcomings
 from rlacd.options.presets import PRESETS, find_preset
 from rlacd.solid.hull import Hull
 

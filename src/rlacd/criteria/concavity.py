@@ -20,7 +20,6 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion, CriterionSummary
-from rlacd.errors import OptionError
 from rlacd.fit import ANY, LengthFit, Unit
 from rlacd.options import Options
 from rlacd.run import Run
@@ -72,11 +71,6 @@ class Distance(Criterion):
     unit
         In which warnings tell lengths of the frame.
 
-    Raises
-    ------
-    OptionError
-        The threshold is not positive.
-
     Notes
     -----
     Inside a convex polytope, the distance to its surface is the least distance to a facet's plane; the distance to the
@@ -97,23 +91,10 @@ class Distance(Criterion):
     eliminates: ClassVar[bool] = True
     """A third more time saves a tenth of the parts, and the parts around a hole need not be 8, 16 or 32."""
 
-    def __post_init__(self) -> None:
-        if not self.threshold > 0:
-            raise OptionError(f"The {self.name} threshold must be positive, not {self.threshold}; 0.05 is usual.")
-
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> Distance:
         """Make the criterion."""
         return cls(options.threshold, solid.frame.unit)
-
-    @property
-    def reach(self) -> float:
-        """Twice the threshold: in a wider gap, the middle of the joint hull is too far from both."""
-        return 2 * self.threshold
-
-    def credit(self, part: Part) -> float:
-        """The part's volume: the rest of the hull is what lies between the surfaces."""
-        return part.volume
 
     def volume_error(self, volume: float, hull_volume: float) -> float:
         """``0.3 R_v``."""
@@ -173,8 +154,6 @@ class Distance(Criterion):
         Values up to ``floor`` need not be resolved: for them the interval may be as wide as ``(0, floor)``. That is
         much faster for nearly convex parts with many faces, which otherwise need cells as small as the tolerance.
         """
-        if not tolerance > 0:
-            raise OptionError(f"The tolerance must be positive, not {tolerance}; 0.001 is usual.")
         radius = volume_radius(part.filled, (part.exact or part.hull).volume) if self.weight else 0.0
         by_volume = self.weight * radius
         lengths = part.whole.against.measure(part.hull.body, tolerance, max(floor, by_volume + tolerance))

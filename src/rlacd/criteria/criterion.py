@@ -11,8 +11,8 @@ from rlacd import _native
 from rlacd.options import Options
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import Balls
 from rlacd.solid.component import Component, Part
-from rlacd.solid.primitive import Balls
 from rlacd.solid.solid import Solid
 
 if TYPE_CHECKING:
@@ -50,12 +50,18 @@ class Criterion(Protocol):
 
     @property
     def reach(self) -> float:
-        """Distance beyond which two parts cannot be one, unless the solid fills what lies between them."""
-        return math.inf
+        """Distance beyond which two parts cannot be one, unless the solid fills what lies between them.
+
+        By default twice what hulls may reach: in a wider gap, the middle of the joint hull is too far from both.
+        """
+        return 2 * self.outward_deviation
 
     def credit(self, part: Part) -> float:
-        """Volume credited to a part; a pair costs |CH| - the credits of both, and the cheapest merges first."""
-        return sum(piece.hull.volume for piece in part.members) if part.members else part.hull.volume
+        """Volume credited to a part; a pair costs |CH| - the credits of both, and the cheapest merges first.
+
+        By default the part's own: the rest of its hull is what criteria count.
+        """
+        return part.volume
 
     def volume_error(self, volume: float, hull_volume: float) -> float:
         """The error that the volumes of a part and its hull alone give it."""

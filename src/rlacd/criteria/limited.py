@@ -17,11 +17,11 @@ from rlacd.options import Options
 from rlacd.options.presets import HullLimits
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import NO_BALLS, Balls
 from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, keeps, limit_hull
 from rlacd.solid.passages import passage_balls
-from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.resting import within_reach
 from rlacd.solid.solid import Solid
 
@@ -74,9 +74,6 @@ def _named(name: str) -> type[Criterion]:
     return Distance if name == "distance" else Concavity
 
 
-FINEST_SHARE = 0.01
-"""Parts whose hulls enter a mesh to avoid are cut down to this share of the threshold."""
-
 CLEARLY = 0.99
 """Share of the allowed distance that limits may use, since criteria are decided to 0.1% of it."""
 
@@ -104,8 +101,6 @@ class LimitedCriterion(Criterion):
         The largest balls that fit in the solid's passages, and the balls that stay free of hulls.
     avoided : Avoided or None
         The meshes that hulls may not enter.
-    finest : Distance or None
-        A part that is as tight as this is cut no further to avoid it.
     sides : float64 [P, 4]
         Half-spaces in which limited hulls stay, on whose planes the solid can rest.
     """
@@ -115,7 +110,6 @@ class LimitedCriterion(Criterion):
     free: Balls = NO_BALLS
     kept: Balls = NO_BALLS
     avoided: Avoided | None = None
-    finest: Distance | None = None
     sides: FloatArray = field(default_factory=lambda: NO_SIDES)
 
     @classmethod
@@ -126,8 +120,8 @@ class LimitedCriterion(Criterion):
         if options.avoid:
             from rlacd.extras.criteria.avoided import Avoided
 
-            avoided = Avoided.of(options.avoid, solid, 1 if run is None else run.threads)
-            made = replace(made, avoided=avoided, finest=Distance(FINEST_SHARE * options.threshold))
+            threads = 1 if run is None else run.threads
+            made = replace(made, avoided=Avoided.of(options.avoid, solid, options.threshold, threads))
         if run is not None and (options.keep_open is not None or options.keep_open_abs is not None):
             free, kept = _passages(criterion, options, solid, run)
             return replace(made, free=free, kept=kept)
@@ -189,14 +183,11 @@ class LimitedCriterion(Criterion):
         return replace(self, criterion=self.criterion.of_facets, limits=NO_LIMITS)
 
     def _is_met(self, part: Part, exact: Part) -> bool:
-        narrows = len(self.kept) > 0 and self._intrusions.any_beyond(part, ROUNDING)
-        return not narrows and not self._enters(part, exact) and self.criterion.is_met(part)
-
-    def _enters(self, part: Part, exact: Part) -> bool:
-        """Whether the hull enters a mesh to avoid, and the part is not too fine to be cut for that."""
-        if self.avoided is None or not self.avoided.is_entered(part.hull):
+        if len(self.kept) > 0 and self._intrusions.any_beyond(part, ROUNDING):
             return False
-        return self.finest is None or not self.finest.is_met(exact)
+        if self.avoided is not None and self.avoided.is_in_the_way(part.hull, exact):
+            return False
+        return self.criterion.is_met(part)
 
     def error(self, part: Part) -> float:
         """The error of the part with the limited hull it ends with: off the sides, where the one on them fails."""
@@ -214,10 +205,9 @@ class LimitedCriterion(Criterion):
     def scaled(self, factor: float) -> LimitedCriterion:
         """The coarser criterion: hulls may take more of balls, and coarser parts enter meshes, by that factor."""
         radii = np.maximum(self.free.radii - factor * (self.free.radii - self.kept.radii), 0.0)
-        finest = self.finest and self.finest.scaled(factor)
-        return replace(
-            self, criterion=self.criterion.scaled(factor), kept=Balls(self.free.centres, radii), finest=finest
-        )
+        avoided = self.avoided and self.avoided.scaled(factor)
+        kept = Balls(self.free.centres, radii)
+        return replace(self, criterion=self.criterion.scaled(factor), kept=kept, avoided=avoided)
 
     @property
     def alone(self) -> Criterion:

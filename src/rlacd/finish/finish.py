@@ -18,24 +18,25 @@ import trimesh
 from rlacd import _native
 from rlacd.criteria import Criterion
 from rlacd.criteria.limited import limited_part
-from rlacd.find_parts import Reached
+from rlacd.find_parts import Reached, covered
 from rlacd.finish.report import make_report
 from rlacd.fit import RESOLVED
+from rlacd.options import Options
 from rlacd.options.navigable import LARGEST_COORDINATE
 from rlacd.options.presets import HullLimits
 from rlacd.options.ranges import SIMPLE
 from rlacd.report import COVERAGE_TOLERANCE, Overlap, Report
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray
+from rlacd.solid.balls import Balls
 from rlacd.solid.component import DENSE, Part
 from rlacd.solid.distance import PLACES, hull_union
 from rlacd.solid.frame import GROWTH_TO_SPARE, ROUNDING, Frame
-from rlacd.solid.hull import NO_LIMITS, NO_SIDES, TOLERANCE, Hull, keeps
-from rlacd.solid.primitive import PRIMITIVE, Balls
+from rlacd.solid.hull import NO_LIMITS, NO_SIDES, PRIMITIVE, TOLERANCE, Hull, keeps
+from rlacd.solid.input_mesh import InputMesh
 from rlacd.solid.provenance import owners
 from rlacd.solid.resting import resting_sides, within_reach
 from rlacd.solid.solid import Solid
-from rlacd.solid.twins import Similarity
 
 LARGEST = float(np.finfo(np.float64).max)
 """The largest coordinate."""
@@ -49,25 +50,29 @@ class Finished(NamedTuple):
     balls: Balls | None = None
 
 
-def misses_some(reached: Reached, run: Run) -> bool:
-    """Whether a stop left parts that miss some of a small solid, as can happen where it crosses itself."""
-    if run.stopped_by is None or not 0 < len(reached.solid.faces) <= PLACES:
-        return False
-    with run.shielded():
-        return not covers(reached.parts, *reached.solid.mesh, run)
-
-
 def covers(parts: Sequence[Part], vertices: FloatArray, faces: IntArray, run: Run) -> bool:
     """Whether no point of a surface [V, 3], [F, 3] lies farther outside the hulls of parts than tolerated."""
     union = hull_union([part.hull for part in parts], run.threads)
     return union.under(vertices, faces, RESOLVED, run.threads, COVERAGE_TOLERANCE)[0] <= COVERAGE_TOLERANCE
 
 
-def finish(reached: Reached, run: Run, *, is_clean: bool = False) -> Finished:
-    """Clean the parts, carry them to the input's unit, and measure them; repeat if hulls have to grow.
+def whole(reached: Reached, source: InputMesh, options: Options, run: Run) -> Reached:
+    """What was reached; a cover of the input if a stop left parts that miss some of it.
 
-    Parts that are clean stay as they are. What a state covers, every later state covers: a state that misses some of
-    the solid is not the result, the latest one that misses nothing is.
+    That can happen where a small solid crosses itself.
+    """
+    if run.stopped_by is None or not 0 < len(reached.solid.faces) <= PLACES:
+        return reached
+    with run.shielded():
+        is_whole = covers(reached.parts, *reached.solid.mesh, run)
+    return reached if is_whole else covered(source, options, run)
+
+
+def finish(reached: Reached, run: Run, *, is_clean: bool = False) -> Finished:
+    """Clean the parts unless they are clean, carry them to the input's unit, and measure them; repeat if hulls grow.
+
+    What a state covers, every later state covers: a state that misses some of the solid is not the result, the latest
+    one that misses nothing is.
     """
     done, parts = _finished(reached, run, is_clean)
     under = done.report.hausdorff.missed
@@ -82,19 +87,6 @@ def finish(reached: Reached, run: Run, *, is_clean: bool = False) -> Finished:
         return done
     again, _ = _finished(reached._replace(parts=grown), run, is_clean)
     return again if run.stopped_by is None else done
-
-
-def finish_twin(reached: Reached, like: Finished, twin: Similarity, run: Run) -> Finished:
-    """Finish what was taken over from a mesh's twin with the finished hulls of that, if they meet the goal here."""
-    options, root = reached.options, reached.root
-    assert root is not None, "parts are taken over to a solid"
-    if not options.primitive_kinds and options.overlap == 0:
-        corners = [np.asarray(hull.vertices) for hull in like.hulls]
-        parts = twin.moved(corners, root, reached.solid.frame)
-        if parts is not None and run.if_in_time(lambda: all(run.map(reached.goal.is_met, parts)), lambda: False):
-            cleaned = reached._replace(parts=parts, before=(reached.parts,))
-            return finish(cleaned, run, is_clean=True)
-    return finish(reached, run)
 
 
 def _covering(reached: Reached, finished: Sequence[Part], run: Run) -> Reached | None:
@@ -260,12 +252,12 @@ def simple_part(part: Part, criterion: Criterion, limits: HullLimits, sides: Flo
 def limit_part(part: Part, limits: HullLimits, criterion: Criterion, sides: FloatArray = NO_SIDES) -> Part:
     """Get the part with a hull inside the limits and without nearly redundant corners; the same part if unchanged.
 
-    Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet a given criterion.
+    Without such corners a hull is up to 1e-6 larger. They stay if the part would then no longer meet the criterion.
     For `sides` see `limit_hull`; if no hull in them meets the criterion, the criterion comes first.
     """
     limited = limited_part(part, limits, criterion.of_facets.outward_deviation, sides=sides)
     if limited is part:
-        return limited
+        return part
     if (criterion if limited.exact is None else criterion.of_facets).is_met(limited):
         return limited
     if len(sides):

@@ -15,11 +15,11 @@ from rlacd.fit import Unit
 from rlacd.report import Passage
 from rlacd.run import Run
 from rlacd.solid.arrays import BoolArray, FloatArray, dots
+from rlacd.solid.balls import Balls
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.hull import Hull
 from rlacd.solid.passages import FACES, passage_balls
-from rlacd.solid.primitive import Balls
 
 NARROWEST = 8 * HALF_THICKNESS
 """Least radius of passages looked for (the longest side is 2): folds of scans and gaps of sheets are narrower."""

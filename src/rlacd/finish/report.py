@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from itertools import accumulate
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
 
 from rlacd import _native
-from rlacd.criteria.limited import FINEST_SHARE
 from rlacd.find_parts import Reached
 from rlacd.finish.narrowed import Narrowed, narrowed, too_narrow
 from rlacd.options import Options
 from rlacd.options.names import PRIMITIVE_KINDS
-from rlacd.options.presets import Preset, find_preset
+from rlacd.options.presets import find_preset
 from rlacd.report import (
     COVERAGE_TOLERANCE,
-    Avoids,
     Hausdorff,
-    NodeHulls,
     Overlap,
     Point,
     Report,
@@ -33,8 +27,8 @@ from rlacd.solid.arrays import FloatArray
 from rlacd.solid.component import Part, concatenated
 from rlacd.solid.distance import hull_distances, hull_union
 from rlacd.solid.frame import Frame
-from rlacd.solid.hull import Hull, is_sliver
-from rlacd.solid.mass import joint_mass, mass_of
+from rlacd.solid.hull import Hull
+from rlacd.solid.mass import mass_of
 from rlacd.solid.solid import Solid
 
 MOST_HOLES = 1000
@@ -90,11 +84,19 @@ def make_report(
         warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
         warnings += _unmeasured(solid) if has_surface and distances is None else []
         warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
-        warnings += [*_stuck_out(parts, reached), *summary.warnings, *missed]
-        warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
-        warnings += avoided.warnings_of(entered, _why_entered(run), solid.frame.told_in) if avoided and entered else []
+        if any(options.hull_limits):
+            from rlacd.extras.finish.limits import stuck_out
+
+            warnings += stuck_out(parts, reached)
+        warnings += [*summary.warnings, *missed]
+        is_stopped = run.stopped_by is not None
+        warnings += too_narrow(distances.narrowed, reached, is_stopped) if distances else []
+        if avoided and entered:
+            warnings += avoided.warnings_of(entered, solid.frame.told_in, is_stopped=is_stopped)
         if criterion.obstacles is not None and not is_cover:
-            warnings += _out_of_the_box([part.hull for part in parts], solid)
+            from rlacd.extras.finish.limits import out_of_the_box
+
+            warnings += out_of_the_box([part.hull for part in parts], solid)
         return Report(
             options=options.as_plain(),
             complete=run.stopped_by is None,
@@ -119,13 +121,6 @@ def make_report(
         )
 
 
-def _why_entered(run: Run) -> str:
-    """Why finer cuts did not help."""
-    if run.stopped_by is not None:
-        return "the work was stopped before"
-    return f"parts within {FINEST_SHARE:.0%} of the threshold, and those that limits leave no way, are cut no further"
-
-
 def _primitives(parts: Sequence[Part]) -> dict[str, int]:
     """How many parts are of each kind; those that stayed hulls last."""
     kinds = [None if part.hull.primitive is None else part.hull.primitive.kind for part in parts]
@@ -142,104 +137,6 @@ def _shallow(seams: Overlap | None, overlap: str) -> list[str]:
         f"{seams.short} of {seams.seams} seams between hulls overlap by less than {overlap}: more would break "
         "the criterion. A smaller overlap or a larger threshold helps."
     ]
-
-
-def joint_report(reports: Sequence[tuple[str, Report]], scale: float) -> Report:
-    """Join the reports of a scene's nodes, which were decomposed separately.
-
-    Parameters
-    ----------
-    reports : sequence of (str, Report)
-        Each node's name and report.
-    scale : float
-        Frame units of the scene per unit of the input; joint lengths are in that frame.
-    """
-    each, factors = [report for _, report in reports], [scale / report.scale for _, report in reports]
-    first, stopped = each[0], next((report for report in each if not report.complete), each[0])
-    begins = [*accumulate((len(report.repair) for report in each), initial=0)]
-    bodies = [*zip(reports, factors, begins, strict=False)]
-    return Report(
-        options=first.options,
-        complete=stopped.complete,
-        stopped_by=stopped.stopped_by,
-        **{what: sum(getattr(report, what) for report in each) for what in ("hulls", "triangles", "vertices")},
-        primitives=_added([report.primitives for report in each]),
-        overlap=_joint_overlap(each),
-        **_joint_fit(each, factors),
-        avoid=_joint_avoid([report.avoid for report in each if report.avoid is not None]),
-        hausdorff=Hausdorff(
-            _farthest([report.hausdorff.added for report in each], factors),
-            _farthest([report.hausdorff.missed for report in each], factors),
-        ),
-        passages=tuple(replace(one, node=name) for name, report in reports for one in report.passages or ()),
-        nodes=tuple(NodeHulls(name, report.hulls, report.scale) for name, report in reports),
-        scale=scale,
-        mass=joint_mass([report.mass for report in each]),
-        repair=tuple(
-            replace(body, body=begin + i, deviation=body.deviation * factor, node=name)
-            for (name, report), factor, begin in bodies
-            for i, body in enumerate(report.repair)
-        ),
-        holes=tuple(
-            replace(hole, body=begin + hole.body, node=name)
-            for (name, report), _, begin in bodies
-            for hole in report.holes
-        ),
-        lower_bound=_sum_known([report.lower_bound for report in each]),
-        warnings=tuple(f"{name}: {warning}" for name, report in reports for warning in report.warnings),
-        unit=first.unit,
-    )
-
-
-def _sum_known(counts: Sequence[int | None]) -> int | None:
-    known = [count for count in counts if count is not None]
-    return sum(known) if len(known) == len(counts) else None
-
-
-def _joint_fit(each: Sequence[Report], factors: Sequence[float]) -> dict[str, Any]:
-    """The criterion's measurement of the parts of all nodes; lengths grow by each node's factor."""
-    fits = [fit for report in each if (fit := report.fit) is not None]
-    known, scaled = [fit.per_part for fit in fits if fit.per_part is not None], [*zip(fits, factors, strict=True)]
-    errors = [e * fit.unit(factor) for fit, factor in scaled for e in fit.per_part or ()]
-    found: dict[str, Any] = {"per_part": tuple(errors), "max": max(errors, default=None)}
-    if len(known) < len(fits):
-        found = {"per_part": None, "max": None}
-    if fits[0].is_length:
-        found["threshold"] = max(fit.limit * factor for fit, factor in scaled if fit.limit is not None)
-    return {fits[0].key: replace(getattr(each[0], fits[0].key), **found)}
-
-
-def _farthest(lengths: Sequence[float | None], factors: Sequence[float]) -> float | None:
-    """The greatest of lengths, each times its factor; None if one is unknown."""
-    known = [length * factor for length, factor in zip(lengths, factors, strict=True) if length is not None]
-    return max(known) if len(known) == len(lengths) else None
-
-
-def _joint_overlap(each: Sequence[Report]) -> Overlap | None:
-    """Join the seams of all nodes, with parts numbered through."""
-    overlaps = [report.overlap for report in each if report.overlap is not None]
-    if not overlaps:
-        return None
-    if any(one.seams is None for one in overlaps):
-        return Overlap()
-    firsts = accumulate((report.hulls for report in each), initial=0)
-    short = [
-        replace(seam, hulls=(first + seam.hulls[0], first + seam.hulls[1]))
-        for first, one in zip(firsts, overlaps, strict=False)
-        for seam in one.short_seams or ()
-    ]
-    return Overlap(sum(one.seams or 0 for one in overlaps), len(short), tuple(short))
-
-
-def _joint_avoid(each: Sequence[Avoids]) -> Avoids | None:
-    """Join what hulls of all nodes enter: a mesh entered by several nodes is listed for each."""
-    crossed = dict.fromkeys(name for one in each for name in one.crossed)
-    return Avoids(tuple(crossed), tuple(entry for one in each for entry in one.entered)) if each else None
-
-
-def _added(counts: Sequence[Mapping[str, int] | None]) -> dict[str, int] | None:
-    known = [count for count in counts if count is not None]
-    return {kind: sum(count[kind] for count in known) for kind in known[0]} if known else None
 
 
 def _distances(reached: Reached, parts: Sequence[Part], run: Run) -> _Distances:
@@ -278,24 +175,6 @@ def missed(points: FloatArray, hulls: Sequence[Hull], frame: Frame, run: Run) ->
     )
 
 
-def _stuck_out(parts: Sequence[Part], reached: Reached) -> list[str]:
-    """How far hulls stick out because of limits on their vertices and triangles, where without them they would not."""
-    facets, limits, unit = reached.goal.of_facets, reached.options.hull_limits, reached.solid.frame.unit
-    if not math.isfinite(facets.outward_deviation):
-        return []
-    tight = [part for part in parts if part.exact and facets.is_met(part.with_hull(part.exact))]
-    beyond = [error for part in tight if (error := facets.error(part)) > facets.outward_deviation]
-    if not beyond:
-        return []
-    counts = zip(limits, ("vertices", "triangles"), strict=True)
-    most = " and ".join(f"{limit} {what}" for limit, what in counts if limit is not None)
-    farthest, allowed = unit.apart(max(beyond), facets.outward_deviation)
-    return [
-        f"{_hulls(len(beyond), 'sticks', 'stick')} out by up to {farthest}, more than {allowed}: "
-        f"with at most {most} they cannot fit closer unless there are many more."
-    ]
-
-
 def _unmeasured(solid: Solid) -> list[str]:
     sentences = ["There was no time to measure how far hulls and input are apart."]
     moved = max((body.deviation for body in solid.bodies), default=0.0)
@@ -312,19 +191,6 @@ def _coarse(solid: Solid) -> list[str]:
     return [
         f"So far from the origin, coordinates cannot resolve lengths below {finest}, so hulls thinner "
         "than that are made thicker: move the mesh to the origin."
-    ]
-
-
-def _out_of_the_box(hulls: Sequence[Hull], solid: Solid) -> list[str]:
-    """Warn of limits that no tight hull can meet: the criterion cannot see it, as there are no balls so far out."""
-    lower, upper = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    beyond = max(float(max((lower - hull.box[0]).max(), (hull.box[1] - upper).max())) for hull in hulls)
-    if beyond <= COVERAGE_TOLERANCE:
-        return []
-    out = solid.frame.unit.words(beyond)
-    return [
-        f"The hulls extend up to {out} outside the solid's bounding box, where a ball may go: the limits on "
-        "vertices or faces allow no tighter ones."
     ]
 
 
@@ -351,7 +217,11 @@ def _early_end(run: Run) -> list[str]:
 def _shortcomings(hulls: Sequence[Hull], distances: _Distances | None, reached: Reached, exceeds: bool) -> list[str]:
     """Say what hulls miss, and how far they reach out unless the criterion has reported that (`exceeds`)."""
     options, unit = reached.options, reached.solid.frame.unit
-    sentences = [] if options.preset is None else engine_shortcomings(find_preset(options.preset), hulls)
+    sentences: list[str] = []
+    if options.preset is not None:
+        from rlacd.extras.finish.limits import engine_shortcomings
+
+        sentences += engine_shortcomings(find_preset(options.preset), hulls)
     if options.max_hulls is not None and len(hulls) > options.max_hulls:
         sentences.append(f"{len(hulls)} hulls are left, more than the {options.max_hulls} asked for.")
     if options.quality == "best" and reached.found is None and options.max_hulls is not None and exceeds:
@@ -377,29 +247,3 @@ def _why_beyond(solid: Solid, options: Options) -> str:
     if filled and options.openings != "thin":
         return "repair closed openings (see `repair`), which --openings thin leaves open"
     return "repair moved the surface there (see `repair`)"
-
-
-def engine_shortcomings(engine: Preset, hulls: Sequence[Hull]) -> list[str]:
-    """One sentence for each limit of an engine that hulls exceed."""
-    sentences = []
-    for what, limit, counts in (
-        ("vertices", engine.max_vertices, [len(hull.vertices) for hull in hulls]),
-        ("triangles", engine.max_faces, [len(hull.faces) for hull in hulls]),
-    ):
-        over = [count for count in counts if limit is not None and count > limit]
-        if over:
-            sentences.append(
-                f"{_hulls(len(over), 'has', 'have')} up to {max(over)} {what}, more than {limit}, the limit for "
-                f"{engine.engine}."
-            )
-    thin = 0 if engine.slivers else sum(is_sliver(hull, 1 / 200) for hull in hulls)  # a ball is two radii thick
-    if thin:
-        sentences.append(
-            f"{_hulls(thin, 'is', 'are')} thinner than 1/100 of the largest extent, which {engine.engine} refuses or "
-            "handles on the CPU: thicken the mesh there."
-        )
-    return sentences
-
-
-def _hulls(count: int, one: str, many: str) -> str:
-    return f"1 hull {one}" if count == 1 else f"{count} hulls {many}"

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rlacd.criteria import Criterion
-from rlacd.cut import CutCache
 from rlacd.learn.options import TrainOptions
 from rlacd.planes.candidates import Candidates
 from rlacd.planes.sweep import paper_planes, valid_planes
@@ -49,6 +48,29 @@ class Step:
 def terminal_reward(parts: int) -> float:
     """Eq. 3 of a decomposition into `parts` >= 1 finished components: 1 / (1 + log(parts - 1)), at most 1."""
     return 1 / (1 + math.log(max(parts - 1, 1)))
+
+
+class CutCache:
+    """Pieces and sides of components, computed once for all episodes: they share their first cuts."""
+
+    def __init__(self) -> None:
+        self._pieces: dict[Component, list[Component]] = {}
+        self._sides: dict[tuple[Component, Plane], list[Component]] = {}
+
+    def pieces(self, component: Component) -> list[Component]:
+        """Get the connected pieces of a component; ``[component]`` if it is connected."""
+        if component not in self._pieces:
+            pieces = component.pieces()
+            self._pieces[component] = pieces if len(pieces) > 1 else [component]
+        return self._pieces[component]
+
+    def sides(self, component: Component, plane: Plane) -> list[Component]:
+        """Get the sides below and above a plane; an empty list if one side would be empty."""
+        key = component, plane
+        if key not in self._sides:
+            below, above = component.cut(plane)
+            self._sides[key] = [] if below is None or above is None else [below, above]
+        return self._sides[key]
 
 
 class Memory:

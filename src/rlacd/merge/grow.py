@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd.criteria.criterion import Criterion
-from rlacd.merge.unite import merge_parts
+from rlacd.merge.unite import joint_part, merge_parts
 from rlacd.run import Run, work
 from rlacd.solid.arrays import BoolArray, FloatArray, heights
 from rlacd.solid.component import DENSE, Component, Part, Plane, is_thin
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS
-from rlacd.solid.hull import TOLERANCE, Hull, is_sliver
+from rlacd.solid.hull import TOLERANCE, is_sliver
 
 CROSSING, SHARED = 0.4, 1.05
 """Bodies cross where in at least this share of the hulls the solid fills so many times the volume of their pieces: on
@@ -52,20 +52,16 @@ def grow_cover(merged: list[Part], criterion: Criterion, run: Run) -> list[Part]
     merged : list of Part
         Parts that meet the criterion; their members are the pieces.
     criterion : Criterion
+        If it does not bound how far hulls may reach beyond the solid, none can grow.
     run : Run
         The merged parts are returned when its work runs out.
     """
-    if not may_grow(criterion) or merged[0].whole.size > DENSE:
+    if not math.isfinite(criterion.outward_deviation) or merged[0].whole.size > DENSE:
         return merged
     if sum(map(_shares, merged)) < CROSSING * len(merged):
         return merged
     pieces = [member for part in merged for member in part.members]
     return grown_parts(pieces, WORTH * len(merged), criterion, run) or merged
-
-
-def may_grow(criterion: Criterion) -> bool:
-    """Whether a criterion bounds how far hulls may reach beyond the solid, and by nothing else."""
-    return criterion.obstacles is None and math.isfinite(criterion.outward_deviation)
 
 
 def _shares(part: Part) -> bool:
@@ -87,7 +83,7 @@ def grown_parts(pieces: Sequence[Component], most: float, criterion: Criterion, 
         chosen = _chosen(pieces, grown)
         if len(chosen) > most:  # samples show it
             return []
-        parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run, whole), run)
+        parts = drop_slivers(_taken(pieces, [grown[i] for i in chosen], criterion, run), run)
         parts = drop_slivers(merge_parts(parts, criterion, run), run) if parts else []
     return [] if run.is_over or len(parts) > most else parts
 
@@ -119,9 +115,7 @@ def _held(points: FloatArray, spaces: FloatArray) -> NDArray[np.intp]:
     return held
 
 
-def _taken(
-    pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run, whole: Component
-) -> list[Part]:
+def _taken(pieces: Sequence[Component], grown: Sequence[FloatArray], criterion: Criterion, run: Run) -> list[Part]:
     """Parts of what each intersection of half-spaces holds, if they meet the criterion, and parts of the rest.
 
     Empty if most do not, or if the rest comes apart.
@@ -131,15 +125,10 @@ def _taken(
         if tried > 2 * (len(parts) + 1):  # grown hulls are mostly empty space
             return []
         inside, outside, units = _divided(rest, spaces)
-        hull = Hull.of(*(member.hull.vertices for member in inside)) if inside else None
         if not run.may_continue() or not run.work.pay(units):
             break
-        if hull is None:
-            continue
-        part = Part(hull, tuple(inside), whole)
-        if not run.work.pay(work.uniting(len(hull.vertices))):
-            break
-        if criterion.is_met(part):
+        part = joint_part(criterion, run.work, *inside) if inside else None
+        if part is not None:
             parts.append(part)
             rest = outside
         if len(rest) > 2 * len(pieces):  # what is beside grown hulls comes apart

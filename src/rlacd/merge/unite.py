@@ -1,4 +1,4 @@
-"""Uniting pairs of parts, always the pair of least cost: merging, and fewer parts than any merging leaves.
+"""Uniting pairs of parts, always the pair of least cost: merging.
 
 Lazy best-first search: a pair waits by a bound of its cost, and is united for real only once that makes it the first.
 """
@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,31 +29,12 @@ part."""
 PAIRS_AT_ONCE = 512
 """Number of pairs tested against the solid between two checks of the run."""
 
-FIRST_REACH = 0.05
-"""Where few hulls are asked for, parts within this (the longest side is 2) are united before all others."""
-
 
 class _Pair(NamedTuple):
     cost: float  # of uniting the two: a lower bound of it as long as there is no union
     first: int
     second: int
     union: Part | None = None
-
-
-class _Rule(Protocol):
-    """Which pairs may be united, and at what cost."""
-
-    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> IntArray:
-        """Pairs [P, 2] of a new part and any other."""
-        ...
-
-    def bounds(self, alive: NumberedParts, pairs: IntArray, account: Work, threads: int) -> FloatArray | None:
-        """Lower bounds [P] of the costs; infinite for pairs that may not be united. None if that cannot be paid."""
-        ...
-
-    def cost(self, union: Part, bound: float) -> float:
-        """The cost of a union; infinite if it may not be."""
-        ...
 
 
 def merge_parts(parts: Sequence[Part], criterion: Criterion, run: Run, across: bool = True) -> list[Part]:
@@ -81,41 +62,13 @@ def merge_parts(parts: Sequence[Part], criterion: Criterion, run: Run, across: b
     alive = NumberedParts(parts, criterion)
     with run.until_stopped():
         for is_across in (False, True)[: 1 + across]:
-            for _ in _united(alive, _ByGrowth(criterion, is_across), run.work, run):
+            for _ in united(alive, ByGrowth(criterion, is_across), run.work, run):
                 pass
     return alive.in_order()
 
 
-def united_in_turn(
-    parts: Sequence[Part], criterion: Criterion, account: Work, run: Run
-) -> Iterator[tuple[list[Part], float]]:
-    """Unite parts, always the pair whose union has the least error, until one is left; yield each state and its error.
-
-    First neighbours are united, then any parts.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-    criterion : Criterion
-        Measures the errors; unions need not meet it.
-    account : Work
-        Pays for measuring. When it is spent, or the run ends, nothing is united any more.
-    run : Run
-    """
-    alive = NumberedParts(parts, criterion)
-    errors = dict(zip(alive.parts, run.map(criterion.error, parts), strict=True))
-    yield alive.in_order(), max(errors.values())
-    for reach in (FIRST_REACH, math.inf):
-        if account.is_spent:
-            return  # bounding all pairs would be in vain
-        for pair, number in _united(alive, _ByError(criterion, reach), account, run):
-            errors[number] = pair.cost
-            del errors[pair.first], errors[pair.second]
-            yield alive.in_order(), max(errors.values())
-
-
 @dataclass(frozen=True)
-class _ByGrowth:
+class ByGrowth:
     """The volume of the joint hull minus what the criterion credits to both parts; a union has to meet the criterion.
 
     Pairs across other parts are screened: most may not be united. Most neighbours may, or are gone before it is their
@@ -126,10 +79,12 @@ class _ByGrowth:
     across: bool
 
     def pairs(self, alive: NumberedParts, new: Sequence[int]) -> IntArray:
+        """Pairs [P, 2] of a new part and any other that may be united."""
         is_any = self.across and len(alive.parts) <= FEW_TO_PAIR
         return alive.boxes.pairs(new, math.inf if is_any else self.criterion.reach, across=self.across)
 
     def bounds(self, alive: NumberedParts, pairs: IntArray, account: Work, threads: int) -> FloatArray | None:
+        """Lower bounds [P] of the costs; infinite for pairs that may not be united. None if that cannot be paid."""
         vertices, volumes, credits = alive.sums(pairs)
         if not account.pay(work.screening(vertices.sum(), len(pairs))):
             return None
@@ -140,28 +95,11 @@ class _ByGrowth:
         return np.asarray(joint - credits)
 
     def cost(self, union: Part, bound: float) -> float:
+        """The cost of a union; infinite if it may not be."""
         return bound if self.criterion.is_met(union) else math.inf
 
 
-@dataclass(frozen=True)
-class _ByError:
-    """The error of the union, which the volumes alone tell some of."""
-
-    criterion: Criterion
-    reach: float
-
-    def pairs(self, alive: NumberedParts, new: Sequence[int]) -> IntArray:
-        return alive.boxes.pairs(new, self.reach)
-
-    def bounds(self, alive: NumberedParts, pairs: IntArray, account: Work, threads: int) -> FloatArray | None:
-        hulls = _native.joint_hull_volumes(alive.bodies, pairs, threads)
-        return np.array([*map(self.criterion.volume_error, alive.sums(pairs)[1].tolist(), hulls.tolist())])
-
-    def cost(self, union: Part, bound: float) -> float:
-        return self.criterion.error(union)
-
-
-def _united(alive: NumberedParts, rule: _Rule, account: Work, run: Run) -> Iterator[tuple[_Pair, int]]:
+def united(alive: NumberedParts, rule: ByGrowth, account: Work, run: Run) -> Iterator[tuple[_Pair, int]]:
     """Unite the pair of least cost again and again; yield each and its union's number.
 
     Ends when no pair is left, the run is over or the account spent: unions are paid in their order, so that how many
@@ -189,7 +127,7 @@ def _united(alive: NumberedParts, rule: _Rule, account: Work, run: Run) -> Itera
         return union, rule.cost(union, pair.cost)
 
     try:
-        while run.step(count - len(alive.parts), None, len(alive.parts)) and (pair := first()) is not None:
+        while run.step(count - len(alive.parts), len(alive.parts)) and (pair := first()) is not None:
             if pair.union is None:
                 union, cost = run.result(begun.pop(pair))
                 if not account.pay(work.uniting(len(union.hull.vertices))):
@@ -205,7 +143,7 @@ def _united(alive: NumberedParts, rule: _Rule, account: Work, run: Run) -> Itera
         run.drop(begun.values())
 
 
-def _bounded(alive: NumberedParts, rule: _Rule, new: Sequence[int], account: Work, run: Run) -> list[_Pair]:
+def _bounded(alive: NumberedParts, rule: ByGrowth, new: Sequence[int], account: Work, run: Run) -> list[_Pair]:
     """Pairs of a new part and another, as a heap; not all of them if the run ends or the account is spent."""
     found: list[_Pair] = []
     pairs = rule.pairs(alive, new)
@@ -219,9 +157,9 @@ def _bounded(alive: NumberedParts, rule: _Rule, new: Sequence[int], account: Wor
     return found
 
 
-def joint_part(first: Part, second: Part, criterion: Criterion, account: Work) -> Part | None:
-    """Unite two parts if the union meets the criterion and the account pays for deciding that."""
-    union = Part.joint(first, second)
+def joint_part(criterion: Criterion, account: Work, *parts: Part) -> Part | None:
+    """Unite parts if the union meets the criterion and the account pays for deciding that."""
+    union = Part.joint(*parts)
     return union if account.pay(work.uniting(len(union.hull.vertices))) and criterion.is_met(union) else None
 
 

@@ -4,7 +4,7 @@ reflex edges, where a component has to be cut anyway and equidistant planes only
 A component with a reflex edge is not convex, and stays non-convex until a plane through (or close to) that edge
 separates its two faces. Each edge offers the plane that bisects the reflex angle and the planes of its two faces. Of
 the many edges of a mesh, a few are chosen: deep, sharp and long ones first, and spread out (Andrews,
-"Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024). Implemented in native/decompose/reflex_edges.hpp.
+"Navigation-Driven Approximate Convex Decomposition", SIGGRAPH 2024). Implemented in native/decompose/concave_edges.hpp.
 """
 
 from __future__ import annotations
@@ -56,16 +56,6 @@ class Candidates:
         return Plane((x, y, z), float(self.offsets[k, j]))
 
 
-def axis_and_principal(component: Component) -> Candidates:
-    """Candidates of one component: the paper's 150 planes, along x, y, z and its three principal axes.
-
-    The planes divide the component's extent along each direction into equal slabs (the paper, 3.2).
-    Principal axes within 0.001 radians of a coordinate axis are replaced by it.
-    """
-    directions, offsets = _planes(component, OFFSETS_PER_AXIS, 0)
-    return Candidates(np.ascontiguousarray(directions[::OFFSETS_PER_AXIS]), offsets.reshape(-1, OFFSETS_PER_AXIS))
-
-
 def reflex_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) -> Candidates:
     """Candidates of one component: three planes for each of `count` reflex edges, without near-duplicates.
 
@@ -88,11 +78,15 @@ def reflex_edge_planes(component: Component, count: int = EDGES_PER_COMPONENT) -
 
 
 def all_planes(component: Component, per_axis: int, edges: int) -> Candidates:
-    """The planes of `axis_and_principal` and `reflex_edge_planes`, each with its own direction."""
-    normals, offsets = _planes(component, per_axis, edges)
-    return Candidates(normals, offsets[:, None])
+    """So many planes along each of x, y, z and the component's principal axes, and `reflex_edge_planes`.
 
+    The planes divide the component's extent along each direction into equal slabs (the paper, 3.2).
+    Principal axes within 0.001 radians of a coordinate axis are replaced by it.
 
-def _planes(component: Component, per_axis: int, edges: int) -> tuple[FloatArray, FloatArray]:
+    Returns
+    -------
+    Candidates
+        Each plane with its own direction.
+    """
     planes = _native.candidate_planes(component.vertices, component.faces, component.hull.body, per_axis, edges)
-    return np.ascontiguousarray(planes[:, :3]), np.ascontiguousarray(planes[:, 3])
+    return Candidates(np.ascontiguousarray(planes[:, :3]), np.ascontiguousarray(planes[:, 3:]))

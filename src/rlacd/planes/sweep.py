@@ -8,21 +8,18 @@ from __future__ import annotations
 import math
 import threading
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from rlacd import _native
-from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS, Candidates, all_planes, axis_and_principal
+from rlacd.planes.candidates import EDGES_PER_COMPONENT, OFFSETS_PER_AXIS, Candidates, all_planes
 from rlacd.solid.arrays import BoolArray, FloatArray, heights
 from rlacd.solid.component import NEGLIGIBLE_VOLUME, Component, Plane
 from rlacd.solid.frame import ROUNDING
 from rlacd.solid.hull import SLIVER_RADIUS
-
-Made = TypeVar("Made")
 
 SLIVER = 2 * SLIVER_RADIUS
 """A side thinner than this share of its largest extent is a sliver."""
@@ -78,33 +75,22 @@ def sweep(component: Component, candidates: Candidates, threads: int = 1) -> Swe
 
 
 class SweepCache:
-    """Candidate planes of components and their sweeps, kept as long as the component lives.
+    """Sweeps of components over their candidate planes, kept as long as the component lives.
 
     Parameters
     ----------
-    reflex_edges : int
-        Number of reflex edges whose planes are added.
     seed : sequence of int, optional
         Only half of the planes are candidates, drawn by this seed and the component's vertices.
     """
 
-    def __init__(
-        self,
-        reflex_edges: int = EDGES_PER_COMPONENT,
-        seed: Sequence[int] | None = None,
-    ) -> None:
-        self._reflex_edges = reflex_edges
+    def __init__(self, seed: Sequence[int] | None = None) -> None:
         self._seed = seed
-        self._candidates: WeakKeyDictionary[Component, Candidates] = WeakKeyDictionary()
         self._sweeps: WeakKeyDictionary[Component, Sweep] = WeakKeyDictionary()
         self._lock = threading.Lock()
 
     def candidates(self, component: Component) -> Candidates:
         """Get the planes of a component."""
-        return self._once(self._candidates, component, self._planes)
-
-    def _planes(self, component: Component) -> Candidates:
-        planes = all_planes(component, OFFSETS_PER_AXIS, self._reflex_edges)
+        planes = all_planes(component, OFFSETS_PER_AXIS, EDGES_PER_COMPONENT)
         if self._seed is None:
             return planes
         random = np.random.default_rng([*self._seed, zlib.crc32(component.vertices.tobytes())])
@@ -113,18 +99,13 @@ class SweepCache:
 
     def of(self, component: Component, threads: int = 1) -> Sweep:
         """Get the sweep of a component."""
-        return self._once(self._sweeps, component, lambda one: sweep(one, self.candidates(one), threads))
-
-    def _once(
-        self, known: WeakKeyDictionary[Component, Made], component: Component, make: Callable[[Component], Made]
-    ) -> Made:
         with self._lock:
-            made = known.get(component)
-        if made is None:
-            made = make(component)
+            known = self._sweeps.get(component)
+        if known is None:
+            known = sweep(component, self.candidates(component), threads)
             with self._lock:  # another thread may have done the same, with the same result
-                known[component] = made
-        return made
+                self._sweeps[component] = known
+        return known
 
 
 SLIVERS = (SLIVER, SLIVER / 100)
@@ -165,7 +146,7 @@ def paper_planes(component: Component) -> Candidates:
     Along a shorter side, the outer ones miss the component; they are not valid.
     """
     lower, upper = component.box
-    directions = axis_and_principal(component).directions
+    directions = all_planes(component, 1, 0).directions
     steps = (np.arange(OFFSETS_PER_AXIS) - OFFSETS_PER_AXIS // 2) / OFFSETS_PER_AXIS * float((upper - lower).max())
     return Candidates(directions, heights(directions, (lower + upper) / 2)[:, None] + steps)
 

@@ -1,5 +1,6 @@
 """Policies: which plane cuts a component."""
 
+import math
 from importlib.resources import as_file, files
 
 from rlacd.options.names import AS_PUBLISHED, CONTROLS, EDGES, POLICIES, WEIGHTS_ENDING, is_policy
@@ -30,7 +31,8 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     sweeps : SweepCache, optional
         Sweeps over the 150 planes and those of four reflex edges, shared with others.
     scale : float, optional
-        The criterion's length in the frame, such as the concavity threshold; an input of networks.
+        The criterion's length in the frame, such as the concavity threshold; an input of networks. Infinite if it has
+        none.
 
     Raises
     ------
@@ -41,6 +43,7 @@ def make_policy(name: str | Policy, sweeps: SweepCache | None = None, scale: flo
     """
     if not isinstance(name, str):
         return CheckedPolicy(name)
+    scale = None if scale == math.inf else scale
     if name == "greedy":
         return Greedy(sweeps=sweeps)
     if name == "navacd":

@@ -1,4 +1,4 @@
-"""The model that is cut for a solid: the solid, or a simpler copy of a dense one, whose parts are transferred.
+"""The transfer of a proxy's parts to the dense solid that it stands for.
 
 Hulls grow to take in the surface of the solid that they miss (`Against.uncovered`), so that together they cover the
 solid. What the solid fills of a hull that fails the criterion is cut.
@@ -6,7 +6,6 @@ solid. What the solid fills of a hull that fails the criterion is cut.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,13 +16,12 @@ from rlacd.cut import CutTree
 from rlacd.cut_and_merge import cut_and_merge
 from rlacd.merge import merge_parts
 from rlacd.policies import Policy
-from rlacd.proxy.simplify import Proxy, simplify
+from rlacd.proxy.simplify import Proxy
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.component import DENSE, Component, Part
+from rlacd.solid.component import Component, Part
 from rlacd.solid.frame import GROWTH_TO_SPARE, HALF_THICKNESS
 from rlacd.solid.hull import TOLERANCE, Hull, limit_hull
-from rlacd.solid.solid import Shape
 
 SIMPLE_FIRST = 2 * HALF_THICKNESS
 """The hulls of a proxy's parts are simplified within this first: they have to grow anyway. Grown hulls are simplified
@@ -102,6 +100,14 @@ class Transfer:
         with self.run.shielded():
             return reached or (self._covering(parts), 1.0)
 
+    def moved(self, parts: Sequence[Part], *, merge: bool) -> list[Part]:
+        """Transfer parts, and merge those that the proxy's tighter goal may have kept from it."""
+        with self.run.stage("transfer"):
+            moved, worst = self(parts)
+            if merge and self.run.stopped_by is None:
+                moved = merge_parts(moved, self.goal.scaled(worst), self.run)
+        return moved
+
     def _begun(self, hull: Hull) -> _Moved:
         return _Moved(Part(hull, (), self.solid))
 
@@ -152,49 +158,3 @@ class Transfer:
         for i, is_met in zip(asked, self.run.map(self.goal.is_met, [moved[i].part for i in asked]), strict=True):
             moved[i].is_met = is_met
         return [i for i in asked if not moved[i].is_met]
-
-
-@dataclass(frozen=True)
-class Model:
-    """A solid, and the proxy that is cut in its place if it is dense.
-
-    Attributes
-    ----------
-    solid : Component
-    proxy : Proxy or None
-    """
-
-    solid: Component
-    proxy: Proxy | None
-
-    @classmethod
-    def of(cls, solid: Component, pieces: Sequence[Shape], goal: Criterion, run: Run) -> Model:
-        """Make the model of a solid; `pieces` are closed solids whose union it is (see `simplify`)."""
-        proxy = None
-        if math.isfinite(goal.outward_deviation) and len(solid.faces) >= DENSE:
-            with run.until_stopped(), run.stage("simplify"):
-                proxy = simplify(solid, goal.outward_deviation, run.threads, pieces)
-        return cls(solid, proxy)
-
-    @property
-    def component(self) -> Component:
-        """The component that is cut: the proxy, or else the solid."""
-        return self.solid if self.proxy is None else self.proxy.component
-
-    def tighter(self, goal: Criterion, factor: float = 1.0) -> Criterion:
-        """Get the tighter goal for parts of the model, so that those of the solid meet the goal, scaled by a factor."""
-        if self.proxy is None:
-            return goal if factor == 1.0 else goal.scaled(factor)
-        return goal.alone.scaled(factor - self.proxy.margin(goal))
-
-    def transfer(
-        self, parts: list[Part], goal: Criterion, factor: float, policy: Policy, run: Run, *, merge: bool
-    ) -> list[Part]:
-        """Transfer parts of the model to the solid, where they meet the goal, scaled by a factor."""
-        assert self.proxy is not None
-        scaled = goal if factor == 1.0 else goal.scaled(factor)
-        with run.stage("transfer"):
-            parts, worst = Transfer(self.solid, self.proxy, scaled, policy, run)(parts)
-            if merge and run.stopped_by is None:  # the margin may have kept some from merging
-                parts = merge_parts(parts, scaled.scaled(worst), run)
-        return parts

@@ -95,13 +95,11 @@ def simplify(solid: Component, threshold: float, threads: int = 1, pieces: Seque
     pieces : sequence of Manifold or (vertices, faces)
         Closed solids whose union, without its cavities, the solid is; not needed if it is only one.
     """
-    for copy in _copies(solid, threshold, threads, pieces):
-        if copy is not None:
-            try:
-                return Proxy(Component(copy.mesh), float(np.quantile(copy.distances, OFTEN)))
-            except ValueError:  # flat
-                return None
-    return None
+    copy = next(filter(None, _copies(solid, threshold, threads, pieces)), None)
+    try:
+        return copy and Proxy(Component(copy.mesh), float(np.quantile(copy.distances, OFTEN)))
+    except ValueError:  # flat
+        return None
 
 
 def _copies(solid: Component, threshold: float, threads: int, pieces: Sequence[Shape]) -> Iterator[_Copy | None]:

@@ -33,7 +33,7 @@ class Progress:
     done : int
         Steps of this stage finished so far.
     total : int or None
-        Steps of this stage in all; None where that cannot be known beforehand.
+        Steps of this stage in all; None where that cannot be known beforehand, as in all stages of a decomposition.
     parts : int
         Components the solid is in now.
     seconds : float
@@ -124,7 +124,6 @@ class Run:
         self._end = math.inf  # of the innermost time limit
         self._stage = ""
         self._done = self._parts = 0
-        self._total: int | None = None
         self._is_quiet = self._is_finishing = False
         self._stopped_at = self._finish_by = math.inf
         self._outer: Run | None = None
@@ -155,7 +154,7 @@ class Run:
         """Count the time inside towards stage `name`."""
         outer, start = self._stage, time.perf_counter()
         self._stage = outer if self._is_quiet else name
-        self.step(0, None, self._parts)
+        self.step(0, self._parts)
         try:
             with self._trace.span("stage", name):
                 yield
@@ -218,18 +217,18 @@ class Run:
             each.account.close()
         self.drop([each.begun for each in apart])
 
-    def step(self, done: int, total: int | None, parts: int) -> bool:
+    def step(self, done: int, parts: int) -> bool:
         """Report a step of the current stage; True if the work may continue."""
         if self._outer is not None:
             return not self.is_over
         if not self._is_quiet:
-            self._done, self._total, self._parts = done, total, parts
+            self._done, self._parts = done, parts
         self._ask_caller()
         return self._is_finishing or not self.is_over
 
     def may_continue(self) -> bool:
         """Report the last step again; True if the work may continue."""
-        return self.step(self._done, self._total, self._parts)
+        return self.step(self._done, self._parts)
 
     @contextmanager
     def until_stopped(self) -> Iterator[None]:
@@ -349,7 +348,7 @@ class Run:
             return
         answer = None
         if self._progress is not None:
-            answer = self._progress(Progress(self._stage, self._done, self._total, self._parts, self.elapsed))
+            answer = self._progress(Progress(self._stage, self._done, None, self._parts, self.elapsed))
         cancelled = answer is not None and not answer
         if self._is_finishing:
             if cancelled:

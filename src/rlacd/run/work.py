@@ -75,5 +75,5 @@ def uniting(vertices: int) -> float:
 
 
 def limiting(vertices: int) -> float:
-    """Find a hull of few corners around one of `vertices` corners, and even it out."""
-    return 60 * vertices
+    """Find hulls of few corners around a part whose hull has `vertices`, and around its pieces, which are smaller."""
+    return 180 * vertices

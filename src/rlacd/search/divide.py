@@ -85,7 +85,7 @@ def divide(
     Exchange or None
         An exchange that saves one part, or with `keeps_rest` none; None if nothing can be taken, or not enough.
     """
-    division = _Division(around, criterion, random, run, again)
+    division = _Division([*around], criterion, random, run, again)
     pieces = [_Piece(member) for member in sorted(part.members, key=lambda member: -member.volume)]
     if not keeps_rest and not all(division.takers(piece) or division.may_go(piece) for piece in pieces):
         return None  # a quick test that ends most trials
@@ -97,12 +97,11 @@ def divide(
     changes = [*zip(division.now, around, strict=True)]
     if run.is_over or all(now is before for now, before in changes):
         return None
-    rest = [Part.joint(*left)] if left else []
-    for whole in rest:
-        if not run.work.pay(work.uniting(len(whole.hull.vertices))) or not criterion.is_met(whole):
-            return None
+    rest = joint_part(criterion, run.work, *left) if left else None
+    if left and rest is None:
+        return None
     after = [now if now is before else _mended(now, criterion) for now, before in changes]
-    return Exchange.between([part, *around], [*after, *rest])
+    return Exchange.between([part, *around], [*after, *([rest] if rest else [])])
 
 
 def _mended(part: Part, criterion: Criterion) -> Part:
@@ -121,21 +120,19 @@ class _Piece:
     halves: list[_Piece] | None = None
 
 
+@dataclass
 class _Division:
     """Parts that are offered pieces of another, which are halved if none can take them."""
 
-    def __init__(
-        self, around: Sequence[Part], criterion: Criterion, random: np.random.Generator, run: Run, again: bool
-    ) -> None:
-        self.now = list(around)
-        self._criterion = criterion
-        self._random = random
-        self._run = run
-        self._again = again
+    now: list[Part]
+    criterion: Criterion
+    random: np.random.Generator
+    run: Run
+    again: bool
 
     def takers(self, piece: _Piece) -> list[int]:
         """The parts that may take a piece, those first whose hulls would grow the least."""
-        feasible = feasible_unions(piece.component, self.now, self._criterion, self._run.work)
+        feasible = feasible_unions(piece.component, self.now, self.criterion, self.run.work)
         return [i for i, _ in sorted(feasible, key=lambda found: found[1] - self.now[found[0]].hull.volume)[:TAKERS]]
 
     def may_go(self, piece: _Piece, halvings: int = PIECE_HALVINGS) -> bool:
@@ -146,7 +143,7 @@ class _Division:
     def left_of(self, piece: _Piece, halvings: int = PIECE_HALVINGS, stop: bool = False) -> list[Component]:
         """Give parts what they can take of a piece; returns the rest, or with `stop` the first of the rest."""
         for i in self.takers(piece):
-            union = joint_part(self.now[i], piece.component, self._criterion, self._run.work)
+            union = joint_part(self.criterion, self.run.work, self.now[i], piece.component)
             if union is not None:
                 self.now[i] = union
                 return []
@@ -162,13 +159,13 @@ class _Division:
 
     def _halves(self, piece: _Piece) -> list[_Piece]:
         if piece.halves is None:
-            may_cut = self._run.step(0, None, len(self.now)) and self._run.work.pay(work.cutting(piece.component.size))
+            may_cut = self.run.step(0, len(self.now)) and self.run.work.pay(work.cutting(piece.component.size))
             piece.halves = [_Piece(half) for half in self._halved(piece.component)] if may_cut else []
         return piece.halves
 
     def _halved(self, component: Component) -> list[Component]:
         """Cut near the middle; the smaller half comes first."""
-        share = self._random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
-        if not self._again:
+        share = self.random.uniform(0.5 - MIDDLE, 0.5 + MIDDLE)
+        if not self.again:
             return component.halved_between(share, [part.hull for part in self.now])
-        return component.halved(share, self._random.random() >= 0.5)
+        return component.halved(share, self.random.random() >= 0.5)

@@ -30,10 +30,6 @@ LEAST_WORK, MOST_WORK = 0.15e6, 8e6
 WORK_OF_A_STEP = 1e5
 """Where only the number of steps is limited, the work allowed for each: far more than most take."""
 
-PATIENCE = 1.0
-"""Another start is tried when the search from the best one has saved nothing in this multiple of the work of the first
-pass: about what another start takes until it shows what it is worth."""
-
 STARTS = ("excess-norm", "hull-sum")
 """Scores of the greedy policy for further passes over the whole solid, in turn, each among other planes."""
 
@@ -150,7 +146,7 @@ class _Search:
         self._passes = 1
         self._state: Neighbourhood | None = None
         self._ahead = 0  # number of its parts once each had been offered to others
-        self._next: list[Apart[list[Part] | None]] = []  # the next pass, once it is under way
+        self._next: list[Apart[list[Part]]] = []  # the next pass, once it is under way
 
     def go_on(self, most: float) -> None:
         """Search until the run is over, `most` trials are made, or parts are as few as the lower bound."""
@@ -176,7 +172,7 @@ class _Search:
     def _challenge(self, best: Neighbourhood, most: float) -> None:
         """Search from another start unless it is behind already; the better of two goes on."""
         start = self._another_pass()
-        if start is None:
+        if not start:
             return
         other = self._begun(start)
         early = len(other.parts)
@@ -186,9 +182,12 @@ class _Search:
             self._state, self._ahead = other, early
 
     def _improve(self, state: Neighbourhood, most: float) -> None:
-        """Search from a start until it saves nothing any more."""
+        """Search from a start until it has saved nothing in the work of the first pass.
+
+        That is about what another start takes until it shows what it is worth.
+        """
         steps, accepted = state.steps, state.accepted
-        state.improve(most - self.steps + steps, PATIENCE * self._context.first_pass)
+        state.improve(most - self.steps + steps, self._context.first_pass)
         self.steps += state.steps - steps
         self.accepted += state.accepted - accepted
         self._note(state)
@@ -219,21 +218,21 @@ class _Search:
         if not self._next and self._run.work.left >= 2 * most:
             self._next = [self._run.apart(partial(self._pass, self._passes), most)]
 
-    def _another_pass(self) -> list[Part] | None:
-        """The parts of the next pass; None if it takes too much work."""
+    def _another_pass(self) -> list[Part]:
+        """The parts of the next pass; none if it takes too much work."""
         run, most = self._run, ANOTHER_PASS * self._context.first_pass
         if run.work.left < most:
-            return None
+            return []
         other = self._next.pop() if self._next else run.apart(partial(self._pass, self._passes), most)
         self._passes += 1
         parts = run.result(other.begun)
         run.work.pay(other.account.done)
         return parts
 
-    def _pass(self, number: int, run: Run) -> list[Part] | None:
-        """The parts of a pass by another score, among other planes; None if it takes too much work."""
+    def _pass(self, number: int, run: Run) -> list[Part]:
+        """The parts of a pass by another score, among other planes; none if it takes too much work."""
         context = self._context
         policy = Greedy(STARTS[number % len(STARTS)], sweeps=SweepCache(seed=(context.seed, number)))
         tree = CutTree(context.root, policy, run)
         other = cut_and_merge(tree, context.criterion, run, most=self._most, strict=True)
-        return None if other.unmet or run.is_over else other.parts
+        return [] if run.is_over else other.parts

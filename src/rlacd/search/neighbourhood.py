@@ -105,7 +105,6 @@ class Neighbourhood:
         self.best = list(parts)
         self.gained = time.perf_counter()
         self.steps = self.accepted = 0
-        self._near = min(context.criterion.reach, 2 * context.criterion.outward_deviation)
         self._around: dict[int, tuple[int, ...]] = {}
         self._chosen: deque[_Chosen] = deque()
         self._stale: list[Apart[Exchange | None]] = []  # may still be under way
@@ -117,17 +116,13 @@ class Neighbourhood:
         """The parts as they are."""
         return list(self._now.parts.values())
 
-    @property
-    def is_least(self) -> bool:
-        """Whether the parts are as few as the lower bound."""
-        return len(self.best) <= self._context.enough()
-
     def improve(self, most: float = math.inf, patience: float = math.inf) -> None:
         """Search until the run or `most` trials are over, `patience` units save nothing, or no fewer parts can do."""
         self._in_vain = dict.fromkeys((False, True), 0)
 
         def goes_on() -> bool:
-            return self.steps < most and sum(self._in_vain.values()) < patience and not self.is_least
+            is_in_time = self.steps < most and sum(self._in_vain.values()) < patience
+            return is_in_time and len(self.best) > self._context.enough()
 
         self._make(self._most_due, goes_on)
 
@@ -157,7 +152,7 @@ class Neighbourhood:
         """The parts that each part may be divided among, in ascending order."""
         if not self._around:
             around: dict[int, list[int]] = {i: [] for i in self._now.parts}
-            for i, j in self._now.boxes.pairs([*around], self._near).tolist():
+            for i, j in self._now.boxes.pairs([*around], self._context.criterion.reach).tolist():
                 around[i].append(j)
                 around[j].append(i)
             self._around = {i: tuple(sorted(near)) for i, near in around.items()}
@@ -186,7 +181,7 @@ class Neighbourhood:
         run = self._run
         with run.until_stopped():
             try:
-                while goes_on() and run.step(self.steps, None, len(self.best)):
+                while goes_on() and run.step(self.steps, len(self.best)):
                     trial = due()
                     if trial is not None:
                         self._choose(trial)
@@ -199,23 +194,18 @@ class Neighbourhood:
                 self._chosen.clear()
                 self._stale.clear()
 
-    def _begin(self) -> Apart[Exchange | None]:
-        """Begin as many trials as there are threads, and one: more would be made in vain. Returns the first."""
-        run = self._run
-        for one in islice(self._chosen, run.threads + 1):
-            one.apart = one.apart or run.apart(one.exchange, one.units)
-        first = self._chosen[0].apart
-        assert first is not None
-        return first
-
     def _settle(self) -> None:
         """Apply what the first trial chosen has found."""
-        apart = self._begin()
-        exchange = self._run.result(apart.begun)
-        trial = self._chosen.popleft().trial
-        self._run.work.pay(apart.account.done)
+        run = self._run
+        for one in islice(self._chosen, run.threads + 1):  # more would be made in vain
+            one.apart = one.apart or run.apart(one.exchange, one.units)
+        trial, apart = self._chosen[0].trial, self._chosen[0].apart
+        assert apart is not None
+        exchange = run.result(apart.begun)
+        self._chosen.popleft()
+        run.work.pay(apart.account.done)
         if apart.account.is_spent:  # it was given all that was left
-            self._run.work.close()
+            run.work.close()
         self.steps += 1
         self._in_vain[trial.gives] += apart.account.done
         if exchange is None:

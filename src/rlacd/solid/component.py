@@ -187,7 +187,7 @@ class Component(Part):
         """Number of planes that its faces lie in, without the smallest, which hold 1% of the area."""
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        areas = np.linalg.norm(normals, axis=1)
+        areas = np.sqrt(dots(normals, normals))
         normals = normals[areas > 0] / areas[areas > 0, None]
         planes = np.concatenate([normals, dots(normals, corners[areas > 0, 0])[:, None]], axis=1)
         _, side = np.unique(np.round(planes / FLAT), axis=0, return_inverse=True)

@@ -5,13 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, IntArray
-from rlacd.solid.primitive import Primitive
+
+if TYPE_CHECKING:
+    from rlacd.extras.primitive import Primitive
+
+PRIMITIVE = "primitive"
+"""The key in the metadata of an output hull under which the primitive that it stands for is described."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rlacd import _native
 from rlacd.report import Mass
-from rlacd.solid.arrays import FloatArray, IntArray, dots
+from rlacd.solid.arrays import FloatArray, IntArray
 from rlacd.solid.frame import Frame
 
 _GREATEST = np.finfo(np.float64).max
@@ -27,18 +26,6 @@ def mass_of(vertices: FloatArray, faces: IntArray, frame: Frame) -> Mass:
             frame.to_input(np.array([centre]))[0],
             _times(inertia, unit**5),
         )
-
-
-def joint_mass(masses: Sequence[Mass]) -> Mass:
-    """Add up bodies of density one that do not overlap."""
-    volume = sum(mass.volume_abs for mass in masses)
-    weights = [mass.volume_abs / volume if volume > 0 else 1 / len(masses) for mass in masses]
-    centre = np.sum([weight * mass.centre_abs for weight, mass in zip(weights, masses, strict=True)], axis=0)
-    inertia = np.zeros((3, 3))
-    for mass in masses:
-        away = mass.centre_abs - centre
-        inertia += mass.inertia_abs + mass.volume_abs * (dots(away, away) * np.eye(3) - np.outer(away, away))
-    return Mass(float(volume), centre, inertia)
 
 
 def _times(value: Any, factor: np.float64) -> FloatArray:

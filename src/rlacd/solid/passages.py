@@ -14,7 +14,7 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
-from rlacd.solid.primitive import Balls
+from rlacd.solid.balls import Balls
 
 LARGEST_DRIFT = 0.25
 """Share of its way by which a held ball may drift: the walls that hold it open by up to 30 degrees."""

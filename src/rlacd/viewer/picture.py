@@ -18,7 +18,7 @@ from rlacd.io.write.target import checked_place
 from rlacd.options.fields import checked, integer, read
 from rlacd.options.output import OutputOptions
 from rlacd.result import Result
-from rlacd.solid.primitive import Balls
+from rlacd.solid.balls import Balls
 from rlacd.viewer.coloring import color_hulls
 from rlacd.viewer.render import Body, Spheres, render_apart
 from rlacd.viewer.robot import RobotResult

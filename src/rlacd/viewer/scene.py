@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rlacd.fit import Unit
 from rlacd.result import Result
 from rlacd.solid.frame import Frame
-from rlacd.solid.primitive import PRIMITIVE
+from rlacd.solid.hull import PRIMITIVE
 from rlacd.viewer.coloring import color_hulls
 from rlacd.viewer.heat import HeatMesh, frame_of
 from rlacd.viewer.picture import disjoint

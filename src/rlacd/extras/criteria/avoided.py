@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rlacd import _native
+from rlacd.criteria.concavity import Distance
 from rlacd.fit import Unit
 from rlacd.report import Avoids, Entered
 from rlacd.solid.arrays import FloatArray, dots
@@ -17,6 +18,9 @@ from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.hull import TOLERANCE, Hull
 from rlacd.solid.obstacle import Obstacle
 from rlacd.solid.solid import Solid
+
+FINEST_SHARE = 0.01
+"""Parts whose hulls enter a mesh to avoid are cut down to this share of the threshold."""
 
 SMALL = 0.02
 """Triangles that cross the solid are halved until their sides are at most this long, then left out."""
@@ -73,19 +77,32 @@ class Kept:
 
 @dataclass(frozen=True)
 class Avoided:
-    """All that hulls stay out of."""
+    """All that hulls stay out of.
+
+    Attributes
+    ----------
+    kept : tuple of Kept
+    finest : Distance
+        A part that is as tight as this is cut no further to avoid them.
+    """
 
     kept: tuple[Kept, ...]
+    finest: Distance
 
     @classmethod
-    def of(cls, obstacles: Sequence[Obstacle], solid: Solid, threads: int) -> Avoided:
+    def of(cls, obstacles: Sequence[Obstacle], solid: Solid, threshold: float, threads: int) -> Avoided:
         """Prepare obstacles for the hulls of a solid."""
         surface = _native.Surface(*solid.mesh, threads) if len(solid.mesh[1]) else None
-        return cls(tuple(Kept.of(obstacle, solid.frame, surface, threads) for obstacle in obstacles))
+        kept = tuple(Kept.of(obstacle, solid.frame, surface, threads) for obstacle in obstacles)
+        return cls(kept, Distance(FINEST_SHARE * threshold))
 
-    def is_entered(self, hull: Hull) -> bool:
-        """Whether a hull enters any of them."""
-        return any(kept.is_entered(hull) for kept in self.kept)
+    def is_in_the_way(self, hull: Hull, exact: Part) -> bool:
+        """Whether a hull enters any of them, and its part, with the exact hull, is not too fine to be cut for that."""
+        return any(kept.is_entered(hull) for kept in self.kept) and not self.finest.is_met(exact)
+
+    def scaled(self, factor: float) -> Avoided:
+        """The same where coarser parts, by a factor, may enter them."""
+        return replace(self, finest=self.finest.scaled(factor))
 
     def found(self, parts: Sequence[Part], scale: float) -> Avoids | None:
         """The report's entry: what finished hulls enter, how many and how deep, and what the input crosses."""
@@ -98,8 +115,11 @@ class Avoided:
         return Avoids(tuple(kept.name for kept in told if kept.is_crossed), tuple(entered))
 
     @staticmethod
-    def warnings_of(found: Avoids, reason: str, unit: Unit) -> list[str]:
-        """A sentence for each obstacle that is entered all the same, with lengths in a unit; `reason` ends it."""
+    def warnings_of(found: Avoids, unit: Unit, *, is_stopped: bool) -> list[str]:
+        """A sentence for each obstacle that is entered all the same, with lengths in a unit."""
+        share = f"{FINEST_SHARE:.0%} of the threshold"
+        no_finer = f"parts within {share}, and those that limits leave no way, are cut no further"
+        reason = "the work was stopped before" if is_stopped else no_finer
         return [
             *(f"The input itself crosses {name}, so hulls are not kept out of it there." for name in found.crossed),
             *(

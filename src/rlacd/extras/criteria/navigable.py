@@ -32,10 +32,10 @@ from rlacd.options import Options
 from rlacd.options.navigable import NavigableSpace, Point
 from rlacd.run import Run
 from rlacd.solid.arrays import FloatArray, IntArray, dots, heights, length
+from rlacd.solid.balls import NO_BALLS, Balls
 from rlacd.solid.component import Part
 from rlacd.solid.frame import ROUNDING, Frame
 from rlacd.solid.hull import Hull
-from rlacd.solid.primitive import NO_BALLS, Balls
 from rlacd.solid.solid import Solid
 
 MOST_CELLS = 256
@@ -181,6 +181,10 @@ class Navigable(Criterion):
     def obstacles(self) -> Balls:
         """The balls."""
         return self.balls
+
+    def credit(self, part: Part) -> float:
+        """The sum of the volumes of its pieces' hulls: what lies between a hull and the surface is no error."""
+        return sum(member.hull.volume for member in part.members) or part.hull.volume
 
     def summary(self, errors: Sequence[float] | None) -> CriterionSummary:
         """The number of balls, how many gave way, and how deep the parts' hulls reach into them."""

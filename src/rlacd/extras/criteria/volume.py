@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -58,6 +59,8 @@ class AddedVolume(Criterion):
     whole: float | None
     least: float
 
+    reach: ClassVar[float] = REACH
+
     @classmethod
     def prepare(cls, options: Options, solid: Solid, run: Run | None) -> AddedVolume:
         """Make the criterion; shares are of each part or of the whole solid, as the options say."""
@@ -67,24 +70,11 @@ class AddedVolume(Criterion):
         whole = float(_native.mesh_volume(*solid.mesh)) if options.volume_of == "whole" else None
         return cls(options.volume_tolerance, whole, LEAST_PART * hull.volume if hull is not None else 0.0)
 
-    def share(self, volume: float, hull_volume: float) -> float:
-        """The error of a part with these volumes."""
+    def volume_error(self, volume: float, hull_volume: float) -> float:
+        """The error itself."""
         base = max(volume if self.whole is None else self.whole, self.least)
         added = max(hull_volume - volume, 0.0)
         return added / base if base > 0 else math.inf if added else 0.0
-
-    @property
-    def reach(self) -> float:
-        """`REACH`."""
-        return REACH
-
-    def credit(self, part: Part) -> float:
-        """The part's volume: the rest of the hull is what the criterion counts."""
-        return part.volume
-
-    def volume_error(self, volume: float, hull_volume: float) -> float:
-        """The error itself."""
-        return self.share(volume, hull_volume)
 
     def joint_volumes(
         self, whole: Component, hulls: Sequence[_native.ConvexBody], pairs: IntArray, volumes: FloatArray, threads: int
@@ -96,11 +86,11 @@ class AddedVolume(Criterion):
 
     def is_met(self, part: Part) -> bool:
         """Whether the hull adds at most the tolerance."""
-        return self.share(part.volume, part.hull.volume) <= self.tolerance or self.error(part) <= self.tolerance
+        return self.volume_error(part.volume, part.hull.volume) <= self.tolerance or self.error(part) <= self.tolerance
 
     def error(self, part: Part) -> float:
         """The share that the hull adds to what the solid fills of it."""
-        return self.share(part.filled, part.hull.volume)
+        return self.volume_error(part.filled, part.hull.volume)
 
     def scaled(self, factor: float) -> AddedVolume:
         """The same criterion with `factor` times the tolerance."""

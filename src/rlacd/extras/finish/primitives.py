@@ -10,12 +10,12 @@ import numpy as np
 
 from rlacd import _native
 from rlacd.criteria import Criterion
+from rlacd.extras.primitive import Primitive
 from rlacd.options.names import PRIMITIVE_KINDS, PrimitiveKind
 from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import FloatArray, heights, length
 from rlacd.solid.component import Part
 from rlacd.solid.hull import Hull, keeps
-from rlacd.solid.primitive import Primitive
 
 SIMPLER = 1.25
 """A simpler primitive is preferred unless its volume exceeds that of the tightest by this factor."""

@@ -15,7 +15,7 @@ import trimesh
 from rlacd.clear import Cleared, Motion, Solids, at_rest, check
 from rlacd.decompose_mesh import decompose
 from rlacd.errors import MeshFileError
-from rlacd.finish.report import joint_report
+from rlacd.extras.nodes.joint_report import joint_report
 from rlacd.io.robots.decomposed import SMALL, Checked, check_options, decomposed_robot
 from rlacd.io.robots.read import robot_or_none
 from rlacd.io.robots.rewritten import warnings_of

@@ -10,7 +10,7 @@ import trimesh
 
 from rlacd.io.write.atomic import write_file
 from rlacd.io.write.target import checked_place
-from rlacd.solid.primitive import Balls
+from rlacd.solid.balls import Balls
 
 COLOR = (86, 156, 214, 90)  # translucent, so that the hulls show through
 

@@ -8,7 +8,7 @@ recomputed after rounding to float32.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import trimesh
@@ -17,7 +17,9 @@ from rlacd.io.write.glb import GltfFile, Placed
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull, rounded_hull
 from rlacd.solid.arrays import FloatArray
-from rlacd.solid.primitive import Primitive
+
+if TYPE_CHECKING:
+    from rlacd.extras.primitive import Primitive
 
 GENERATOR = "rlacd"
 

@@ -12,7 +12,7 @@ import base64
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import trimesh
@@ -27,9 +27,11 @@ from rlacd.io.write.single_precision import required_hull
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.input_mesh import InputMesh
-from rlacd.solid.primitive import Primitive
 
-Named = Callable[[str, int, Primitive | None], str]
+if TYPE_CHECKING:
+    from rlacd.extras.primitive import Primitive
+
+Named: TypeAlias = "Callable[[str, int, Primitive | None], str]"
 """The name of a hull, from that of its node or mesh, its number there, and the primitive that it stands for."""
 
 _MIME = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp", ".ktx2": "image/ktx2"}

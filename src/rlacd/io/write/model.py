@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 import trimesh
@@ -21,7 +21,9 @@ from rlacd.report import Mass
 from rlacd.result import Result
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.frame import HALF_THICKNESS
-from rlacd.solid.primitive import Primitive
+
+if TYPE_CHECKING:
+    from rlacd.extras.primitive import Primitive
 
 TO_Z_UP = {
     "x": (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0),

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from lxml import etree
 
 from rlacd.io.write.model import TO_Z_UP, MeshFile, RigidBody, Shape, numbers
 from rlacd.io.write.palette import hull_colors
-from rlacd.solid.primitive import Primitive
+
+if TYPE_CHECKING:
+    from rlacd.extras.primitive import Primitive
 
 LEAST_INERTIA = 1e-14
 """MuJoCo refuses moving bodies with less than 1e-15 of mass or inertia; those are rounded up."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from rlacd.io.write.encode import hull_name
 from rlacd.io.write.model import RigidBody
 from rlacd.io.write.palette import hull_colors, linear_from_srgb
 from rlacd.io.write.single_precision import Triangulated, placed_mesh, required_hull
-from rlacd.solid.primitive import Primitive
+
+if TYPE_CHECKING:
+    from rlacd.extras.primitive import Primitive
 
 
 def require_usd() -> None:

@@ -1,7 +1,4 @@
-"""Boxes, spheres, capsules and cylinders: shapes that physics engines collide faster than hulls.
-
-Also the balls that stand for the space a decomposition must leave free.
-"""
+"""Boxes, spheres, capsules and cylinders: shapes that physics engines collide faster than hulls."""
 
 from __future__ import annotations
 
@@ -14,14 +11,10 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from rlacd.options.names import PrimitiveKind
-from rlacd.solid.arrays import BoolArray, FloatArray, dots, heights
+from rlacd.solid.arrays import FloatArray, dots, heights
 from rlacd.solid.frame import Frame
-
-PRIMITIVE = "primitive"
-"""The key in the metadata of an output hull under which the primitive that it stands for is described."""
 
 SIDES = (12, 24)
 """Sides of the prisms that stand for a cylinder."""
@@ -163,31 +156,3 @@ def _at_least_one(points: FloatArray, distances: FloatArray) -> FloatArray:
 
 _DECIMALS = 12
 """What libraries compute in their own ways is rounded to so many, so that it is the same bits everywhere."""
-
-
-@dataclass(frozen=True, eq=False)
-class Balls:
-    """Balls, in the order they were placed.
-
-    Attributes
-    ----------
-    centres : float64 [B, 3]
-    radii : float64 [B]
-    """
-
-    centres: FloatArray
-    radii: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.radii)
-
-    def some(self, which: BoolArray | NDArray[np.intp]) -> Balls:
-        """Those of a mask, or with these numbers."""
-        return Balls(self.centres[which], self.radii[which])
-
-    def in_input(self, frame: Frame) -> Balls:
-        """Map balls from the normalised frame to the input's frame and unit."""
-        return Balls(frame.to_input(self.centres), self.radii / frame.scale)
-
-
-NO_BALLS = Balls(np.empty((0, 3)), np.empty(0))
