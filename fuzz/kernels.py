@@ -132,7 +132,7 @@ def part_queries(mesh: Soup, hull: Hull, random: np.random.Generator) -> None:
     _native.candidate_planes(*mesh, hull.body, 12, 4)
     threshold = float(random.choice([0.01, 0.05, 0.3]))
     against = _native.Against(*mesh)
-    met = against.meets(hull.body, threshold)
+    met = not (against.comes_deeper(hull.body, threshold) or against.leads_farther(hull.body, threshold))
     lower, upper = np.max(against.measure(hull.body, TOLERANCE), axis=0)
     assert lower <= upper, f"distance: {lower}, {upper}"
     assert not (met and lower > threshold * (1 + 1e-9)), f"distance {lower} said to be within {threshold}"

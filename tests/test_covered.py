@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from manifold3d import Manifold, OpType
 
 import rlacd
+from rlacd import _native
 from rlacd.criteria import Concavity
 from rlacd.finish.finish import covers
 from rlacd.planes.sweep import SweepCache
@@ -309,3 +310,13 @@ def test_pieces_of_the_parts_lie_in_their_hulls_and_are_a_partition_after_each_s
     watch(monkeypatch, PIECES, lambda path, parts: (assert_partition(parts), seen.add(path)))
     rlacd.decompose(mesh, threads=1, **asked)
     assert "rlacd.find_parts.cut_and_merge" in seen
+
+
+def test_a_stop_while_bodies_are_made_exact_ends_with_what_was_merged(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*_: object) -> list[Part]:
+        raise _native.Stopped
+
+    monkeypatch.setattr("rlacd.find_parts.grown_parts", stopped)
+    result = rlacd.decompose(hash_sign(), threads=1)
+    assert not result.report.complete
+    assert outside(hash_sign(), list(result)) == 0

@@ -196,11 +196,11 @@ def test_a_quick_no_about_a_pair_is_never_wrong(seed: int, threshold: float) -> 
     for (i, j), volume in zip(pairs, volumes, strict=True):
         joint = Hull.around(hulls[i], hulls[j])
         assert volume == np.inf or volume == pytest.approx(joint.volume)
-        assert np.isfinite(volume) or not solid.against.meets(joint.body, threshold)
-        if solid.against.comes_deeper(joint.body, threshold):
+        is_deep = solid.against.comes_deeper(joint.body, threshold)
+        assert np.isfinite(volume) or is_deep or solid.against.leads_farther(joint.body, threshold)
+        if is_deep:
             larger = Hull.of(np.concatenate([joint.vertices, random.uniform(-1, 1, (3, 3))]))
             assert solid.against.comes_deeper(larger.body, threshold * (1 - 1e-9))
-            assert not solid.against.meets(joint.body, threshold)
 
 
 def grooved() -> Manifold:
@@ -223,7 +223,8 @@ def test_what_is_deep_in_a_hull_is_seen(
     whole = Component(solid())
     for threshold in too_deep:
         assert whole.against.comes_deeper(whole.hull.body, threshold)
-    assert whole.against.meets(whole.hull.body, deep_enough)
+    assert not whole.against.comes_deeper(whole.hull.body, deep_enough)
+    assert not whole.against.leads_farther(whole.hull.body, deep_enough)
 
 
 def test_a_solid_that_overlaps_itself_can_be_reunited() -> None:

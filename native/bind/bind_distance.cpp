@@ -132,10 +132,8 @@ void bind_against(nb::module_& m) {
            }),
            "vertices"_a, "faces"_a, "threads"_a = 1)
       .def_prop_ro("surface", &Against::surface, nb::rv_policy::reference_internal, "The solid's surface.")
-      .def("meets", released(&Against::meets), "hull"_a, "threshold"_a,
-           "Whether no point of the solid's surface is certainly deeper than the threshold inside a hull, and none of "
-           "the hull's surface farther than that from the solid.\n\n"
-           "False when one is, or so nearly (0.1 %) that branch and bound gave up.")
+      .def("leads_farther", released(&Against::leads_farther), "hull"_a, "threshold"_a,
+           "Whether the hull's surface leads farther than the threshold from the solid; so if undecided (within 0.1%).")
       .def("measure", released([](const Against& self, const ConvexBody& hull, double tolerance, double floor) {
              require_positive(tolerance);
              return self.measure(hull, tolerance, floor);

@@ -166,12 +166,11 @@ Interval measured(const Field& field, const Mesh& mesh, const Goal& goal) {
 
 }  // namespace
 
-bool Against::meets(const ConvexBody& hull, double threshold) const {
-  if (comes_deeper(hull, threshold)) return false;
+bool Against::leads_farther(const ConvexBody& hull, double threshold) const {
   Goal goal;
   goal.tolerance = kUndecided * threshold;
   goal.pass = goal.rough = goal.fail = threshold;
-  return maximize(SolidField(surface_), hull.mesh(), goal, 1).upper <= threshold;
+  return !(maximize(SolidField(surface_), hull.mesh(), goal, 1).upper <= threshold);
 }
 
 Against::Fit Against::measure(const ConvexBody& hull, double tolerance, double floor) const {

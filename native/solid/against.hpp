@@ -21,9 +21,9 @@ class Against {
 
   const Surface& surface() const { return surface_; }
 
-  // True only if hull and solid are certainly no farther apart than the threshold, inside the hull and on it. False if
-  // they are, or if they are within 1e-3 of the threshold and undecided.
-  bool meets(const ConvexBody& hull, double threshold) const;
+  // False only if no point of the hull's surface certainly leads farther from the solid than the threshold. True if one
+  // does, or if that is within 1e-3 of the threshold and undecided.
+  bool leads_farther(const ConvexBody& hull, double threshold) const;
   // Whether the solid's surface comes deeper than the threshold inside a hull, as it then does in every larger hull.
   bool comes_deeper(const ConvexBody& hull, double threshold) const;
 

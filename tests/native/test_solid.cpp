@@ -60,7 +60,9 @@ TEST_CASE("a hull meets what is measured of it, and no less") {
     const Against::Fit fit = against.measure(hull, 1e-4, 0);
     CHECK(fit.depth.lower <= fit.depth.upper);
     CHECK(fit.reach.lower <= fit.reach.upper);
-    CHECK(against.meets(hull, 1.01 * std::max(fit.depth.upper, fit.reach.upper) + 1e-4));
-    CHECK_FALSE(against.meets(hull, 0.99 * std::max(fit.depth.lower, fit.reach.lower)));
+    CHECK_FALSE(against.comes_deeper(hull, 1.01 * fit.depth.upper + 1e-4));
+    CHECK_FALSE(against.leads_farther(hull, 1.01 * fit.reach.upper + 1e-4));
+    if (fit.depth.lower > 0) CHECK(against.comes_deeper(hull, 0.99 * fit.depth.lower));
+    if (fit.reach.lower > 0) CHECK(against.leads_farther(hull, 0.99 * fit.reach.lower));
   }
 }

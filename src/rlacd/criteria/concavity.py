@@ -139,7 +139,10 @@ class Distance(Criterion):
 
         False if it is larger, or if it is within 0.1% of the threshold and branch and bound cannot decide.
         """
-        return part.whole.against.meets(part.hull.body, self.threshold) and self._is_full(part)
+        against, body = part.whole.against, part.hull.body
+        if against.comes_deeper(body, self.threshold) or not self._is_full(part):  # quickly seen
+            return False
+        return not against.leads_farther(body, self.threshold)
 
     def _is_full(self, part: Part) -> bool:
         """Whether ``0.3 R_v`` is at most the threshold, if it counts; the part's own volume mostly shows it."""

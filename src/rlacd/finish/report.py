@@ -52,6 +52,11 @@ class _Distances(NamedTuple):
     narrowed: Narrowed
     left_out: Missed
 
+    @property
+    def hausdorff(self) -> Hausdorff:
+        """What the report says of it."""
+        return Hausdorff(self.over, max(self.under, self.left_out.distance))
+
 
 def make_report(
     reached: Reached, parts: Sequence[Part], hulls: Sequence[trimesh.Trimesh], seams: Overlap | None, run: Run
@@ -106,9 +111,7 @@ def make_report(
             overlap=None if options.overlap == 0 else seams or Overlap(),
             **summary.entries,
             avoid=entered,
-            hausdorff=Hausdorff(distances.over, max(distances.under, distances.left_out.distance))
-            if distances
-            else Hausdorff(),
+            hausdorff=distances.hausdorff if distances else Hausdorff(),
             passages=distances and distances.narrowed.passages,
             scale=solid.frame.scale,
             mass=mass_of(*concatenated(weighed), solid.frame),
