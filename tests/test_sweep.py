@@ -292,7 +292,7 @@ def test_a_sliver_inside_out_is_halved_and_a_body_is_left_as_it_is() -> None:
         sliver = gutter(1e-4)
         turned = Component((sliver.vertices, np.ascontiguousarray(sliver.faces[:, ::-1])))
         assert turned.volume < 0
-        below, above = cut.halves(turned)
+        below, above = turned.halved(0.5, principal=False, least=-math.inf)
         assert below.volume + above.volume == pytest.approx(turned.volume, rel=1e-6)
         body = gutter(0.1)
         assert CutTree(body, Never(), run).cut_until(CRITERION) == ([], [body])

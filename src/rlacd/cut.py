@@ -10,7 +10,7 @@ import numpy as np
 from rlacd.criteria import Criterion
 from rlacd.policies import Policy
 from rlacd.run import Run, work
-from rlacd.solid.component import Component, Plane, is_thin
+from rlacd.solid.component import Component, is_thin
 from rlacd.solid.frame import HALF_THICKNESS
 
 MANY_COMPONENTS = 1000
@@ -113,26 +113,18 @@ class CutTree:
         self._children.update(zip(costliest, divided, strict=True))
 
     def _divided(self, component: Component, threads: int) -> list[Component]:
-        """The connected pieces of a component, or the sides of the plane that cuts it; empty if none does."""
+        """The connected pieces of a component, or the sides of the plane that cuts it; empty if none does.
+
+        A sliver that no plane cuts is halved until it is small.
+        """
         pieces = component.pieces()
         if len(pieces) > 1:
             return pieces
         plane = self._policy.choose(component, threads)
         if plane is None:
-            return halves(component) if is_thin(component) else []
+            if not is_thin(component) or np.ptp(component.box, axis=0).max() <= HALF_THICKNESS:
+                return []
+            # What is inside out has no volume, but its hull covers the surface: a side without volume is kept.
+            return component.halved(0.5, principal=False, least=-math.inf)
         below, above = component.cut(plane)
         return [] if below is None or above is None else [below, above]
-
-
-def halves(sliver: Component) -> list[Component]:
-    """Cut a sliver across the middle of its longest side; an empty list if it is too small or one side would be empty.
-
-    A side without volume is kept: what is inside out has none, but its hull covers the surface.
-    """
-    lower, upper = sliver.box
-    axis = int(np.argmax(upper - lower))
-    if upper[axis] - lower[axis] <= HALF_THICKNESS:
-        return []
-    normal = (float(axis == 0), float(axis == 1), float(axis == 2))
-    below, above = sliver.cut(Plane(normal, float(lower[axis] + upper[axis]) / 2), least=-math.inf)
-    return [] if below is None or above is None else [below, above]

@@ -208,18 +208,18 @@ class Decomposer:
         and a summary of the search. Sheets that would take more parts than they have faces get one for each face.
         """
         states, settled, found = self._decomposed(goal)
-        if len(states[-1]) <= self._few:
+        if len(states[-1]) <= self._most_parts:
             return states, settled, found
         return [self.run.if_in_time(lambda: slabs(self.problem.solid, self.run), lambda: states[-1])], goal, None
 
     @property
-    def _few(self) -> float:
+    def _most_parts(self) -> float:
         """More parts are too many: the number of faces of sheets."""
         solid = self.problem.solid
         return len(solid.surface[1]) if solid.is_sheets else math.inf
 
     def _cut(self, goal: Criterion) -> Pass:
-        goal, most = _tighter(goal, self.proxy), PIECES_A_FACE * self._few
+        goal, most = _tighter(goal, self.proxy), PIECES_A_FACE * self._most_parts
         return cut_and_merge(self.tree, goal, self.run, merge=self.problem.options.merge, most=most)
 
     def _decomposed(self, goal: Criterion) -> tuple[list[list[Part]], Criterion, SearchSummary | None]:

@@ -24,7 +24,7 @@ NEGLIGIBLE_VOLUME = 1e-12
 """Solids below this volume (the frame's box has 8) are rounding left over by a cut."""
 
 LOST_VOLUME = TOLERANCE
-"""Share of a solid's volume that may be lost in a boolean, or as slivers (see `rlacd.cut`)."""
+"""Share of a solid's volume that may be lost in a boolean, or as slivers."""
 
 
 FLAT = 1e-5
@@ -213,12 +213,12 @@ class Component(Part):
         below, above = _native.cut(self.vertices, self.faces, *plane.normal, plane.offset, least)
         return below and Component.of(below, self), above and Component.of(above, self)
 
-    def halved(self, share: float, principal: bool) -> list[Component]:
+    def halved(self, share: float, principal: bool, least: float = NEGLIGIBLE_VOLUME) -> list[Component]:
         """Cut at a share of its length along its longest coordinate axis or principal axis.
 
-        The smaller side comes first; an empty list if one would be empty.
+        The smaller side comes first; an empty list if one would have no more than the least volume.
         """
-        sides = _native.halve_along(self.vertices, self.faces, self.hull.body, principal, share, NEGLIGIBLE_VOLUME)
+        sides = _native.halve_along(self.vertices, self.faces, self.hull.body, principal, share, least)
         return [Component.of(side, self) for side in sides]
 
     def halved_between(self, share: float, hulls: Sequence[Hull]) -> list[Component]:
