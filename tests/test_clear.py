@@ -447,6 +447,7 @@ def test_mimic_planar_and_endless_joints_of_urdf(tmp_path: Path) -> None:
     assert motion.carrier[motion.links.index("e")] == motion.links.index("d")
     assert np.array_equal(urdf_motion(tmp_path / "r.urdf", 64).poses, motion.poses)
     assert urdf_motion(tmp_path / "r.urdf", 0).poses.shape[0] == 1
+    assert urdf_motion(tmp_path / "r.urdf", 64, links=[]).poses.shape == (65, 0, 4, 4)
 
 
 def test_the_broad_phase_finds_what_all_pairs_would() -> None:

@@ -217,7 +217,10 @@ def _placed(rest: FloatArray, joints: Sequence[Joint], carried: Sequence[int], p
             moves[number] = _after(move(joints[number].parent), _step(joints[number], away[number]))
         return moves[number]
 
-    return np.stack([_after(move(by), pose) for by, pose in zip(carried, rest, strict=True)], axis=1)
+    poses = np.empty((len(positions), *rest.shape))
+    for link, by in enumerate(carried):
+        poses[:, link] = _after(move(by), rest[link])
+    return poses
 
 
 def _step(joint: Joint, away: FloatArray) -> FloatArray:
