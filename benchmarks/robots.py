@@ -191,7 +191,7 @@ def app(folder: Path, robots: tuple[str, ...], out: Path, before: str, packages:
     python -m benchmarks robots $(python -c "import example_robot_data as e; print(e.path)") --out RUN
     """
     with exit_codes():
-        rows = []
+        out, rows = out.absolute(), []
         for path in _paths(folder, robots, out):
             try:
                 row = measure(path, before, {"quality": quality}, [*packages], out)
