@@ -21,24 +21,31 @@ from benchmarks.cli import PATH
 from benchmarks.methods import Method, make_method
 from benchmarks.store import load_hulls, save_hulls
 from benchmarks.tables import Ratio, Table
-from rlacd.clear import Body, Surface, check
+from rlacd.clear import Body, Solids, Surface, check
 from rlacd.cli.exit_codes import exit_codes
 from rlacd.decomposition import Decomposition
 from rlacd.errors import RlacdError
 from rlacd.io.robots import is_robot
 from rlacd.io.robots.read import read_robot
+from rlacd.io.robots.robot import Robot
 from rlacd.io.write import write_file
 from rlacd.options.robots import RobotOptions
 
 STEPS, ROUNDS = 500, 3
 """Steps that are timed, and how often each model takes them, in turn with the other: the best counts."""
 
-BEFORE = {"coacd": "each mesh by CoACD", "own": "each mesh at its own scale"}
-"""What the default is compared with: hulls as obj2mjcf writes them, or those that rlacd makes of each mesh alone."""
+POSITIONS, SEED, LEAST = 200, 11, 1e-4
+"""Contacts that the links do not have are counted at so many joint positions, which no run looks at, from so many
+metres of depth on."""
+
+BEFORE = {"coacd": "each mesh by CoACD", "own": "each mesh at its own scale", "hull": "one hull a mesh"}
+"""What the default is compared with: hulls as obj2mjcf writes them, those that rlacd makes of each mesh alone, or those
+that MuJoCo takes for meshes."""
 
 HEAD = [
     *("robot", "meshes", "links", "hulls: {}", "now", "a link", "farthest, mm", "its size, mm"),
-    *("deepest new overlap, mm: {}", "now", "steps/s: {}", "now", "CPU s: {}", "now"),
+    *("false contacts: {}", "now", "of them told", "deepest, mm: {}", "now"),
+    *("steps/s: {}", "now", "CPU s: {}", "now"),
 ]
 
 
@@ -49,31 +56,53 @@ def rewritten(robot: Path, way: str, options: dict[str, Any], packages: list[str
     if not kept.exists():
         place.parent.mkdir(parents=True, exist_ok=True)
         kept.parent.mkdir(parents=True, exist_ok=True)
-        if way == "coacd":
-            row = _by_coacd(robot, place, packages, out / "coacd")
+        if way in ("coacd", "hull"):
+            row = _by_mesh(way, robot, place, packages, out / "coacd")
         else:
             began = time.process_time()
             how: dict[str, Any] = {"per": "mesh", "relative_to": "mesh"} if way == "own" else {}
             done = rlacd.rewrite_robot(robot, place, package_dirs=packages, threads=1, **how, **options)
-            cpu, deepest = time.process_time() - began, max((pair.new_depth for pair in done.pairs), default=0.0)
-            row = {**done.as_dict(), "links": len(done.replaced), "cpu": cpu, "deepest": deepest}
+            cpu = time.process_time() - began
+            told = {(pair.first, pair.second) for pair in done.pairs if pair.new_depth}
+            false = _false(read_robot(robot, packages), {link.name: link.hulls for link in done.links}, told)
+            row = {**done.as_dict(), "links": len(done.replaced), "cpu": cpu, **false}
         write_file(kept, json.dumps(row).encode())
     return {**json.loads(kept.read_bytes()), "place": place}
 
 
-def _by_coacd(robot: Path, place: Path, packages: list[str], store: Path) -> dict[str, Any]:
-    """Replace each mesh by what CoACD makes of it."""
-    method, cpu = make_method("coacd"), 0.0
+def _by_mesh(way: str, robot: Path, place: Path, packages: list[str], store: Path) -> dict[str, Any]:
+    """Replace each mesh by its hull, or by what CoACD makes of it."""
+    cpu = 0.0
     read, results = read_robot(robot, packages, apart=True), {}
     for collider in (collider for body in read.bodies for collider in body.colliders):
         mesh = collider.mesh()
-        hulls, seconds = _stored(method, np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32), store)
+        hulls, seconds = [mesh.convex_hull], 0.0
+        if way == "coacd":
+            made = _stored(make_method(way), np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32), store)
+            hulls, seconds = made
         results[collider] = Decomposition.of(hulls, mesh)
         cpu += seconds
     read.write(place, results, None, RobotOptions(), whole=False)
-    bodies = [Body(body.name, _surface(body.mesh()), [*map(_surface, body.hulls(results))]) for body in read.bodies]
-    deepest = max((one.depth for one in check(bodies, read.motion(500, 0)).values()), default=0.0)
-    return {"hulls": sum(map(len, results.values())), "cpu": cpu, "deepest": deepest}
+    false = _false(read, {body.name: body.hulls(results) for body in read.bodies}, set())
+    return {"hulls": sum(map(len, results.values())), "cpu": cpu, **false}
+
+
+def _false(robot: Robot, hulls: dict[str, Any], told: set[tuple[str, str]]) -> dict[str, Any]:
+    """How often hulls touch where links do not, how often of pairs that were told, and how deep at most."""
+    motion = robot.motion(POSITIONS, SEED)
+    meshes = {body.name: body.mesh() for body in robot.bodies}
+    solids = motion.solids or [Solids(body.primitives) for body in robot.bodies]
+    bodies = [
+        Body(name, _surface(meshes.get(name, trimesh.Trimesh())), [*map(_surface, hulls.get(name, []))], own.primitives)
+        for name, own in zip(motion.links, solids, strict=True)
+    ]
+    found = [
+        (offence.depth, (bodies[i].name, bodies[j].name) in told)
+        for (i, j), touching in check(bodies, motion).items()
+        for offence in touching.offences
+        if offence.depth * robot.metres > LEAST
+    ]
+    return {"false": len(found), "told": sum(said for _, said in found), "deepest": max(found, default=(0.0,))[0]}
 
 
 def _stored(method: Method, vertices: Any, faces: Any, store: Path) -> tuple[list[trimesh.Trimesh], float]:
@@ -136,6 +165,7 @@ def _line(row: dict[str, Any]) -> list[object]:
     return [
         *(row["robot"], whole["meshes"], whole["links"], own["hulls"], whole["hulls"]),
         *(f"{whole['hulls'] / whole['links']:.1f}", f"{far:.1f}", f"{size:.0f}"),
+        *(own["false"], whole["false"], whole["told"]),
         *(f"{1000 * whole['metres'] * way['deepest']:.2f}" for way in (own, whole)),
         *(f"{way[what]:.{digits}f}" for what, digits in (("speed", 0), ("cpu", 1)) for way in (own, whole)),
     ]
@@ -161,7 +191,7 @@ def app(folder: Path, robots: tuple[str, ...], out: Path, before: str, packages:
     python -m benchmarks robots $(python -c "import example_robot_data as e; print(e.path)") --out RUN
     """
     with exit_codes():
-        rows = []
+        out, rows = out.absolute(), []
         for path in _paths(folder, robots, out):
             try:
                 row = measure(path, before, {"quality": quality}, [*packages], out)
@@ -172,11 +202,14 @@ def app(folder: Path, robots: tuple[str, ...], out: Path, before: str, packages:
                 rows.append(row)
                 click.echo(_line(row))
         click.echo(Table([head.format(BEFORE[before]) for head in HEAD], [_line(row) for row in rows]))
+        click.echo(f"CPU seconds now, sum: {sum(row['whole']['cpu'] for row in rows):.0f}")
         for what, one, other in (
             ("hulls a link", ("whole", "hulls"), ("whole", "links")),
             ("hulls, before / now", ("before", "hulls"), ("whole", "hulls")),
             ("steps a second, now / before", ("whole", "speed"), ("before", "speed")),
             ("CPU seconds, now / before", ("whole", "cpu"), ("before", "cpu")),
         ):
+            if before == "hull" and what.startswith("CPU"):
+                continue
             values = ([row[way][key] for row in rows] for way, key in (one, other))
             click.echo(f"{what}, geometric mean: {Ratio.of(*values)}")

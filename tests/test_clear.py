@@ -20,6 +20,7 @@ from rlacd.clear import (
     Touching,
     at_rest,
     check,
+    kept_clear,
     mjcf_motion,
     urdf_motion,
     warnings_of,
@@ -66,6 +67,8 @@ def test_links_too_close_for_any_hulls_are_named_with_depth_and_joint_position(t
     (pair,) = done.pairs
     assert (pair.meshes, pair.adjacent, pair.kept_clear) == (0, True, False)
     assert pair.new_depth > 1e-4
+    assert done.touch_within is not None
+    assert 1e-4 <= done.touch_within <= 0.05, "hulls touch where links are 0.1 mm apart"
     (said,) = [warning for warning in done.warnings if "touch though the links do not" in warning]
     assert said.startswith(f"Hulls of fork and lug touch though the links do not, up to {pair.new_depth:.4g} m ")
     assert "lug_joint = " in said or "at rest" in said
@@ -87,6 +90,25 @@ def test_links_that_would_take_too_many_hulls_keep_theirs_and_are_told(
     assert (free, told) == ([], [True])
     assert kept[0] == fork
     assert kept[1] < lug <= max(3 * kept[1], kept[1] + 16), "the lug alone is mended"
+
+
+def test_a_pair_that_mending_does_not_help_is_left_once_both_have_made_way() -> None:
+    """Two frames one in the other, whose hulls no decomposition changes."""
+    boards = [block((-2, -2, 0), (2, -1.9, 1)), block((-2, 1.9, 0), (2, 2, 1))]
+    frame = trimesh.util.concatenate(boards)
+    surface, hull = (Surface(mesh.vertices, mesh.faces) for mesh in (frame, frame.convex_hull))
+    inner = Surface(block((-1, -1, 0), (1, 1, 1)).vertices, block((-1, -1, 0), (1, 1, 1)).faces)
+    bodies = [Body("frame", surface, [hull]), Body("inner", inner, [inner])]
+    tried = []
+
+    def redo(number: int, *_: object) -> list[Surface]:
+        tried.append(number)
+        return bodies[number].hulls
+
+    done = kept_clear(bodies, at_rest(["frame", "inner"]), redo)
+    assert 1 <= len(tried) <= 2
+    assert done.touching[0, 1].offences
+    assert (done.mended, done.given_up) == ((), frozenset())
 
 
 def test_links_whose_own_meshes_overlap_are_told_and_left_as_they_are(tmp_path: Path) -> None:
@@ -378,6 +400,28 @@ def test_joints_follow_in_a_chain_whatever_the_order_of_the_lines(arm: Path, ord
         assert len(set(motion.carrier)) == 1
 
 
+def test_links_are_where_mujoco_puts_them(arm: Path) -> None:
+    """Joints turn and slide, two in one body; some follow others by curves with constants."""
+    arm.write_text("""<mujoco><compiler angle="radian"/><default><joint limited="true" range="-1 2"/></default>
+    <asset><mesh name="box" file="box.obj"/></asset><worldbody>
+    <body name="a" pos="1 2 3" euler="0.3 0.2 0.1"><joint name="turn" axis="1 2 3" pos="0.1 0.2 0.3" ref="0.2"/>
+      <joint name="slide" type="slide" axis="1 1 0"/><geom type="mesh" mesh="box"/>
+      <body name="b" pos="0 1 0"><joint name="first" axis="0 1 0"/><geom type="mesh" mesh="box"/>
+        <body name="c" pos="1 0 0"><joint name="second" type="slide" axis="0 0 1" ref="0.1"/>
+          <geom type="mesh" mesh="box"/></body></body></body></worldbody>
+    <equality><joint joint1="second" joint2="first" polycoef="0.1 0.5 0.2 0 0.1"/>
+      <joint joint1="first" joint2="turn" polycoef="0.3 -1 0.2 0.1 0"/></equality></mujoco>""")
+    motion, model = mjcf_motion(arm, 20, 0, ["a", "b", "c"]), mujoco.MjModel.from_xml_path(str(arm))
+    assert [joint.name for joint in motion.joints] == ["turn", "slide", "first", "second"]
+    data = mujoco.MjData(model)
+    for (turn, slide), poses in zip(motion.positions, motion.poses, strict=True):
+        first = 0.3 - (turn - 0.2) + 0.2 * (turn - 0.2) ** 2 + 0.1 * (turn - 0.2) ** 3
+        data.qpos[:] = turn, slide, first, 0.1 + 0.1 + 0.5 * first + 0.2 * first**2 + 0.1 * first**4
+        mujoco.mj_kinematics(model, data)
+        assert poses[:, :3, 3] == pytest.approx(data.xpos[1:])
+        assert poses[:, :3, :3].reshape(-1, 9) == pytest.approx(data.xmat[1:])
+
+
 MIMIC = """<robot name="r">
   <link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>
   <joint name="ab" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
@@ -403,6 +447,7 @@ def test_mimic_planar_and_endless_joints_of_urdf(tmp_path: Path) -> None:
     assert motion.carrier[motion.links.index("e")] == motion.links.index("d")
     assert np.array_equal(urdf_motion(tmp_path / "r.urdf", 64).poses, motion.poses)
     assert urdf_motion(tmp_path / "r.urdf", 0).poses.shape[0] == 1
+    assert urdf_motion(tmp_path / "r.urdf", 64, links=[]).poses.shape == (65, 0, 4, 4)
 
 
 def test_the_broad_phase_finds_what_all_pairs_would() -> None:

@@ -28,6 +28,9 @@ from rlacd.solid.poses import inverse, moved
 MOST_ROUNDS = 8
 """After which pairs that still touch are told."""
 
+IN_VAIN = 2
+"""Rounds after which a pair that touches at no fewer places is left: by then both have made way."""
+
 MOST_OFFENCES = 24
 """Of one pair, looked at in one round: the deepest, and those that differ most from it."""
 
@@ -105,8 +108,9 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
     bodies = [body.with_hulls(finer[i]) if i in finer else body for i, body in enumerate(bodies)]
     touching = _renewed(bodies, motion, touching, {*finer})
     most = [max(MOST_GROWTH * len(body.hulls), len(body.hulls) + SPARE) for body in bodies]
+    vain = Counter[tuple[int, int]]()
     for _ in range(MOST_ROUNDS):
-        wrong = {pair: found for pair, found in touching.items() if found.offences}
+        wrong = {pair: found for pair, found in touching.items() if found.offences and vain[pair] < IN_VAIN}
         again = _wish(bodies, wrong, wishes)
         if not again:
             break
@@ -121,6 +125,10 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
             bodies[body] = bodies[body].with_hulls(hulls)
             wishes.renewed[body] += 1
         touching = _renewed(bodies, motion, touching, again - wishes.given_up)
+        for pair, found in wrong.items():
+            if not again.isdisjoint(pair):
+                is_vain = pair in touching and len(touching[pair].offences) >= len(found.offences)
+                vain[pair] = vain[pair] + 1 if is_vain else 0
     mended = sorted(pair for pair in first if pair not in touching or not touching[pair].offences)
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended), frozenset(wishes.given_up))
 

@@ -1,27 +1,27 @@
 """Where the links of a robot are: at rest, and at joint positions spread over what the joints allow.
 
-Kinematics are those of yourdfpy for URDF and of MuJoCo for MJCF. Positions are a Sobol sequence (Sobol', "On the
-distribution of points in a cube", 1967), scrambled by the seed.
+Where links rest, and what joints do, is read by yourdfpy for URDF and by MuJoCo for MJCF. Positions are a Sobol
+sequence (Sobol', "On the distribution of points in a cube", 1967), scrambled by the seed.
 """
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from trimesh.transformations import quaternion_matrix
 
 from rlacd.clear.bodies import PRIMITIVES, Primitive
 from rlacd.errors import import_extra
-from rlacd.solid.arrays import FloatArray
+from rlacd.solid.arrays import FloatArray, dots
 
 SAMPLES = 500
 """Joint positions that are looked at, beside that at rest."""
@@ -98,7 +98,6 @@ class Motion:
     fixed: frozenset[int] = frozenset()  # links that never move: of two of them, hulls may touch
     carrier: tuple[int, ...] = ()  # the last link below, or itself, whose joint was looked at only at rest; -1: none
     carried: tuple[int, ...] = ()  # the joint that carries it; -1 if none does
-    place: Callable[[FloatArray], FloatArray] | None = None  # takes positions [J], returns poses [L, 4, 4]
     solids: tuple[Solids, ...] = ()  # of each link; empty where that is not known
 
     @property
@@ -109,7 +108,7 @@ class Motion:
     def at(self, positions: Sequence[float]) -> Motion:
         """The same links, only where other positions of the sampled joints put them."""
         row = np.array([positions], dtype=np.float64)
-        return replace(self, positions=row, poses=self.poses[:1] if self.place is None else self.place(row[0])[None])
+        return replace(self, positions=row, poses=_placed(self.poses[0], self.joints, self.carried, row))
 
     def words(self, sample: int) -> str:
         """The joint position of a sample, as text."""
@@ -179,7 +178,7 @@ def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] |
     moving = {j: file.joints[j] for j in _led(file.joints, sampled)}
     number = {j: i for i, j in enumerate(moving)}
     positions = _positions([*sampled.values()], samples, seed)
-    poses = np.stack([file.place(row) for row in positions[::-1]])[::-1]  # at rest last: there, axes are read
+    rest = file.rest()[chosen]
     last = {moving[j].link: number[j] for j in sorted(moving)}  # of several in a link, each carries the next
     joints = []
     for j, joint in moving.items():
@@ -189,22 +188,61 @@ def _motion(file: _Urdf | _Mjcf, samples: int, seed: int, links: Sequence[str] |
         driven = -1 if joint.leader is None else number[joint.leader], joint.curve
         joints.append(Joint(joint.name, joint.slides, lower, upper, joint.rest, *file.axis(j), parent, *driven))
     held = {joint.link: joint.link for j, joint in file.joints.items() if j not in moving and joint.leader != -1}
+    carried = _last(file.parents, last, chosen)
     return Motion(
         tuple(file.links[i] for i in chosen),
-        poses[:, chosen],
+        np.concatenate([rest[None], _placed(rest, joints, carried, positions[1:])]),
         tuple(joints),
         positions,
         _adjacent(file, [link for link in file.parents if link not in held], chosen),
         _told(file.said),
         carrier=_last(file.parents, held, chosen),
-        carried=_last(file.parents, last, chosen),
-        place=partial(_placed, file, chosen),
+        carried=carried,
         solids=tuple(file.solids.get(i, Solids()) for i in chosen),
     )
 
 
-def _placed(file: _Urdf | _Mjcf, chosen: list[int], positions: FloatArray) -> FloatArray:
-    return file.place(positions)[chosen]
+def _placed(rest: FloatArray, joints: Sequence[Joint], carried: Sequence[int], positions: FloatArray) -> FloatArray:
+    """Poses [S, L, 4, 4] at positions [S, J] of links that rest at poses [L, 4, 4], carried by joints or by none."""
+    away, moves = list[FloatArray](), dict[int, FloatArray]()
+    for number, joint in enumerate(joints):
+        leads = number < positions.shape[1]
+        ahead = positions[:, number] - joint.rest if leads else away[joint.leader]
+        away.append(ahead if leads else sum(c * ahead ** (i + 1) for i, c in enumerate(joint.curve)) + 0 * ahead)
+
+    def move(number: int) -> FloatArray:
+        if number < 0:
+            return np.tile(np.eye(4), (len(positions), 1, 1))
+        if number not in moves:
+            moves[number] = _after(move(joints[number].parent), _step(joints[number], away[number]))
+        return moves[number]
+
+    poses = np.empty((len(positions), *rest.shape))
+    for link, by in enumerate(carried):
+        poses[:, link] = _after(move(by), rest[link])
+    return poses
+
+
+def _step(joint: Joint, away: FloatArray) -> FloatArray:
+    """What a joint does [S, 4, 4], so far from rest [S]: it slides or, by Rodrigues' formula, turns."""
+    moves = np.tile(np.eye(4), (len(away), 1, 1))
+    if joint.slides:
+        moves[:, :3, 3] = away[:, None] * joint.axis
+        return moves
+    x, y, z = joint.axis.tolist()
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sines, rests = np.sin(away)[:, None, None], 2 * np.sin(away / 2)[:, None, None] ** 2
+    moves[:, :3, :3] += sines * across + rests * (np.outer(joint.axis, joint.axis) - np.eye(3))
+    moves[:, :3, 3] = joint.anchor - dots(moves[:, :3, :3], joint.anchor)
+    return moves
+
+
+def _after(first: FloatArray, then: FloatArray) -> FloatArray:
+    """Products of poses [S, 4, 4] and [S, 4, 4] or [4, 4]."""
+    whole = first.copy()
+    whole[:, :3, :3] = dots(first[:, :3, None, :3], np.swapaxes(then[..., :3, :3], -1, -2)[..., None, :, :])
+    whole[:, :3, 3] += dots(first[:, :3, :3], then[..., None, :3, 3])
+    return whole
 
 
 def _positions(joints: Sequence[_Read], samples: int, seed: int) -> FloatArray:
@@ -298,13 +336,12 @@ class _Urdf:
             elif mimic is not None and joint.type != "fixed" and mimic.joint in names:
                 times = 1.0 if mimic.multiplier is None else float(mimic.multiplier)
                 self.joints[number] = read._replace(leader=names.index(mimic.joint), curve=(times,))
-        self._sampled = [joint.name for joint in self.joints.values() if joint.limits is not None]
+        self._robot.update_cfg(dict.fromkeys(actuated, 0.0))
         self.world = self.links.index("world") if "world" in self.links else None
         links = enumerate(self._robot.robot.links)
         self.solids = {i: _solids(map(_urdf_shape, link.collisions)) for i, link in links if link.collisions}
 
-    def place(self, positions: FloatArray) -> FloatArray:
-        self._robot.update_cfg(dict(zip(self._sampled, positions.tolist(), strict=True)))
+    def rest(self) -> FloatArray:
         return np.stack([self._robot.get_transform(name) for name in self.links])
 
     def axis(self, joint: int) -> tuple[FloatArray, FloatArray]:
@@ -338,7 +375,7 @@ class _Mjcf:
     def __init__(self, path: Path) -> None:
         mujoco = import_extra("mujoco", _FOR, "clear")
         self._model = model = mujoco.MjModel.from_xml_path(str(path))
-        self._data, self._walk = mujoco.MjData(model), mujoco.mj_kinematics
+        self._data = mujoco.MjData(model)
         self.links, self.said = [model.body(i).name or f"body_{i}" for i in range(model.nbody)], _Said()
         self.parents = {i: int(parent) for i, parent in enumerate(model.body_parentid) if i}
         shapes = _mjcf_shapes(mujoco.mjtGeom, model)
@@ -350,9 +387,15 @@ class _Mjcf:
             if model.eq_type[e] == joint_equality and model.eq_active0[e]
         }
         self.joints = {j: self._read(j) for j in range(model.njnt)}
-        self._sampled = model.jnt_qposadr[[j for j, joint in self.joints.items() if joint.limits is not None]]
         leaders = [j for j, joint in self.joints.items() if joint.leader is None or joint.leader < 0]
-        self._follow = [j for j in _led(self.joints, leaders) if j in self._driven]
+        away = {-1: 0.0}  # at rest
+        for j in _led(self.joints, leaders):
+            leader, curve = self._driven.get(j, (-1, [0.0]))
+            ahead = Polynomial([away[leader], 1.0])
+            away[j], *linear = Polynomial(curve)(ahead).coef.tolist()
+            self.joints[j] = self.joints[j]._replace(curve=tuple(linear))
+            self._data.qpos[model.jnt_qposadr[j]] += away[j]
+        mujoco.mj_kinematics(model, self._data)
 
     def _read(self, j: int) -> _Read:
         model = self._model
@@ -360,24 +403,15 @@ class _Mjcf:
         name, rest = model.joint(j).name or f"number {j}", float(model.qpos0[model.jnt_qposadr[j]])
         read = _Read(name, bool(slides), int(model.jnt_bodyid[j]), rest=rest)
         if j in self._driven:
-            leader, curve = self._driven[j]
-            return read._replace(leader=leader, curve=tuple(curve[1:]))
+            return read._replace(leader=self._driven[j][0])
         given = tuple(model.jnt_range[j].tolist()) if model.jnt_limited[j] and slides is not None else None
         roots = {int(model.body_rootid[body]) for body in self.solids if body}
         if slides is None and roots == {read.link}:
             return read  # all that collides hangs on it, so where it is makes no difference
         return read._replace(limits=_limits(kind, name, given, self.said))
 
-    def place(self, positions: FloatArray) -> FloatArray:
+    def rest(self) -> FloatArray:
         model, data = self._model, self._data
-        data.qpos[:] = model.qpos0
-        data.qpos[self._sampled] = positions
-        for driven in self._follow:
-            leader, curve = self._driven[driven]
-            start, drives = model.jnt_qposadr[driven], model.jnt_qposadr[leader]
-            away = 0.0 if leader < 0 else data.qpos[drives] - model.qpos0[drives]
-            data.qpos[start] = model.qpos0[start] + sum(c * away**power for power, c in enumerate(curve))
-        self._walk(model, data)
         poses = np.tile(np.eye(4), (model.nbody, 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = data.xmat.reshape(-1, 3, 3), data.xpos
         return poses

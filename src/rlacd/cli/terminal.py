@@ -145,6 +145,8 @@ def rewrite_summary(done: RewrittenRobot) -> str:
             f"{counted(len(done.pairs), 'pair', 'pairs')} of links at {counted(done.samples, 'position', 'positions')}"
         )
         lines.append(f"  {looked}: {kept} kept clear by finer hulls")
+        if (within := done.touch_within) is not None:
+            lines.append(f"  at others, hulls may touch where links are within {done.unit.words(within)}")
     lines += [f"  warning: {warning}" for warning in done.warnings]
     return "\n".join(lines)
 

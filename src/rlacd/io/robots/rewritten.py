@@ -89,6 +89,16 @@ class RewrittenRobot:
         return _most([link.added for link in self.replaced])
 
     @property
+    def touch_within(self) -> float | None:
+        """Wherever the joints are, hulls of two links touch only where the links are at most so far apart.
+
+        It is what the two links add whose hulls reach farthest, in the robot's unit; None where not measured.
+        """
+        each = [link.added for link in self.replaced]
+        known = sorted(length for length in each if length is not None)
+        return sum(known[-2:]) if len(known) == len(each) else None
+
+    @property
     def replaced(self) -> list[RewrittenLink]:
         """The links with collision meshes, which hulls replaced."""
         return [link for link in self.links if link.meshes]
@@ -123,6 +133,7 @@ class RewrittenRobot:
             "meshes": sum(len(link.meshes) for link in self.links),
             "hulls": sum(len(link.files) for link in self.links),
             "added_abs": self.added,
+            "touch_within_abs": self.touch_within,
             "seconds": self.seconds,
             "links": [
                 {
