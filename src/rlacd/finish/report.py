@@ -85,23 +85,9 @@ def make_report(
         weighed = [(part.hull.vertices, part.hull.faces) for part in parts] if is_cover else solid.weighed
         avoided = criterion.avoided
         entered = None if avoided is None else avoided.found(parts, solid.frame.scale)
-        missed = _shortcomings([part.hull for part in parts], distances, reached, len(summary.warnings) > 0)
-        warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
-        warnings += _unmeasured(solid) if has_surface and distances is None else []
-        warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
-        if any(options.hull_limits):
-            from rlacd.extras.finish.limits import stuck_out
-
-            warnings += stuck_out(parts, reached)
-        warnings += [*summary.warnings, *missed]
-        is_stopped = run.stopped_by is not None
-        warnings += too_narrow(distances.narrowed, reached, is_stopped) if distances else []
+        warnings = _warned(reached, parts, seams, distances, summary.warnings, run)
         if avoided and entered:
-            warnings += avoided.warnings_of(entered, solid.frame.told_in, is_stopped=is_stopped)
-        if criterion.obstacles is not None and not is_cover:
-            from rlacd.extras.finish.limits import out_of_the_box
-
-            warnings += out_of_the_box([part.hull for part in parts], solid)
+            warnings += avoided.warnings_of(entered, solid.frame.told_in, is_stopped=run.stopped_by is not None)
         return Report(
             options=options.as_plain(),
             complete=run.stopped_by is None,
@@ -122,6 +108,32 @@ def make_report(
             warnings=tuple(warnings),
             unit=solid.frame.told_in,
         )
+
+
+def _warned(
+    reached: Reached,
+    parts: Sequence[Part],
+    seams: Overlap | None,
+    distances: _Distances | None,
+    by_criterion: Sequence[str],
+    run: Run,
+) -> list[str]:
+    """One sentence for each thing that the user should know."""
+    solid, options, hulls = reached.solid, reached.options, [part.hull for part in parts]
+    warnings = [*solid.warnings, *_coarse(solid), *_early_end(run)]
+    warnings += _unmeasured(solid) if len(solid.surface[1]) > 0 and distances is None else []
+    warnings += _shallow(seams, solid.frame.unit.words(options.overlap)) if options.overlap > 0 else []
+    if any(options.hull_limits):
+        from rlacd.extras.finish.limits import stuck_out
+
+        warnings += stuck_out(parts, reached)
+    warnings += [*by_criterion, *_shortcomings(hulls, distances, reached, len(by_criterion) > 0)]
+    warnings += too_narrow(distances.narrowed, reached, run.stopped_by is not None) if distances else []
+    if reached.goal.obstacles is not None and len(solid.faces) > 0:
+        from rlacd.extras.finish.limits import out_of_the_box
+
+        warnings += out_of_the_box(hulls, solid)
+    return warnings
 
 
 def _primitives(parts: Sequence[Part]) -> dict[str, int]:
