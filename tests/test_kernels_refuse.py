@@ -28,7 +28,7 @@ def least(points: Any = VERTICES, offsets: Any = (0.2,), exponent: float = 1.3, 
 
 
 def concave(points: Any = VERTICES, faces: Any = FACES, hull: Any = FACES) -> Any:
-    return _native.Against(points, faces).leads_farther(_native.ConvexBody(VERTICES, hull), 0.05)
+    return _native.Against(points, faces).comes_deeper(_native.ConvexBody(VERTICES, hull), 0.05)
 
 
 def simple(points: Any, faces: Any) -> Any:

@@ -75,7 +75,7 @@ STAGES_OF_THEIR_OWN = [
 
 @pytest.mark.parametrize(
     ("name", "ratio", "options"),
-    [pytest.param(n, 4, WHOLE, marks=pytest.mark.slow) if n in LONG else (n, 2.5, WHOLE) for n in SMALL]
+    [pytest.param(n, 4, WHOLE, marks=pytest.mark.slow) if n in LONG else (n, 2.3, WHOLE) for n in SMALL]
     + [pytest.param(name, 1.5, WHOLE, marks=pytest.mark.nightly) for name in SMALL]
     + [
         pytest.param("screws", 8.4, options, marks=pytest.mark.slow, id=str(options)) for options in STAGES_OF_THEIR_OWN

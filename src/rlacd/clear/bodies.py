@@ -192,6 +192,13 @@ class Body:
         """What it collides as; hulls of points alone have nothing to be compared with."""
         return [*(self.hulls if len(self.mesh.faces) else []), *self.primitives]
 
+    def holds(self, other: Body, pose: FloatArray) -> bool:
+        """Whether a corner of another body, seen at a pose where the two do not touch, is within its walls."""
+        corners = moved(pose, other.mesh.used)
+        corners = corners[((corners >= self.mesh.box[0]) & (corners <= self.mesh.box[1])).all(axis=1)]
+        walls = _native.Surface(self.mesh.vertices, self.mesh.faces, 1)
+        return bool((walls.winding(np.ascontiguousarray(corners), threads=1) > 1 / 2).any())
+
     @property
     def is_compared(self) -> bool:
         """Whether nothing of it collides but its `shapes`."""

@@ -44,8 +44,9 @@ tolerance between them take seven times as many, which costs more in every step 
 Redo = Callable[[int, Sequence[Obstacle], int], Sequence[Surface] | None]
 """Decomposes the body of this number again, clear of obstacles in its frame; None if that takes more hulls."""
 
-Exact = Callable[[int], Sequence[Surface] | None]
-"""The body of this number as the exact hulls of its parts; None if its hulls are that already."""
+Exact = Callable[[int, bool], Sequence[Surface] | None]
+"""The body of this number as the exact hulls of its parts, as open as it is if others move in it; None if its hulls are
+that already."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class _Wishes:
         return is_new
 
 
-def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact = lambda _: None) -> Cleared:
+def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact = lambda *_: None) -> Cleared:
     """Decompose bodies again until no hulls touch where the bodies do not, or that does not help.
 
     Raises
@@ -103,7 +104,7 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
     finer = {
         i: hulls
         for i in sorted({*chain(*(pair for pair, found in touching.items() if found.offences))})
-        if bodies[i].hulls and (hulls := exact(i)) is not None
+        if bodies[i].hulls and (hulls := exact(i, _is_entered(i, bodies, touching))) is not None
     }
     bodies = [body.with_hulls(finer[i]) if i in finer else body for i, body in enumerate(bodies)]
     touching = _renewed(bodies, motion, touching, {*finer})
@@ -131,6 +132,14 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
                 vain[pair] = vain[pair] + 1 if is_vain else 0
     mended = sorted(pair for pair in first if pair not in touching or not touching[pair].offences)
     return Cleared(bodies, dict(sorted(touching.items())), tuple(mended), frozenset(wishes.given_up))
+
+
+def _is_entered(own: int, bodies: Sequence[Body], touching: dict[tuple[int, int], Touching]) -> bool:
+    """Whether another body moves where only closing an opening of a body has put hulls."""
+    wrong = [(pair, one.pose) for pair, found in touching.items() if own in pair for one in _spread(found.offences)]
+    return any(
+        bodies[own].holds(bodies[j if own == i else i], pose if own == i else inverse(pose)) for (i, j), pose in wrong
+    )
 
 
 def _renewed(
@@ -169,6 +178,8 @@ def _wish(bodies: Sequence[Body], wrong: dict[tuple[int, int], Touching], wishes
 
 def _spread(offences: Sequence[Offence]) -> list[Offence]:
     """The deepest, and then always the one that differs most from those chosen."""
+    if not offences:
+        return []
     poses = np.stack([one.pose[:3].ravel() for one in offences])
     poses[:, 3::4] /= max(float(np.abs(poses[:, 3::4]).max()), 1e-300)
     chosen, away = [0], np.full(len(offences), np.inf)

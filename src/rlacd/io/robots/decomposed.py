@@ -46,7 +46,7 @@ SHARE = 0.015
 link (geometric mean), and MuJoCo takes twice as many steps a second as with each mesh at its own scale."""
 
 SMALL: OpeningsName = "small"
-"""Links are solids, which nothing gets into; what is as open as a bucket stays open."""
+"""Links are solids, which nothing gets into; what is as open as a bucket stays open, and what other links move in."""
 
 FULL: DetailName = "full"
 """Hulls with all their corners: simpler ones hold them, and a little more."""
@@ -128,7 +128,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         body, own = bodies[number], each[number]
         tell(LINK + body.name, number)
         for collider in body.colliders:
-            parts = collider.key, own.get("threshold_abs")
+            parts = collider.key, own.get("threshold_abs"), own["openings"]
             if (key := (parts, own.get("detail"))) not in done:
                 done[key] = decomposed(body, collider, own, robot.unit, found.setdefault(parts, Memory()))
             results[collider] = done[key]
@@ -149,10 +149,11 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         results.update(again)
         return hulls
 
-    def exact(number: int) -> list[Surface] | None:
-        if "detail" in each[number]:
+    def exact(number: int, is_entered: bool) -> list[Surface] | None:
+        finer = {"detail": FULL} | ({"openings": "auto"} if is_entered and each[number]["openings"] == SMALL else {})
+        if finer.items() <= each[number].items():
             return None
-        each[number] |= {"detail": FULL}
+        each[number] |= finer
         decompose_body(number)
         return _moving(bodies[number], results).hulls
 
