@@ -320,6 +320,22 @@ def ball_and_wall(folder: Path, dent: float) -> Path:
 
 
 @pytest.mark.promise("links-clear")
+@pytest.mark.parametrize("is_entered", [True, False])
+def test_an_opening_stays_open_only_if_another_link_moves_in_it(is_entered: bool, tmp_path: Path) -> None:
+    """A flask without a thickness, whose mouth is small beside it, and a rod that turns in its mouth or beside it."""
+    profile = np.array([(0, 0), (0.5, 0), (0.5, 1.4), (0.3, 1.7)])
+    flask = trimesh.creation.revolve(profile, sections=16)
+    x = 0.0 if is_entered else 0.6
+    rod = block((x - 0.05, -0.05, 0.9), (x + 0.05, 0.05, 2.5))
+    turn = Joint("revolute", "flask", "rod", (0, 0, 1), (x, 0, 0), (-1, 1))
+    robot = Robot("mixer", {"flask": flask, "rod": rod}, (turn,)).write(tmp_path)
+    done = rlacd.rewrite_robot(robot, tmp_path / "out.urdf", quality="fast", threads=1, samples=20)
+    assert (len(done.links[0].hulls) > 4) == is_entered
+    assert [pair.share for pair in done.pairs] == [0] * len(done.pairs)
+    assert positions_with_contacts(done.path) == []
+
+
+@pytest.mark.promise("links-clear")
 def test_hulls_are_exact_where_simpler_ones_would_touch(tmp_path: Path) -> None:
     robot, options = ball_and_wall(tmp_path, 0.02), {"threads": 1, "samples": 50, "quality": "fast"}
     simple = rlacd.rewrite_robot(
