@@ -150,8 +150,11 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         return hulls
 
     def exact(number: int, is_entered: bool) -> list[Surface] | None:
-        finer = {"detail": FULL} | ({"openings": "auto"} if is_entered and each[number]["openings"] == SMALL else {})
-        if finer.items() <= each[number].items():
+        own = each[number]
+        finer: dict[str, Any] = {} if "detail" in own else {"detail": FULL}
+        if is_entered and own["openings"] == SMALL:
+            finer["openings"] = "auto"
+        if not finer:
             return None
         each[number] |= finer
         decompose_body(number)
