@@ -139,7 +139,7 @@ def test_no_file_becomes_more_triangles_than_can_be_handled(monkeypatch: pytest.
     """The bound is lower here, in this process: a server of its own would not know."""
     monkeypatch.setattr(cad, "MOST_OF_CAD", 20_000)
     values = {"path": str(BALL), "kind": "iges", "share": 1e-4, "metres": None, "of_nodes": False}
-    facts, blobs = cad.triangulate(Path())(values, {"file": BALL.read_bytes()}, {})
+    facts, blobs = cad.triangulate(Path())(values, {"file": BALL.read_bytes()})
     count = sum(len(shape.faces) for _, shape in read_gltf(BALL, blobs["glb"]).geometry)
     assert 15_000 < count < 25_000
     assert facts["sought"] == pytest.approx(6e-6, rel=0.01)
