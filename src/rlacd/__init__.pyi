@@ -158,8 +158,8 @@ def decompose(
         Grid cells along the longest side, used to repair bodies that are not closed. Default: 100.
     openings : OpeningsName
         Bodies with openings: auto fills those that nothing can get into, or that have lost some faces, and makes the
-        others thin shells; small, the default for robots, also fills those whose openings are small beside them; solid
-        fills all that enclose a space; thin fills none. Default: auto.
+        others thin shells; small, the default for robots, also fills those whose openings are small beside them, unless
+        another link moves in there; solid fills all that enclose a space; thin fills none. Default: auto.
     keep_cavities : bool
         Closed cavities stay empty, for a ball that starts inside or a room to stand in; else they are filled, as
         nothing can get in, and only the mass leaves them out. Closed cavities are those that an inner shell or closed

@@ -231,7 +231,8 @@ class Options:
         one_of=OpeningsName,
         help="""Bodies with openings: auto fills those that nothing can get into, or that have lost some faces,
         and makes the others thin shells; small, the default for robots, also fills those whose openings are
-        small beside them; solid fills all that enclose a space; thin fills none.""",
+        small beside them, unless another link moves in there; solid fills all that enclose a space; thin fills
+        none.""",
     )
     keep_cavities: bool = option(
         False,
