@@ -117,6 +117,19 @@ def test_an_implausible_body_is_doubted_with_what_would_help(
         rlacd.decompose(big, scale=1 / factor, quality="fast", threads=1).save(tmp_path / f"small.{ending}")
 
 
+@pytest.mark.parametrize(("units", "metres"), [("mm", 0.001), ("meters", 1.0), ("inches", 0.0254)])
+def test_the_unit_that_a_trimesh_object_states_is_known(units: str, metres: float) -> None:
+    mesh = trimesh.creation.box((40, 30, 20))
+    mesh.units = units
+    for given in (mesh, trimesh.Scene(mesh)):
+        result = rlacd.decompose(given, threshold=f"{1000 * metres}mm", quality="fast", threads=1)
+        assert result.report.options["threshold_abs"] == pytest.approx(1.0)
+        assert result.report.metres == pytest.approx(metres)
+    mesh.units = "unknown"
+    with pytest.raises(OptionError, match="does not say its unit"):
+        rlacd.decompose(mesh, threshold="1mm")
+
+
 def test_a_hollow_shell_is_doubted_unless_its_mass_is_given(tmp_path: Path) -> None:
     """A box of faces without its lid: repair makes its walls a thousandth of its longest side thick."""
     walls = trimesh.creation.box((0.2, 0.2, 0.2))

@@ -374,8 +374,9 @@ class Options:
         TypeError
             There is no such option.
         """
-        given = read_lengths({name: value for name, value in given.items() if value is not None})
+        given = {name: value for name, value in given.items() if value is not None}
         check_names("decompose", given, OPTION_NAMES, ELSEWHERE)
+        given = read_lengths(given)
         options = cls(**given)
         for name, rule in options._overridden():
             if name in given:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TypeAlias
+from typing import IO, Any, TypeAlias
 
 import numpy as np
 import trimesh
@@ -90,13 +90,22 @@ def load_mesh(
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
         kind, looks = type(source).__name__, hasattr(source, "geometry") or getattr(source, "visual", None)
         asset = Asset(source) if looks is True or getattr(looks, "defined", False) else None
-        return without_engine_hulls(_baked(kind, Contents(geometry_of(source, kind), asset=asset)))
+        contents = Contents(geometry_of(source, kind), asset=asset, metres=_metres(source))
+        return without_engine_hulls(_baked(kind, contents))
     if isinstance(source, tuple) and len(source) == 2:
         return replace(_baked("arrays", Contents(one_shape("arrays", *arrays_of(*source)))), nodes=(), node_of=None)
     raise MeshDataError(
         f"cannot take a mesh from {type(source).__name__}: give a path, an open file, vertices and faces, or a trimesh "
         "object or a list of them"
     )
+
+
+def _metres(source: Any) -> float | None:
+    """How many metres the unit is that a trimesh object states; None if it states none that is known."""
+    try:
+        return None if source.units is None else float(trimesh.units.unit_conversion(source.units, "meters"))
+    except (KeyError, ValueError):
+        return None
 
 
 def _read(path: Path, fineness: Fineness) -> Contents:

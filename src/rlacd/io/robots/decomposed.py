@@ -212,7 +212,9 @@ def options_of_bodies(robot: Robot, options: Mapping[str, Any], asked: RobotOpti
         matched = [name for name in replaced if re.fullmatch(pattern, name)]
         if not matched:
             known = ", ".join(replaced)
-            raise OptionError(f"no link with a collision mesh matches the regular expression {pattern!r}: {known}.")
+            raise OptionError(
+                f"no link with a collision mesh matches the regular expression {pattern!r}; there are {known}."
+            )
         lengths |= dict.fromkeys(matched, length)
     whole = _relative_to_robot(options, robot)
     return [whole | ({"threshold_abs": lengths[name]} if name in lengths else {}) for name in names]
