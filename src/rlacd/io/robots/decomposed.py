@@ -150,11 +150,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         return hulls
 
     def exact(number: int, is_entered: bool) -> list[Surface] | None:
-        own = each[number]
-        finer: dict[str, Any] = {} if "detail" in own else {"detail": FULL}
-        if is_entered and own["openings"] == SMALL:
-            finer["openings"] = "auto"
-        if not finer:
+        if not (finer := _finer(each[number], is_entered)):
             return None
         each[number] |= finer
         decompose_body(number)
@@ -162,6 +158,12 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
 
     tell("clear", 0)
     return _checked(robot, results, asked, options.get("seed") or 0, (redo, exact))
+
+
+def _finer(options: Mapping[str, Any], is_entered: bool) -> dict[str, Any]:
+    """What makes the hulls of a link exact, and leaves it as open as it is if another link moves in it."""
+    finer = {} if "detail" in options else {"detail": FULL}
+    return finer | ({"openings": "auto"} if is_entered and options["openings"] == SMALL else {})
 
 
 def _checked(
