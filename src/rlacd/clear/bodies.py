@@ -83,6 +83,11 @@ class Surface:
         return coal.Convex(points, triangles)
 
     @cached_property
+    def walls(self) -> _native.Surface:
+        """For winding numbers, its triangles."""
+        return _native.Surface(self.vertices, self.faces, 1)
+
+    @cached_property
     def corner(self) -> FloatArray:
         """The point [1, 3] farthest from its middle: hardly ever in the box of another body."""
         away = self.used - self.box.mean(axis=0)
@@ -194,10 +199,11 @@ class Body:
 
     def holds(self, other: Body, pose: FloatArray) -> bool:
         """Whether a corner of another body, seen at a pose where the two do not touch, is within its walls."""
+        if not len(self.mesh.faces):
+            return False
         corners = moved(pose, other.mesh.used)
         corners = corners[((corners >= self.mesh.box[0]) & (corners <= self.mesh.box[1])).all(axis=1)]
-        walls = _native.Surface(self.mesh.vertices, self.mesh.faces, 1)
-        return bool((walls.winding(np.ascontiguousarray(corners), threads=1) > 1 / 2).any())
+        return bool((self.mesh.walls.winding(np.ascontiguousarray(corners), threads=1) > 1 / 2).any())
 
     @property
     def is_compared(self) -> bool:
