@@ -67,6 +67,8 @@ class Metrics:
     overlap : float
         Volume that lies in several hulls, counted once for each but one, over that of their union; 0 if they are
         disjoint.
+    added : float
+        Volume of the union that lies outside the repaired input, over the input's.
     uncovered : float
         Fraction of the input's surface outside the union.
     invalid : int
@@ -85,6 +87,7 @@ class Metrics:
     exceeding: int | None
     volume: float
     overlap: float
+    added: float
     uncovered: float
     invalid: int
     empty: int
@@ -129,6 +132,9 @@ def measure(
     under = union.under(vertices, faces, TOLERANCE, threads)[1]
     points, _ = _native.sample_surface(vertices, faces, SAMPLES, 0)
     concavity, exceeding, empty = _concavity(solid, usable, promised)
+    bodies = [to_manifold(hull.vertices, hull.faces.astype(np.int64)) for hull in usable]
+    filled = Manifold.batch_boolean(bodies, OpType.Add)
+    total, inside = sum(body.volume() for body in bodies), solid.manifold.volume()
     return Metrics(
         parts=len(hulls),
         faces=sum(len(f) for _, f in hulls),
@@ -138,19 +144,13 @@ def measure(
         hausdorff=max(over, under),
         concavity=concavity,
         exceeding=exceeding,
-        volume=sum(hull.volume for hull in usable) / solid.manifold.volume(),
-        overlap=_overlap(usable),
+        volume=total / inside,
+        overlap=max(0.0, total / filled.volume() - 1),
+        added=(filled - solid.manifold).volume() / inside,
         uncovered=float((union.distance(points, threads) > COVERED).mean()),
         invalid=sum(not is_valid(v, f) for v, f in hulls),
         empty=empty,
     )
-
-
-def _overlap(hulls: Sequence[Hull]) -> float:
-    bodies = [to_manifold(hull.vertices, hull.faces.astype(np.int64)) for hull in hulls]
-    union: float = Manifold.batch_boolean(bodies, OpType.Add).volume()
-    total: float = sum(body.volume() for body in bodies)
-    return max(0.0, total / union - 1)
 
 
 def _concavity(solid: Solid, hulls: Sequence[Hull], promised: float | None) -> tuple[float, int | None, int]:
