@@ -43,8 +43,9 @@ class Exchange:
 TAKERS = 6
 """Number of parts a piece is offered to, starting with those whose hulls would grow the least."""
 
-PIECE_HALVINGS = 3
-"""Maximum depth of halving for a piece that no part can take."""
+PIECE_HALVINGS, HALVINGS_TO_GIVE = 3, 1
+"""Maximum depth of halving for a piece that no part can take, and where what is left may stay: smaller pieces take most
+of the search's time, and taking them saves no part."""
 
 PATCHES = 4
 """Parts of more components than this are reunited into one if that meets the criterion."""
@@ -91,7 +92,7 @@ def divide(
         return None  # a quick test that ends most trials
     left: list[Component] = []
     for piece in pieces:
-        left += division.left_of(piece, stop=not keeps_rest)
+        left += division.left_of(piece, HALVINGS_TO_GIVE if keeps_rest else PIECE_HALVINGS, stop=not keeps_rest)
         if left and not keeps_rest:
             return None
     changes = [*zip(division.now, around, strict=True)]
@@ -140,7 +141,7 @@ class _Division:
         smaller = self._halves(piece) if halvings > 0 else []
         return all(self.may_go(half, halvings - 1) for half in smaller) if smaller else bool(self.takers(piece))
 
-    def left_of(self, piece: _Piece, halvings: int = PIECE_HALVINGS, stop: bool = False) -> list[Component]:
+    def left_of(self, piece: _Piece, halvings: int, stop: bool) -> list[Component]:
         """Give parts what they can take of a piece; returns the rest, or with `stop` the first of the rest."""
         for i in self.takers(piece):
             union = joint_part(self.criterion, self.run.work, self.now[i], piece.component)

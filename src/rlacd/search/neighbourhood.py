@@ -56,8 +56,8 @@ AHEAD = 16
 """Trials chosen ahead, each as if those before it changed nothing; one whose part or neighbours they do change is made
 between what is there then. So it starts from the state that they leave, whatever the number of threads."""
 
-MOST_TRIES = 3
-"""How often a part is divided between the same parts: of 470 further trials none saved one."""
+MOST_TRIES = 6
+"""How often a part is divided, whatever becomes of those around: they seldom shrink, and a part that shrinks is new."""
 
 
 class _Trial(NamedTuple):
@@ -108,7 +108,7 @@ class Neighbourhood:
         self._around: dict[int, tuple[int, ...]] = {}
         self._chosen: deque[_Chosen] = deque()
         self._stale: list[Apart[Exchange | None]] = []  # may still be under way
-        self._tries: dict[tuple[_Trial, tuple[int, ...]], int] = {}
+        self._tries: dict[_Trial, int] = {}
         self._in_vain = dict.fromkeys((False, True), 0)  # units since trials that give, or do not, last saved a part
 
     @property
@@ -138,9 +138,9 @@ class Neighbourhood:
         return next((trial for trial in found if trial is not None), None)
 
     def _least_tried(self, gives: bool) -> _Trial | None:
-        """The part tried least often between the same neighbours; the smallest of several."""
+        """The part tried least often; the smallest of several."""
         around = self._neighbours()
-        tries = {i: self._tries.get((_Trial(gives, i), around[i]), 0) for i in self._by_size() if around[i]}
+        tries = {i: self._tries.get(_Trial(gives, i), 0) for i in self._by_size() if around[i]}
         which = min(tries, key=tries.__getitem__, default=None)
         return None if which is None or tries[which] == MOST_TRIES else _Trial(gives, which)
 
@@ -164,7 +164,7 @@ class Neighbourhood:
         if trial.part not in parts:
             return
         near = self._neighbours()[trial.part]
-        tries = self._tries[trial, near] = self._tries.get((trial, near), 0) + 1
+        tries = self._tries[trial] = self._tries.get(trial, 0) + 1
         exchange = partial(
             divide,
             parts[trial.part],
@@ -235,7 +235,7 @@ class Neighbourhood:
             if one.apart is not None:
                 one.apart.account.close()
                 self._stale.append(one.apart)
-            self._tries[one.trial, one.near] -= 1
+            self._tries[one.trial] -= 1
             self._choose(one.trial)
 
 
