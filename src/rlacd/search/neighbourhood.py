@@ -57,7 +57,7 @@ AHEAD = 16
 between what is there then. So it starts from the state that they leave, whatever the number of threads."""
 
 MOST_TRIES = 6
-"""How often a part is divided, whatever becomes of those around: they seldom shrink, and a part that shrinks is new."""
+"""How often a part is divided in each way. Those around it mostly grow meanwhile, which seldom makes room for it."""
 
 
 class _Trial(NamedTuple):
