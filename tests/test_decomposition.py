@@ -86,6 +86,28 @@ def test_it_describes_itself_in_one_line() -> None:
     assert repr(Decomposition.of([], SOURCE)) == "<Decomposition: 0 hulls of mesh, 0 triangles>"
 
 
+def test_its_report_shows_itself_in_one_line_and_as_json_in_full(real: Decomposition) -> None:
+    shown = repr(real.report)
+    assert len(shown) < 300
+    assert "\n" not in shown
+    assert f"{len(real)} hull" in shown
+    assert real.report.fit_words() in shown
+    assert real.report.as_dict()["hulls"] == len(real)
+
+
+def test_hulls_know_their_unit_and_what_trimesh_read_its_file(tmp_path: Path) -> None:
+    trimesh.creation.box((80, 30, 200)).export(tmp_path / "brick.stl")
+    mesh = trimesh.load(tmp_path / "brick.stl", force="mesh", process=False)
+    mesh.metadata["file_name"] = "brick.stl"  # as trimesh 4 does
+    plain, converted = decompose(mesh, threads=1), decompose(mesh, threshold="5mm", unit="mm", threads=1)
+    assert plain.name == "brick"
+    assert plain[0].units is None
+    assert converted[0].units == converted.source.units == "m"
+    assert converted[0].extents == pytest.approx((0.08, 0.03, 0.2))
+    with pytest.raises(OptionError, match=r"threshold is 5mm, but brick\.stl does not say its unit"):
+        decompose(mesh, threshold="5mm")
+
+
 def test_it_saves_to_a_file_and_to_a_folder_named_after_the_mesh(tmp_path: Path) -> None:
     cup = result(2)
     assert cup.save(tmp_path / "cup.glb") == tmp_path / "cup.glb"

@@ -293,7 +293,7 @@ sys.exit(rlacd.cli.main.app(["decompose", *sys.argv[1:]], standalone_mode=False)
     words = [sys.executable, "-c", code, str(meshes / "cross.ply"), "--policy", str(sees_points)]
     said = subprocess.run(words, capture_output=True, text=True, check=False)
     assert said.returncode != 0
-    assert "pip install 'rlacd[train]'" in " ".join(said.stderr.split())
+    assert "pip install 'rlacd[train] @ git+https://github.com/rlacd/rlacd'" in " ".join(said.stderr.split())
     assert "Traceback" not in said.stderr
 
 

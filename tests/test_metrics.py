@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from scipy.spatial import ConvexHull
 import rlacd
 from rlacd.io.read.load import load_mesh
 from rlacd.repair.repair import repair
+from rlacd.report import Hausdorff
 from tests.shapes import box, dense, from_manifold, point_to_triangles
 
 # The input of most tests: its longest side is 2 and it is centred, so that lengths are the frame's.
@@ -156,5 +158,7 @@ def test_the_length_that_is_said_is_within_one_per_cent(how: dict[str, float]) -
 
 
 def test_of_the_shortest_lengths_only_a_bound_is_said() -> None:
-    words = rlacd.decompose(trimesh.creation.icosphere(3), detail="full", threads=1).report.fit_words()
-    assert re.search(r"concavity at most .*; hulls reach at most 0.00\d+ units beyond the input and cover it", words)
+    report = rlacd.decompose(trimesh.creation.icosphere(3), detail="full", threads=1).report
+    assert re.search(r"concavity at most .*; hulls reach nowhere beyond the input and cover it", report.fit_words())
+    words = dataclasses.replace(report, hausdorff=Hausdorff(5e-4, 0.0)).fit_words()
+    assert re.search(r"; hulls reach at most 0.000\d+ units beyond the input and cover it", words)

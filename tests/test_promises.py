@@ -200,7 +200,7 @@ def test_a_command_without_its_extra_names_it(hidden: str, extra: str, words: st
     code = f"import sys; sys.modules[{hidden!r}] = None; from rlacd.cli.main import main; main()"
     done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=120)
     assert done.returncode == ExitCode.BAD_INPUT
-    assert f"pip install 'rlacd[{extra}]'" in done.stderr
+    assert f"pip install 'rlacd[{extra}] @ git+https://github.com/rlacd/rlacd'" in done.stderr
     assert done.stderr.strip().count("\n") == 0
     assert not out.exists()
 

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "convex/lying.hpp"
 #include "convex/polygon.hpp"
 #include "core/stop.hpp"
 #include "surface/weld.hpp"
@@ -29,6 +30,7 @@ class SurfaceField {
     return {std::sqrt(hit.distance2), hit.slot};
   }
   double from(std::int32_t slot, Vec3 p) const { return bvh_.distance(slot, p); }
+  double lying(const Corners& t) const { return lying_in(t, bvh_); }
 
  private:
   const Bvh& bvh_;
@@ -143,6 +145,7 @@ class HullField {
     return best;
   }
   double from(std::int32_t hull, Vec3 p) const { return std::max(0.0, members_[hull]->distance(p)); }
+  double lying(const Corners&) const { return kInfinity; }  // what is inside has been clipped off
 
  private:
   const std::vector<std::shared_ptr<ConvexBody>>& members_;
@@ -196,6 +199,7 @@ HullUnion::Exposed HullUnion::exposed(double gap, int threads) const {
 Greatest HullUnion::over(const Bvh& surface, const Goal& goal, double gap, int threads) const {
   const Exposed found = exposed(gap, threads);
   Greatest over = maximize(SurfaceField(surface), found.exposed, goal, threads);
+  if (over.upper <= goal.pass) over.upper = tightened(SurfaceField(surface), found.exposed, over);
   if (!found.unresolved.faces.empty()) {
     const Greatest most = maximize(SurfaceField(surface), found.unresolved, goal, threads);
     if (most.upper > over.upper) over.upper = most.upper, over.at = most.at;

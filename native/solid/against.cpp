@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "convex/hull.hpp"
+#include "convex/lying.hpp"
 #include "convex/polygon.hpp"
 #include "core/mesh_measures.hpp"
 #include "core/stop.hpp"
@@ -106,6 +107,7 @@ class DepthField {
     return {std::max(nearest.depth, 0.0), nearest.plane};
   }
   double from(std::int32_t plane, Vec3 p) const { return std::max(planes_.depth(plane, p), 0.0); }
+  double lying(const Corners&) const { return kInfinity; }  // what lies in the hull's facets has one witness
 
  private:
   const ConvexPlanes& planes_;
@@ -134,6 +136,7 @@ class SolidField {
     if (!is_ball(witness)) return surface_.bvh().distance(witness, p);
     return std::max(0.0, norm(p - ball(witness).middle) - ball(witness).radius);
   }
+  double lying(const Corners& t) const { return lying_inside(t, surface_); }
 
  private:
   struct InnerBall {
@@ -149,19 +152,10 @@ class SolidField {
   mutable std::vector<InnerBall> balls_;  // of one thread
 };
 
-// The maximum, bounded also by the witness of every triangle's centre alone: exact for triangles that lie on those they
-// are measured to.
 template <class Field>
 Interval measured(const Field& field, const Mesh& mesh, const Goal& goal) {
-  Interval found = maximize(field, mesh, goal, 1);
-  double most = found.lower;
-  for (std::size_t f = 0; f < mesh.faces.size() && most < found.upper; ++f) {
-    const Corners corner = corners_of(mesh, mesh.faces[f]);
-    const std::int32_t witness = field.at((1.0 / 3.0) * (corner[0] + corner[1] + corner[2]), -1, 0).witness;
-    for (const Vec3& point : corner) most = std::max(most, field.from(witness, point));
-  }
-  found.upper = std::min(found.upper, most);
-  return found;
+  const Interval found = maximize(field, mesh, goal, 1);
+  return {found.lower, tightened(field, mesh, found)};
 }
 
 }  // namespace

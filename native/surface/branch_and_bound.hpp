@@ -4,6 +4,7 @@
 //      set of convex objects (triangles, hulls) is such a function; so is depth under a set of planes.
 //        Sample at(Vec3 p, int32 hint, double enough)  a witness with f_w(p) = f(p), or any with f_w(p) <= enough
 //        double from(int32 witness, Vec3 p)            f_w(p)
+//        double lying(Corners t)                       a bound on f over a triangle where f is 0, else infinity
 // Out: an interval that holds the maximum, narrow enough for the goal, and where it is reached.
 // How: branch and bound over the triangles: all that are open are halved at once at their longest edges, wave after
 //      wave. A wave depends only on those before it, so nothing depends on the number of threads.
@@ -13,6 +14,8 @@
 //      pair of the witnesses of the corners. A single witness closes a cell that lies in its own territory; a pair
 //      closes one across the ridge between two, where single witnesses would need cells as small as the tolerance.
 //      f_w is 1-Lipschitz, so the bound exceeds f at a corner by no more than the cell's size: halving always ends.
+//      Where f is 0 over many witnesses, cells would have to be as small as the goal along all their ridges: the field
+//      bounds those at once.
 #pragma once
 
 #include <algorithm>
@@ -70,6 +73,10 @@ inline double best_mixture(const std::array<double, 3>& a, const std::array<doub
   }
   return best;
 }
+
+// A triangle is asked whether it lies where the field is 0 once its bound is so many times what need not be resolved:
+// others are halved sooner.
+constexpr double kWorth = 8;
 
 template <class Field>
 double upper_bound(const Field& field, const SubTriangle& cell) {
@@ -141,16 +148,26 @@ Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int th
     if (found.lower > goal.fail) return found;
   }
 
+  const auto unsettled = [&] { return std::max(goal.pass, found.lower + goal.tolerance); };
+  // If f may be 0 at all corners.
+  const auto bound_lying = [&](SubTriangle& cell, double exact_above) {
+    if (cell.upper <= kWorth * unsettled()) return;
+    for (const Sample& sample : cell.sample)
+      if (sample.value > std::max(exact_above, goal.tolerance)) return;
+    cell.upper = std::min(cell.upper, field.lying(cell.corner));
+  };
+
   std::vector<SubTriangle> cells(mesh.faces.size()), halves;
   for_each(cells.size(), [&](std::size_t f) {
     cells[f].corner = corners_of(mesh, mesh.faces[f]);
     for (int i = 0; i < 3; ++i) cells[f].sample[i] = at_vertex[mesh.faces[f][i]];
     cells[f].upper = upper_bound(field, cells[f]);
+    bound_lying(cells[f], enough());
   });
 
   const auto drop = [&](std::vector<SubTriangle>& open) {
     const auto settled = [&](const SubTriangle& cell) {
-      if (cell.upper > std::max(goal.pass, found.lower + goal.tolerance)) return false;
+      if (cell.upper > unsettled()) return false;
       dropped = std::max(dropped, cell.upper);
       return true;
     };
@@ -162,6 +179,7 @@ Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int th
     halves.resize(2 * cells.size());
     for_each(cells.size(), [&](std::size_t c) {
       auto pair = bisect(field, cells[c], exact_above);
+      for (SubTriangle& half : pair) bound_lying(half, exact_above);
       halves[2 * c] = pair[0];
       halves[2 * c + 1] = pair[1];
     });
@@ -173,6 +191,22 @@ Greatest maximize(const Field& field, const Mesh& mesh, const Goal& goal, int th
   found.upper = std::max(found.lower, dropped);
   for (const SubTriangle& cell : cells) found.upper = std::max(found.upper, cell.upper);
   return found;
+}
+
+// An upper bound of the maximum that is tight also where the goal lets it be loose, if triangles lie on what they are
+// measured to: by the witness of every triangle's centre alone, or where the field is 0.
+template <class Field>
+double tightened(const Field& field, const Mesh& mesh, Interval found) {
+  double most = found.lower;
+  for (std::size_t f = 0; f < mesh.faces.size() && most < found.upper; ++f) {
+    const Corners corner = corners_of(mesh, mesh.faces[f]);
+    const std::int32_t witness = field.at((1.0 / 3.0) * (corner[0] + corner[1] + corner[2]), -1, 0).witness;
+    double upper = 0;
+    for (const Vec3& point : corner) upper = std::max(upper, field.from(witness, point));
+    if (upper > std::max(most, kHair)) upper = std::min(upper, field.lying(corner));
+    most = std::max(most, upper);
+  }
+  return std::min(found.upper, most);
 }
 
 }  // namespace rlacd

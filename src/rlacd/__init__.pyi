@@ -200,8 +200,8 @@ def decompose(
         What `threshold` is relative to: with `per_node` the whole scene or each node; of a robot all of it (scene) or
         each mesh, whose criterion is then concavity. Default: scene.
     unit : UnitName | None
-        The unit of the mesh, which is converted to metres; file takes what the file says. Default: coordinates stay as
-        they are.
+        The unit of the mesh, which is converted to metres, and so are the hulls; file takes what the file says.
+        Default: coordinates stay as they are.
     scale : float | None
         Multiply the mesh's coordinates by this. A conversion by `unit` comes first. Default: 1.
     **options
@@ -210,7 +210,8 @@ def decompose(
     Returns
     -------
     Decomposition
-        The hulls, in the input's frame and unit, and a report.
+        The hulls, in the input's frame and unit (metres, if `unit` is given; their ``units`` say it, if it is known),
+        and a report.
 
     Raises
     ------

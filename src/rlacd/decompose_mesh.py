@@ -24,7 +24,7 @@ from rlacd.options import Options
 from rlacd.options.fields import check_callback
 from rlacd.options.keywords import taking
 from rlacd.options.lengths import LONGEST_SIDE
-from rlacd.options.names import UNITS, mesh_name
+from rlacd.options.names import UNITS, file_name, mesh_name
 from rlacd.options.navigable import NavigableSpace
 from rlacd.policies import make_policy
 from rlacd.report import Provenance
@@ -68,7 +68,8 @@ def decompose(
     Returns
     -------
     Decomposition
-        The hulls, in the input's frame and unit, and a report.
+        The hulls, in the input's frame and unit (metres, if `unit` is given; their ``units`` say it, if it is known),
+        and a report.
 
     Raises
     ------
@@ -132,7 +133,7 @@ def decompose_quietly(
             done = _as_one(source, asked, run, memory or Memory())
     report = replace(
         done.report,
-        name=Path(source.name).stem or "mesh" if isinstance(mesh, (str, os.PathLike)) else "mesh",
+        name=Path(file_name(mesh)).stem or "mesh",
         provenance=tuple(Provenance(hull.metadata.get("node"), hull.metadata.get("body")) for hull in done.hulls),
         up=source.up,
         metres=source.metres,
@@ -140,7 +141,15 @@ def decompose_quietly(
         seconds={**run.seconds, "total": run.elapsed},
     )
     surface = trimesh.Trimesh(source.vertices, source.faces, process=False)
+    if source.metres is not None:
+        for each in (surface, *done.hulls):
+            each.units = _trimesh_unit(source.metres)
     return Decomposition(done.hulls, report, surface, done.balls, source)
+
+
+def _trimesh_unit(metres: float) -> str:
+    """What trimesh calls a unit."""
+    return next((name for name, length in UNITS.items() if length == metres), f"{metres!r} * meters")
 
 
 def _fineness(options: Options) -> Fineness:

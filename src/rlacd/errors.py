@@ -70,7 +70,12 @@ def import_extra(module: str, what: str, extra: str) -> Any:
 
 def extra_needed(what: str, extra: str) -> str:
     """Say in a sentence how to install an extra."""
-    return f"{what} needs an extra: run  pip install 'rlacd[{extra}]'  and try again."
+    return f"{what} needs an extra: run  {installing(extra)}  and try again."
+
+
+def installing(extra: str) -> str:
+    """The command that installs an extra; from the source, which works before the first release and after it."""
+    return f"pip install 'rlacd[{extra}] @ git+https://github.com/rlacd/rlacd'"
 
 
 def sentence_of(error: BaseException) -> str:

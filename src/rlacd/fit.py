@@ -11,7 +11,7 @@ RESOLVED = 1e-3
 """Distances in the frame above this (0.05% of the longest side) are measured to 1%; others are upper bounds."""
 
 COVERED = 5e-5
-"""Hulls that miss no more than this of an input cover it."""
+"""Hulls that miss no more than this of an input cover it; those that reach no farther beyond it reach nowhere."""
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,9 @@ class Avoids:
     """Those that hulls enter all the same; for each node that does."""
 
 
+NOTICED = 0.1
+"""Share of a threshold from which it is told how far repair led away from the input."""
+
 COVERAGE_TOLERANCE = 0.005
 """How far hulls may miss the surface, or reach beyond the threshold, before that is told: slack for repair and
 measurement, where the longest side is 2."""
@@ -81,7 +84,8 @@ measurement, where the longest side is 2."""
 
 @dataclass(frozen=True)
 class Hausdorff:
-    """Distances between the surfaces of hulls and input, to 1%; upper bounds up to 0.001; null without time."""
+    """Distances between the surfaces of hulls and input, to 1%; upper bounds up to 0.001, but for rounding (1e-6); null
+    without time."""
 
     added: float | None = None
     """The greatest distance of the hulls' surface from the input's."""
@@ -198,7 +202,7 @@ class Provenance:
     """Number of the body in `repair`; null if the input was not repaired."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Report:
     """What is known of a decomposition."""
 
@@ -287,8 +291,23 @@ class Report:
         added, missed = self.hausdorff.added, self.hausdorff.missed
         if added is not None and missed is not None:
             covered = "and cover it" if missed <= COVERED else f"and miss it by {_length(missed, unit)}"
-            words.append(f"hulls reach {_length(added, unit)} beyond the input {covered}")
+            reach = "reach nowhere" if added <= COVERED else f"reach {_length(added, unit)}"
+            words.append(f"hulls {reach} beyond the input {covered}")
         return "; ".join(words)
+
+    def repair_words(self) -> str:
+        """Say how far the repaired surface is from the input's; empty up to a tenth of the threshold."""
+        moved = max(self.repair, key=lambda body: body.deviation, default=None)
+        limit = self.fit.limit if self.fit is not None and self.fit.is_length else None
+        if moved is None or moved.deviation <= (COVERAGE_TOLERANCE if limit is None else NOTICED * limit):
+            return ""
+        far = self.unit_in_frame.words(moved.deviation)
+        return f"hulls are held against the repaired surface, up to {far} from the input's ({moved.step})"
+
+    def __repr__(self) -> str:
+        warned = f"{len(self.warnings)} warning{'s' * (len(self.warnings) != 1)}"
+        words = [f"{self.hulls} hull{'s' * (self.hulls != 1)} of {self.name}", self.fit_words(), warned]
+        return f"<Report: {'; '.join(word for word in words if word)}; as_dict() has all>"
 
     def as_dict(self) -> dict[str, Any]:
         """Get plain values that ``json`` can write, as ``--report`` does; what was not asked for is left out."""

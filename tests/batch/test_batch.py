@@ -244,6 +244,16 @@ def test_a_summary_tells_what_is_warned_of_and_what_is_uncovered() -> None:
     assert "13 x warning: Some lies … outside" in shown
 
 
+def test_what_is_wrong_with_a_mesh_is_said_once(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    trimesh.creation.box().export(tmp_path / "in" / "box.stl")
+    (tmp_path / "in" / "bad.stl").write_text("junk")
+    words = ["batch", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--jobs", "1"]
+    first, again = (CliRunner().invoke(app, words).stderr for _ in range(2))
+    assert first.count("bad.stl: cannot be read as stl") == 1, first
+    assert again.count("bad.stl: cannot be read as stl") == 1, again
+
+
 def test_warnings_are_counted_by_kind_whatever_their_numbers_and_units() -> None:
     one = ["1 hull sticks out by up to 0.3 m, more than 0.1 m: cut it.", "1 body became a shell (open at (1, 2, 3))."]
     two = [

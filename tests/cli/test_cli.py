@@ -10,6 +10,7 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from rlacd.decompose_mesh import decompose
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError, OutputError
 from rlacd.fit import ANY, LengthFit, Unit, told_apart
-from rlacd.report import Hausdorff
+from rlacd.report import BodyRepair, Hausdorff
 from rlacd.run import Progress, ProgressCallback
 from tests.batch.trouble import write_ell
 from tests.hulls import hull_of
@@ -159,10 +160,16 @@ def test_the_summary_says_how_far_hulls_and_input_are_apart(tmp_path: Path) -> N
     run = CliRunner().invoke(
         app, ["decompose", str(tmp_path / "ball.stl"), "-o", str(tmp_path / "b.glb"), "-t", "0.05"]
     )
-    reach = re.search(r"reach at most (0\.0\d+) units beyond the input and cover it", run.stderr)
-    assert reach is not None, run.stderr
-    assert float(reach[1]) <= 0.05
-    assert "(threshold 0.05 units)" in run.stderr
+    assert "(threshold 0.05 units); hulls reach nowhere beyond the input and cover it" in run.stderr
+
+
+def test_the_summary_says_how_far_repair_led_from_the_input() -> None:
+    result = decompose(trimesh.creation.icosphere(1), threshold=0.05, threads=1)
+    for deviation, says in ((0.004, ""), (0.02, "repaired surface, up to 0.01 units from the input's (wrapped)")):
+        moved = BodyRepair(body=0, step="wrapped", faces_in=80, faces_out=90, deviation=deviation)
+        told = summary(replace(result, report=replace(result.report, scale=2.0, repair=(moved,))), "a.glb")
+        assert says in told
+        assert bool(says) == ("repaired surface" in told)
 
 
 def test_the_summary_says_what_more_time_may_gain() -> None:
@@ -219,6 +226,7 @@ def test_a_folder_can_be_filled_in_any_format(mesh: Path, stand_in: StandIn) -> 
         (["--one-mesh", "-o", "{dir}/out.xml"], 2, "for .urdf files only"),
         (["--package-dir", "a=b"], 2, "is for robots"),
         (["--radius", "0.05"], 2, "--radius needs --criterion navigable"),
+        (["--tolerance", "9mm"], 2, "navigable; how far hulls may be from the mesh is --threshold 9mm"),
         (["--balls", "b.csv"], 2, "--balls needs --criterion navigable"),
         (["--criterion", "navigable", "--tolerance", "-1"], 2, "tolerance"),
         (["--criterion", "navigable", "--seed-point", "1,2"], 2, "--seed-point is '1,2'; it takes 3 numbers"),

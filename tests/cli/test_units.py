@@ -51,7 +51,7 @@ def told(words: str) -> tuple[str, set[str], list[float]]:
     """What a run says, without its lengths; their units; and the lengths, in metres where the unit is known."""
     run = CliRunner().invoke(app, words.split())
     assert "warning: " in run.stderr, run.stderr
-    return lengths_in(run.stderr.partition("\n")[2])  # the first line has the seconds
+    return lengths_in(run.stderr)
 
 
 def lengths_in(said: str) -> tuple[str, set[str], list[float]]:

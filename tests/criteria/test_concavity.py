@@ -130,6 +130,34 @@ def solids(draw: st.DrawFn) -> Component:
     return Component(pieces[-1].refine(draw(st.integers(1, 3))))
 
 
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-8, 1e-4, 0.02]), st.booleans())
+def test_hulls_that_lie_in_the_surface_against_dense_sampling(seed: int, shift: float, turn: bool) -> None:
+    """Boxes against the union of them: facets lie in its surface, inside, across both, or off by a shift."""
+    random = np.random.default_rng(seed)
+    lower = random.integers(0, 5, (5, 3)) / 4
+    boxes = [box(low, low + random.integers(1, 4, 3) / 4) for low in lower]
+    if turn:
+        boxes = [one.rotate((31, 17, 5)) for one in boxes]
+    whole = Component(manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add))
+    surface = whole.against.surface
+    for one in boxes:
+        corners = one.to_mesh64().vert_properties[:, :3]
+        hull = Hull.of(corners + random.normal(0, shift, corners.shape))
+        assert hull is not None
+        points = dense(hull)
+        distances = surface.distance(points)
+        outside = surface.winding(points, is_closed=True) < 0.5
+        _, (least, most) = whole.against.measure(hull.body, TOLERANCE, TOLERANCE)
+        reach = distances[outside].max(initial=0)
+        assert least <= most
+        assert reach <= most + 1e-7
+        if shift == 0:
+            assert most < 1e-5
+        least, most, _ = hull_union([hull]).over(surface, 1e-6, floor=TOLERANCE)
+        assert distances.max() <= most + 1e-7
+
+
 @pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(solids())

@@ -167,6 +167,7 @@ def test_counts_of_every_variant_of_off_are_held_against_the_file(tmp_path, lett
         ("a.dae", DAE.replace(b"<library_geometries>", b"<library_geometries>\0", 1), "damaged or cut off"),
         ("a.zae", zipped({"box.dae": DAE.replace(b"</p>", b" x</p>", 1)}), "they are damaged"),
         ("a.blend", b"BLENDER-v400", "export it from Blender"),
+        ("a.mjcf", b"<mujoco/>", "files for MuJoCo end in .xml"),
         ("a.obj.gz", b"\x1f\x8b\x08", "unpack it"),
         ("a.zip", zipped({"a.obj": OBJ}), "unpack it"),
         ("a.obj", zipped({"a.obj": OBJ}), ""),

@@ -268,6 +268,7 @@ def test_same_decomposition_same_bytes(tmp_path: Path, wooden: Decomposition, en
         ("table.xml", {"up": "w"}, OptionError, "x, y or z"),
         ("table.xml", {"one_mesh": True}, OptionError, r"one_mesh .* works for \.urdf files only"),
         ("table.blend", {}, OptionError, r"\.xml, \.urdf, \.sdf, \.usd"),
+        ("table.mjcf", {}, OptionError, r"for MuJoCo end in \.xml"),
         *((name, {}, OptionError, r"\.glb, \.obj, \.ply, \.stl") for name in ("hulls", "hulls.glb.zip", ".glb")),
         ("nul\0.glb", {}, OutputError, ""),
         ("table/", {"file_type": "fbx"}, OptionError, "unknown format"),

@@ -158,8 +158,11 @@ def test_options_of_the_other_functions_are_checked(odd: Any, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"threshold": "2.05"}, r"threshold is 2\.05; it has to be a number between 0\.001 and 2\."),
-        ({"threshold": [0.1]}, r"threshold is \[0\.1\]; it has to be a number between 0\.001 and 2\."),
+        (
+            {"threshold": "2.05"},
+            r"threshold is 2\.05; it has to be a number between 0\.001 and 2 .* '10mm'\.",
+        ),
+        ({"threshold": [0.1]}, r"threshold is \[0\.1\]; it has to be a number between 0\.001 and 2 "),
         ({"max_hulls": 2.5}, r"max_hulls is 2\.5; it has to be an integer, at least 1\."),
         ({"preset": []}, r"preset is \[\]; it has to be one of mujoco, physx, "),
         ({"quality": np.eye(2)}, r"quality is array\(\[\[1\., 0\.\], \[0\., 1\.\]\]\); it has to be one of fast, "),
@@ -226,6 +229,7 @@ def test_none_is_as_good_as_not_given() -> None:
         (rlacd.decompose, "treshold", "; did you mean threshold?"),
         (rlacd.decompose, "max_convex_hull", "; did you mean max_hulls?"),
         (rlacd.decompose, "radius_abs", "it belongs to NavigableSpace(radius_abs=)."),
+        (rlacd.decompose, "tolerance", "How far hulls may be from the mesh is threshold='10mm'."),
         (rlacd.decompose, "density", "it belongs to .save(density=)."),
         (rlacd.decompose, "qwx", "'qwx'"),
     ],
@@ -257,7 +261,8 @@ def test_shares_that_no_object_can_have_are_refused(given: dict[str, float]) -> 
 @pytest.mark.parametrize("given", [{"radius_abs": 1e-320}, {"tolerance_abs": 1e300}, {"radius_abs": 1e-5}])
 def test_lengths_that_do_not_fit_the_object_are_refused(given: dict[str, float]) -> None:
     with pytest.raises(
-        OptionError, match=r"is .*% of this object's longest side; it has to be between 0\.01% and 1000%"
+        OptionError,
+        match=r"is .*% of this object's longest side, 1 in its unit; .* 0\.01% and 1000%: is the unit",
     ):
         rlacd.decompose(creation.box(), criterion=rlacd.NavigableSpace(**given))
 

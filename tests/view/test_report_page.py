@@ -128,7 +128,7 @@ def test_the_picture_is_inside_and_its_absence_is_reported(
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     without = payload(result.save_report(tmp_path / "without.html").read_text(encoding="utf-8"))
     assert "picture" not in without
-    assert "pip install 'rlacd[view]'" in without["note"]
+    assert "pip install 'rlacd[view] @ git+https://github.com/rlacd/rlacd'" in without["note"]
 
 
 @pytest.mark.parametrize(

@@ -321,7 +321,7 @@ def test_what_is_not_there_is_reported(viewer: ViewServer, monkeypatch: pytest.M
     (missing,) = (offer for offer in offered() if offer.missing)
     assert missing.name == "usd"
     for said in (str(missing.missing), ask(viewer, "GET", "/download?format=usd").json["error"]):
-        assert "pip install 'rlacd[usd]'" in said
+        assert "pip install 'rlacd[usd] @ git+https://github.com/rlacd/rlacd'" in said
     assert ask(viewer, "GET", "/nothing").status == 404
     assert ask(viewer, "POST", "/scene", {}).status == 404
     answer = ask(viewer, "GET", "/download?format=../../etc/passwd")

@@ -136,7 +136,7 @@ def _run(batch: Batch, where: PoolOptions, *, quiet: bool) -> None:
     ):
         summary = batch.run(pool, screen, stop)
     if not quiet:
-        say("\n".join(summary_lines(summary, str(batch.out))))
+        say("\n".join(summary_lines(summary, str(batch.out), screen.told)))
     if summary.stopped:
         raise SystemExit(ExitCode.STOPPED_EARLY)
     if summary.failures:

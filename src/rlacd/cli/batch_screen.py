@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Container
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from rlacd.cli.exit_codes import say
@@ -34,6 +36,8 @@ class Screen:
         self._total = self._passed_over = self._made = 0
         self._status: Counter[str] = Counter()
         self._running: dict[str, None] = {}  # in the order of their turns
+        self.told: set[str] = set()
+        """Meshes of which it has been said what is wrong."""
 
     def close(self) -> None:
         """Remove the bar."""
@@ -63,6 +67,7 @@ class Screen:
         self._update(advance=1, state=self._state(), running=self._names())
         if row["status"] not in ("done", "warned"):
             line = failure_line(row)
+            self.told.add(row["mesh"])
             say(line) if self._bar is None else self._bar.console.print(line, markup=False, highlight=False)
         elif self._bar is None and not self._quiet and time.monotonic() - self._reported > 30:
             self._reported = time.monotonic()
@@ -94,11 +99,12 @@ def failure_line(row: Row) -> str:
     if row["status"] == "uncovered":
         return printable(f"  {row['mesh']}: hulls miss its surface by up to {row['missed']}")
     instead = " (given its convex hull)" if row["status"] == "fallback" else ""
-    return printable(f"  {row['mesh']}: {row['error']}{instead}")
+    error = row["error"].removeprefix(f"{PurePosixPath(row['mesh']).name} ")
+    return printable(f"  {row['mesh']}: {error}{instead}")
 
 
-def summary_lines(summary: Summary, out: str) -> list[str]:
-    """Summarise a run: what was done, what failed, and what took longest."""
+def summary_lines(summary: Summary, out: str, told: Container[str] = ()) -> list[str]:
+    """Summarise a run: what was done, what failed, and what took longest; meshes already `told` are only counted."""
     made = sum(summary.status.values()) - summary.passed_over
     meshes = counted(summary.meshes, "mesh", "meshes")
     warned = summary.status["warned"]
@@ -108,11 +114,11 @@ def summary_lines(summary: Summary, out: str) -> list[str]:
         f"{summary.status[status]} {status}" for status in ("uncovered", "fallback", "failed") if summary.status[status]
     ]
     rate = f", {60 * made / summary.seconds:.0f} a minute" if made and summary.seconds > 0 else ""
-    told = [*summary.uncovered, *summary.failures]
+    wrong = [row for row in (*summary.uncovered, *summary.failures) if row["mesh"] not in told]
     now = f"  {made} now in {duration(summary.seconds)}{rate}; {summary.passed_over} were done before"
-    lines = [f"{out}: {', '.join(words)}", now, *map(failure_line, told[:LISTED])]
-    if len(told) > LISTED:
-        lines.append(f"  ... and {len(told) - LISTED} more: see manifest.jsonl")
+    lines = [f"{out}: {', '.join(words)}", now, *map(failure_line, wrong[:LISTED])]
+    if len(wrong) > LISTED:
+        lines.append(f"  ... and {len(wrong) - LISTED} more: see manifest.jsonl")
     lines += [printable(f"  {count} x warning: {kind}") for kind, count in summary.warnings.most_common(LISTED)]
     if summary.others:
         kinds = ", ".join(f"{count} {ending}" for ending, count in summary.others.most_common())

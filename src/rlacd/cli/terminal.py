@@ -106,6 +106,9 @@ def summary(result: Decomposition, written: str) -> str:
     time = ("" if total is None else f", {total:.2f} s") + STOPPED[report.stopped_by]
     lines = [f"{written}: {counted(len(result), 'hull', 'hulls')}, {triangles} triangles{time}"]
     lines += [f"  {fit}" for fit in [report.fit_words()] if fit]
+    lines += [f"  {moved}" for moved in [report.repair_words()] if moved]
+    if (unit := report.options.get("unit")) not in (None, "m"):
+        lines.append(f"  converted to metres (--unit {unit}): hulls, and places in warnings")
     if report.deviation_abs is not None:
         moved = report.unit.words(report.deviation_abs)
         lines.append(f"  measured to triangles, up to {moved} from the surface in the file")

@@ -76,7 +76,11 @@ class Options:
     threshold: float = option(
         0.05,
         TIGHT,
-        number(*LENGTHS["threshold"], typed=str),
+        number(
+            *LENGTHS["threshold"],
+            rule="a number between 0.001 and 2 (where the longest side of the mesh is 2), or text: '2.5%', '10mm'",
+            typed=str,
+        ),
         flags=("--threshold", "-t"),
         metavar="NUMBER",
         help="""The concavity or distance a hull may have, where the longest side of the mesh is 2, as in CoACD.
@@ -339,7 +343,8 @@ class Options:
         METHOD,
         one_of=UnitName,
         usual="coordinates stay as they are",
-        help="The unit of the mesh, which is converted to metres; file takes what the file says.",
+        help="""The unit of the mesh, which is converted to metres, and so are the hulls; file takes what the file
+        says.""",
     )
     scale: float | None = option(
         None,

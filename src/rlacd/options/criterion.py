@@ -34,6 +34,12 @@ def _criterion(given: Any) -> Any:
 CRITERION = custom(f"{', '.join(NAMED)} or an `rlacd.NavigableSpace`", _criterion, " ".join(CRITERIA))
 
 
+def _instead(word: str, value: Any) -> str:
+    """What to give in place of a tolerance where the criterion has a threshold."""
+    length = value if isinstance(value, str) else "10mm"
+    return f"; how far hulls may be from the mesh is --threshold {length}" if word == "tolerance" else ""
+
+
 def with_criterion(given: Mapping[str, Any]) -> dict[str, Any]:
     """Get arguments of `rlacd.decompose` from flat ones: the criterion by its name, the options of a space beside it.
 
@@ -55,5 +61,5 @@ def with_criterion(given: Mapping[str, Any]) -> dict[str, Any]:
     for word, value in space.items():
         yes, _, no = about(NavigableSpace, word).flags[0].partition("/")
         needed = "volume or navigable" if word == "tolerance" else "navigable"
-        raise OptionError(f"{no if value is False else yes} needs --criterion {needed}.")
+        raise OptionError(f"{no if value is False else yes} needs --criterion {needed}{_instead(word, value)}.")
     return given

@@ -35,6 +35,8 @@ def check_names(function: str, given: Iterable[str], known: Collection[str], els
         if name not in known:
             places = [place for options in elsewhere if (place := stated_in(options, name))]
             hint = f"; it belongs to {places[0]}." if places else meant(name, known)
+            if name == "tolerance" and "threshold" in known:
+                hint += " How far hulls may be from the mesh is threshold='10mm'."
             raise TypeError(f"{function}() got an unexpected keyword argument {name!r}{hint}")
 
 

@@ -141,5 +141,7 @@ def relative(name: str, length: float, scale: float, bounds: tuple[float, float]
     if not least <= number <= most:
         share = 100 / LONGEST_SIDE
         given = f"{name}_abs (--{name.replace('_', '-')} as a length) is {share * number:.3g}% of this object's"
-        raise OptionError(f"{given} longest side; it has to be between {share * least:g}% and {share * most:g}%.")
+        side = f"longest side, {LONGEST_SIDE / scale:.4g} in its unit"
+        between = f"it has to be between {share * least:g}% and {share * most:g}%"
+        raise OptionError(f"{given} {side}; {between}: is the unit right (--unit)?")
     return number

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
 from rlacd.options.fields import one_of
@@ -104,8 +105,15 @@ def read_meshes(given: Any) -> tuple[Any, ...]:
     return tuple(given)
 
 
-def mesh_name(mesh: Any) -> str:
+def mesh_name(mesh: Any, unnamed: str = "a mesh") -> str:
     """Get a name for a mesh: its file's, or its own."""
+    return file_name(mesh) or str(getattr(mesh, "name", unnamed))
+
+
+def file_name(mesh: Any) -> str:
+    """Get the name of the file that a mesh is, or that trimesh read it from; empty if there is none."""
     if isinstance(mesh, (str, os.PathLike)):
         return os.path.basename(os.fspath(mesh))
-    return str(getattr(mesh, "name", "a mesh"))
+    metadata, source = getattr(mesh, "metadata", None), getattr(mesh, "source", None)
+    known = metadata.get("file_name") if isinstance(metadata, Mapping) else None
+    return os.path.basename(str(known or getattr(source, "file_path", None) or ""))

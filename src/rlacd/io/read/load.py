@@ -23,6 +23,7 @@ from rlacd.io.read.in_memory import is_in_memory, opened
 from rlacd.io.read.open_file import CONVERTERS, NO_MESHES, format_of, read_named
 from rlacd.memory import BYTES_READ, require_memory
 from rlacd.options.fields import shown
+from rlacd.options.names import mesh_name
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, heights
 from rlacd.solid.input_mesh import Asset, InputMesh, no_points
 
@@ -88,7 +89,10 @@ def load_mesh(
         source = trimesh.Scene(source)
     arrays_of, geometry_of = (function_of(f"read.trimesh_scene:{name}") for name in ("arrays_of", "geometry_of"))
     if isinstance(source, trimesh.Trimesh | trimesh.Scene | trimesh.PointCloud):
-        kind, looks = type(source).__name__, hasattr(source, "geometry") or getattr(source, "visual", None)
+        kind, looks = (
+            mesh_name(source, type(source).__name__),
+            hasattr(source, "geometry") or getattr(source, "visual", None),
+        )
         asset = Asset(source) if looks is True or getattr(looks, "defined", False) else None
         contents = Contents(geometry_of(source, kind), asset=asset, metres=_metres(source))
         return without_engine_hulls(_baked(kind, contents))

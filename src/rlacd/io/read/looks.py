@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from rlacd.errors import installing
 from rlacd.io.read import function_of
 from rlacd.io.read.beside import FolderFiles
 from rlacd.solid.arrays import FloatArray, Int64Array
@@ -85,6 +86,6 @@ def opened_picture(beside: FolderFiles, name: str) -> Any:
         return picture
     except Exception as error:  # decoders may raise anything
         why = "it is not in the folder" if isinstance(error, FileNotFoundError) else "it is damaged or too large"
-        why = "run  pip install 'rlacd[view]'" if isinstance(error, ImportError) else why
+        why = f"run  {installing('view')}" if isinstance(error, ImportError) else why
         warnings.warn(f"the picture {name!r:.100} was left out: {why}", UserWarning, stacklevel=2)
         return None

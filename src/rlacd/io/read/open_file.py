@@ -87,6 +87,7 @@ CONVERTERS = {
     **dict.fromkeys(("zip", "gz", "bz2", "xz", "zst", "7z", "rar", "tar", "tgz"), "unpack it, and give the mesh in it"),
     "xacro": "expand its macros with the tool xacro, and give the URDF",
     "urdf": "it describes a robot, which rlacd.rewrite_robot takes",
+    "mjcf": "files for MuJoCo end in .xml, and rlacd.rewrite_robot takes them",
     "sdf": "robots are rewritten as .urdf and .xml (MJCF): give one of those, or a mesh",
 }
 """What to do with files that people have and that are not read."""

@@ -125,6 +125,7 @@ def _target(text: str, wanted: str | None) -> Target:
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in (*FORMATS, *MODEL_OF))
         said = f"whose ending is .{ending}" if ending else "which has no ending"
+        said += " (files for MuJoCo end in .xml)" if ending == "mjcf" else ""
         raise OptionError(f"cannot write {shown(str(place))}, {said}; use one of {known}, or a name ending in /.")
     if wanted not in (None, ending):
         raise OptionError(f"the format {wanted} contradicts the name {shown(str(place))}; give one of the two.")
