@@ -80,6 +80,17 @@ double growth(const Mesh& hull, const std::vector<Vec3>& corners) {
   return joint.volume() - mesh_volume(hull);
 }
 
+// No hull grows by less: pyramids over the facets that one of the corners sees.
+double least_growth(const Mesh& hull, const std::vector<Vec3>& corners) {
+  std::vector<double> added(corners.size());
+  for (const Triangle& face : hull.faces) {
+    const Corners t = corners_of(hull, face);
+    const Vec3 normal = long_normal(t);
+    for (std::size_t i = 0; i < corners.size(); ++i) added[i] += std::max(0.0, dot(normal, corners[i] - t[0]));
+  }
+  return 0.999 / 6 * *std::max_element(added.begin(), added.end());  // rounding must not make it more
+}
+
 }  // namespace
 
 std::optional<Piece> piece_of(Mesh mesh, double least) {
@@ -134,12 +145,17 @@ std::optional<std::vector<Piece>> connected_pieces(const Mesh& mesh, double leas
 std::vector<Vec3> between(const ConvexBody& hull, const std::vector<const ConvexBody*>& around) {
   const std::vector<Vec3>& corners = hull.mesh().vertices;
   if (around.size() < 2 || corners.empty()) return {};  // what one cannot take, it cannot take in halves
-  std::vector<std::pair<double, std::size_t>> by_growth;
-  for (std::size_t i = 0; i < around.size(); ++i) {
+  using Growth = std::pair<double, std::size_t>;
+  std::vector<Growth> least, by_growth;
+  for (std::size_t i = 0; i < around.size(); ++i) least.emplace_back(least_growth(around[i]->mesh(), corners), i);
+  std::sort(least.begin(), least.end());
+  for (const auto& [bound, i] : least) {
     poll_stop();
+    if (by_growth.size() == 2 && bound > by_growth[1].first) break;
     by_growth.emplace_back(growth(around[i]->mesh(), corners), i);
+    std::sort(by_growth.begin(), by_growth.end());
+    by_growth.resize(std::min<std::size_t>(by_growth.size(), 2));
   }
-  std::partial_sort(by_growth.begin(), by_growth.begin() + 2, by_growth.end());
   const Vec3 along =
       middle_of(around[by_growth[1].second]->mesh().vertices) - middle_of(around[by_growth[0].second]->mesh().vertices);
   const double length = norm(along);

@@ -21,7 +21,7 @@ from rlacd.solid.component import Part
 BEST_SECONDS = 5.0
 """Seconds of ``best`` by default; more if its first search takes longer."""
 
-TIMES_FIRST_PASS = 3.5
+TIMES_FIRST_PASS = 2.5
 """Limit on the work of a bounded search, as a multiple of the work of the first pass."""
 
 LEAST_WORK, MOST_WORK = 0.15e6, 8e6
