@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from rlacd.clear import Body, Motion, Surface, check
+from rlacd.clear import Body, Motion, check
 from rlacd.io.robots.read import read_robot
 from rlacd.io.robots.robot import Robot, turned
 from rlacd.solid.arrays import FloatArray
