@@ -7,7 +7,8 @@ import json
 import math
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,8 @@ from benchmarks.cli import PATH
 from benchmarks.methods import Method, make_method
 from benchmarks.store import load_hulls, save_hulls
 from benchmarks.tables import Ratio, Table
-from rlacd.clear import Body, Solids, Surface, check
+from benchmarks.worst import film
+from rlacd.clear import Body, Motion, Solids, Surface, check
 from rlacd.cli.exit_codes import exit_codes
 from rlacd.decomposition import Decomposition
 from rlacd.errors import RlacdError
@@ -90,12 +92,7 @@ def _by_mesh(way: str, robot: Path, place: Path, packages: list[str], store: Pat
 def _false(robot: Robot, hulls: dict[str, Any], told: set[tuple[str, str]]) -> dict[str, Any]:
     """How often hulls touch where links do not, how often of pairs that were told, and how deep at most."""
     motion = robot.motion(POSITIONS, SEED)
-    meshes = {body.name: body.mesh() for body in robot.bodies}
-    solids = motion.solids or [Solids(body.primitives) for body in robot.bodies]
-    bodies = [
-        Body(name, _surface(meshes.get(name, trimesh.Trimesh())), [*map(_surface, hulls.get(name, []))], own.primitives)
-        for name, own in zip(motion.links, solids, strict=True)
-    ]
+    bodies = moving(robot, motion, hulls)
     found = [
         (offence.depth, (bodies[i].name, bodies[j].name) in told)
         for (i, j), touching in check(bodies, motion).items()
@@ -103,6 +100,16 @@ def _false(robot: Robot, hulls: dict[str, Any], told: set[tuple[str, str]]) -> d
         if offence.depth * robot.metres > LEAST
     ]
     return {"false": len(found), "told": sum(said for _, said in found), "deepest": max(found, default=(0.0,))[0]}
+
+
+def moving(robot: Robot, motion: Motion, hulls: Mapping[str, Sequence[trimesh.Trimesh]]) -> list[Body]:
+    """The links as they were read and as hulls, in the order of the motion."""
+    meshes = {body.name: body.mesh() for body in robot.bodies}
+    solids = motion.solids or [Solids(body.primitives) for body in robot.bodies]
+    return [
+        Body(name, _surface(meshes.get(name, trimesh.Trimesh())), [*map(_surface, hulls.get(name, []))], own.primitives)
+        for name, own in zip(motion.links, solids, strict=True)
+    ]
 
 
 def _stored(method: Method, vertices: Any, faces: Any, store: Path) -> tuple[list[trimesh.Trimesh], float]:
@@ -126,7 +133,10 @@ def measure(robot: Path, before: str, options: dict[str, Any], packages: list[st
     ways = {"before": before, "whole": "whole"}
     row: dict[str, Any] = {key: rewritten(robot, way, options, packages, out) for key, way in ways.items()}
     if row["whole"]["links"]:
-        for key, speed in zip(ways, _speeds([_model(row[key]["place"]) for key in ways]), strict=True):
+        speeds = [math.nan] * len(ways)
+        with suppress(ValueError):  # MuJoCo refuses the robot, whatever it collides as
+            speeds = _speeds([_model(row[key]["place"]) for key in ways])
+        for key, speed in zip(ways, speeds, strict=True):
             row[key]["speed"] = speed
     return {"robot": robot.parent.name if robot.stem == "robot" else robot.stem, **row}
 
@@ -171,6 +181,13 @@ def _line(row: dict[str, Any]) -> list[object]:
     ]
 
 
+def _shown(robot: Path, row: dict[str, Any], before: str) -> tuple[Path, dict[str, Path]]:
+    """A robot, and the file of each way by its caption."""
+    ways = {"before": BEFORE[before], "whole": "rlacd"}
+    said = {key: f"{name}: {row[key]['hulls']} hulls, {row[key]['false']} false contacts" for key, name in ways.items()}
+    return robot, {said[key]: row[key]["place"] for key in ways}
+
+
 def _paths(folder: Path, robots: Sequence[str], out: Path) -> list[Path]:
     named = [folder / name for name in robots] or sorted(path for path in folder.rglob("*") if is_robot(path))
     return [*named, *write_boxes(out / "boxes")]
@@ -183,7 +200,16 @@ def _paths(folder: Path, robots: Sequence[str], out: Path) -> list[Path]:
 @click.option("--before", type=click.Choice([*BEFORE]), default="coacd", show_default=True, help="Compared with.")
 @click.option("--package-dir", "packages", multiple=True, help="As of rlacd decompose.")
 @click.option("--quality", default="fast", show_default=True, help="Of rlacd.")
-def app(folder: Path, robots: tuple[str, ...], out: Path, before: str, packages: tuple[str, ...], quality: str) -> None:
+@click.option("--film", "shown", type=PATH, help="A GIF of the worst positions of those named, too.")
+def app(
+    folder: Path,
+    robots: tuple[str, ...],
+    out: Path,
+    before: str,
+    packages: tuple[str, ...],
+    quality: str,
+    shown: Path | None,
+) -> None:
     """Rewrite all robots (URDF, MJCF) of a folder, or those named, and six of boxes; step them in MuJoCo. Needs
     rlacd[sim,clear], and CoACD, which takes a minute or so a mesh.
 
@@ -201,6 +227,8 @@ def app(folder: Path, robots: tuple[str, ...], out: Path, before: str, packages:
             if row["whole"]["links"]:
                 rows.append(row)
                 click.echo(_line(row))
+        if shown is not None:
+            film(shown, [_shown(folder / name, row, before) for name, row in zip(robots, rows, strict=False)], packages)
         click.echo(Table([head.format(BEFORE[before]) for head in HEAD], [_line(row) for row in rows]))
         click.echo(f"CPU seconds now, sum: {sum(row['whole']['cpu'] for row in rows):.0f}")
         for what, one, other in (
@@ -211,5 +239,6 @@ def app(folder: Path, robots: tuple[str, ...], out: Path, before: str, packages:
         ):
             if before == "hull" and what.startswith("CPU"):
                 continue
-            values = ([row[way][key] for row in rows] for way, key in (one, other))
-            click.echo(f"{what}, geometric mean: {Ratio.of(*values)}")
+            values = np.array([[row[way][key] for way, key in (one, other)] for row in rows])
+            known = values[np.isfinite(values).all(axis=1)]
+            click.echo(f"{what}, geometric mean of {len(known)}: {Ratio.of(*known.T)}")

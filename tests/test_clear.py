@@ -307,6 +307,15 @@ def test_primitives_touch_where_mujoco_says(tmp_path: Path) -> None:
     assert 50 < close < 150
 
 
+@pytest.mark.parametrize(("height", "touches"), [(1.9, False), (-1.9, True)])
+def test_a_cone_is_pointed_above(height: float, touches: bool) -> None:
+    nothing, place = Surface(np.empty((0, 3)), np.empty((0, 3), int)), np.eye(4)
+    place[:3, 3] = 0.9, 0, height
+    shapes = Primitive("cone", (1.0, 2.0), np.eye(4)), Primitive("sphere", (0.01,), place)
+    found = check([Body("", nothing, [], [shape]) for shape in shapes], at_rest(["a", "b"]))
+    assert bool(found) == touches
+
+
 def ball_and_wall(folder: Path, dent: float) -> Path:
     """An egg with a dent in its side that slides past a wall, 1 mm away at its nearest."""
     egg = trimesh.creation.icosphere(subdivisions=3)

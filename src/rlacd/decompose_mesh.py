@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rlacd.decomposition import Decomposition
 from rlacd.errors import DecompositionWarning, OptionError
-from rlacd.find_parts import Reached, find_parts
+from rlacd.find_parts import Reached, Repaired, find_parts
 from rlacd.finish.finish import Finished, finish, whole
 from rlacd.fit import Unit
 from rlacd.io.read.contents import USUAL, Fineness
@@ -93,9 +93,11 @@ def decompose(
 
 @dataclass
 class Memory:
-    """The parts that a decomposition found: with other `detail`, the same input is only finished again."""
+    """What a decomposition found of an input, which with other options need not be found again."""
 
     reached: Reached | None = None
+    """The parts: with other `detail`, they are only finished again."""
+    repaired: Repaired | None = None
 
 
 def decompose_quietly(
@@ -176,7 +178,7 @@ def _obstacle(mesh: MeshLike | Obstacle) -> Obstacle:
 
 def _as_one(source: InputMesh, options: Options, run: Run, memory: Memory) -> Finished:
     if memory.reached is None:
-        memory.reached = whole(find_parts(source, options, run), source, options, run)
+        memory.reached = whole(find_parts(source, options, run, memory.repaired), source, options, run)
     reached = memory.reached
     run.begin_finishing()
     done = finish(reached._replace(options=replace(reached.options, detail=options.detail)), run)

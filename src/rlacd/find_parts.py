@@ -6,10 +6,10 @@ Transfer and limit cut again what fails; no other stage looks back.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from rlacd.criteria import Criterion, Filled, LimitedCriterion
 from rlacd.cut import CutTree
@@ -91,11 +91,15 @@ class Reached(NamedTuple):
     before: tuple[list[Part], ...] = ()
 
 
-def find_parts(source: InputMesh, options: Options, run: Run) -> Reached:
+Repaired: TypeAlias = "dict[Hashable, Solid]"
+"""A mesh as it was repaired before, by the options of that."""
+
+
+def find_parts(source: InputMesh, options: Options, run: Run, repaired: Repaired | None = None) -> Reached:
     """Decompose a mesh until done or stopped."""
     problem = None
     with run.until_stopped():
-        problem = Problem.of(source, options, run)
+        problem = Problem.of(source, options, run, repaired)
     if problem is None:
         return covered(source, options, run)
     solid, options, root = problem.solid, problem.options, problem.root
@@ -137,17 +141,22 @@ class Problem(NamedTuple):
     root: Component
 
     @classmethod
-    def of(cls, source: InputMesh, options: Options, run: Run) -> Problem:
-        """Repair a mesh, and make the criterion that the options ask for."""
+    def of(cls, source: InputMesh, options: Options, run: Run, repaired: Repaired | None = None) -> Problem:
+        """Repair a mesh, unless it was before, and make the criterion that the options ask for."""
+        known = {} if repaired is None else repaired
         with run.stage("repair"):
-            solid = repair(
-                source,
-                resolution=options.resolution,
-                open_bodies=options.openings,
-                gap=options.gap,
-                threads=run.threads,
-                keep_cavities=options.sees_cavities,
-            )
+            how = options.resolution, options.openings, options.gap, options.sees_cavities
+            if how not in known:
+                resolution, openings, gap, keep = how
+                known[how] = repair(
+                    source,
+                    resolution=resolution,
+                    open_bodies=openings,
+                    gap=gap,
+                    threads=run.threads,
+                    keep_cavities=keep,
+                )
+            solid = replace(known[how], pieces=[*known[how].pieces])  # which go when they are no longer needed
             options = options.at_scale(solid.frame.scale)
             goal = LimitedCriterion.prepare(options, solid, run)
             # What next to nothing gets into may become solid, but not where balls or meshes have to.

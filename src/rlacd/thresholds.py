@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rlacd._native import mesh_volume
 from rlacd.decompose_mesh import MeshLike, in_metres
 from rlacd.errors import OptionError
-from rlacd.find_parts import Decomposer, Problem, Reached
+from rlacd.find_parts import Decomposer, Problem, Reached, Repaired
 from rlacd.finish.finish import cleaned_parts
 from rlacd.fit import ANY, Unit
 from rlacd.io.read.load import load_mesh
@@ -144,26 +144,33 @@ def tradeoff(
 
 
 def rows_of(
-    source: InputMesh, options: Options, finest: float, factors: Sequence[float], run: Run
+    source: InputMesh,
+    options: Options,
+    finest: float,
+    factors: Sequence[float],
+    run: Run,
+    repaired: Repaired | None = None,
 ) -> list[TradeoffRow]:
     """What the threshold of options, of the value `finest`, leads to times each factor, the first of them 1.
 
     Those behind a single hull are left out, and those that there is no time for.
     """
     rows = []
-    for factor, reached in zip(factors, _reached(source, options, factors, run), strict=False):
+    for factor, reached in zip(factors, _reached(source, options, factors, run, repaired), strict=False):
         unit = 1.0 if options.threshold_abs is None else reached.solid.frame.scale
         rows.append(_row(finest * factor, reached, unit, run))
     return rows
 
 
-def _reached(source: InputMesh, options: Options, factors: Sequence[float], run: Run) -> Iterator[Reached]:
+def _reached(
+    source: InputMesh, options: Options, factors: Sequence[float], run: Run, repaired: Repaired | None
+) -> Iterator[Reached]:
     """Decompose a mesh under its goal scaled by each factor, on one tree of cuts, until one part is left.
 
     Factors ascend from 1. Those that there is no time for are left out.
     """
     with run.until_stopped():
-        problem = Problem.of(source, options, run)
+        problem = Problem.of(source, options, run, repaired)
         decomposer = Decomposer.of(problem, run)
         options = problem.options
         for factor in factors:

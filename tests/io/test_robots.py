@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -347,6 +348,24 @@ def test_a_mass_that_follows_from_hulls_is_told(tmp_path: Path) -> None:
         before, after = (mujoco.MjModel.from_xml_path(str(path)) for path in (tmp_path / "r.urdf", done.path))
         said = [warning for warning in done.warnings if warning.startswith("2 links, such as base, have no <inertial>")]
         assert (len(said), np.allclose(before.body_mass, after.body_mass)) == ((1, False), (0, True))[number]
+        assert not [warning for warning in done.warnings if "<inertia>" in warning]
+
+
+@pytest.mark.parametrize(("off", "said"), [(0.4, []), (1.1, ["The <inertia> of the link base cannot be"])])
+def test_an_inertia_that_no_body_has_is_told(off: float, said: list[str], tmp_path: Path) -> None:
+    """MuJoCo refuses such a file, with or without hulls."""
+    mujoco = pytest.importorskip("mujoco", reason="extra sim")
+    table().export(tmp_path / "table.stl")
+    inertia = f'<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="{off}" ixz="0" iyz="0"/>'
+    mesh = '<collision><geometry><mesh filename="table.stl"/></geometry></collision>'
+    links = f'<link name="world"/><link name="base"><inertial>{inertia}</inertial>{mesh}</link>'
+    joint = '<joint name="j" type="floating"><parent link="world"/><child link="base"/></joint>'
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joint}</robot>')
+    done = rlacd.rewrite_robot(tmp_path / "r.urdf", tmp_path / "out.urdf", threads=1, quality="fast")
+    assert [warning[: len(said[0])] for warning in done.warnings if "<inertia>" in warning] == said
+    for path in (tmp_path / "r.urdf", done.path):
+        with pytest.raises(ValueError, match="positive eigenvalues") if said else nullcontext():
+            mujoco.MjModel.from_xml_path(str(path))
 
 
 def test_info_shows_the_links_of_a_robot(ear: Path) -> None:
@@ -474,10 +493,10 @@ def test_a_link_of_many_hulls_is_told_with_what_makes_it_fewer(rings: Path) -> N
     counts = {link.name: len(link.hulls) for link in done.links}
     told = [warning for warning in done.warnings if " at twice the tolerance " in warning]
     assert [warning.split()[0] for warning in told] == [name for name, count in counts.items() if count > 20]
-    ((twice, four),) = re.findall(r"about (\d+) at twice .* and (\d+) at four times, --link 'ring=0.016'", told[0])
+    ((twice, four),) = re.findall(r"about (\d+) at twice .* and (\d+) at four times, --link 'ring=0.008'", told[0])
     assert counts["ring"] > int(twice) > int(four)
-    again = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), links={"ring": 0.016}, **options)
-    assert len(again.links[0].hulls) == int(four)
+    again = rlacd.rewrite_robot(rings, rings.with_name("out.urdf"), links={"ring": 0.008}, **options)
+    assert len(again.links[0].hulls) == int(twice)
     assert told[0].startswith(f"ring is {counts['ring']} hulls; ")
     assert told[0].endswith("'.")
     ((filled,),) = (re.findall(r"with its open bodies filled (\d+), --openings solid\.", told[1]),)

@@ -303,7 +303,8 @@ def test_pairs_of_bodies_that_a_joint_connects_are_filtered_where_asked(tmp_path
         (UsdGeom.Capsule, (2.0, 3.0, 4.0), False),
         (UsdGeom.Cylinder, (2.0, 3.0, 4.0), False),
         (UsdGeom.Cylinder, None, True),
-        (UsdGeom.Cone, (1.0, 1.0, 1.0), False),
+        (UsdGeom.Cone, (2.0, 3.0, 4.0), False),
+        (UsdGeom.Cone, None, True),
         (UsdGeom.Plane, (1.0, 1.0, 1.0), False),
     ],
 )
@@ -336,6 +337,13 @@ def test_primitives_of_a_stage_are_where_it_shows_them(
     to_body = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(shape.GetPrim())).T
     to_body = np.linalg.inv(finger.pose) @ to_body
     corners = trimesh.transform_points(trimesh.bounds.corners(extent), to_body)
+    middle = to_body[:3, 3]
+    if kind is UsdGeom.Cone:  # which leads from the middle of the box to that of one side, not to its corners
+        top = trimesh.transform_points([extent[1] * (np.array([*"XYZ"]) == axis)], to_body)
+        assert np.linalg.norm(tip.vertices - top, axis=1).min() == pytest.approx(0, abs=1e-3)
+        corners = tip.vertices[(tip.vertices - middle) @ (top[0] - middle) < 0]
+        assert np.linalg.norm(corners - (2 * middle - top[0]), axis=1) == pytest.approx(20, abs=0.1)
+        return
     assert tip.box == pytest.approx(np.stack([corners.min(axis=0), corners.max(axis=0)]), abs=0.2)
 
 

@@ -23,7 +23,7 @@ MOST_NEAR = 4_000_000
 """Pairs of boxes that come near each other along the x axis, over all samples; robots of a hundred links have fewer."""
 
 
-PRIMITIVES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3}
+PRIMITIVES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "cone": 2, "ellipsoid": 3}
 """Kinds of primitives, and how many sizes each has."""
 
 
@@ -109,10 +109,10 @@ LARGEST_SIZE = 1e10
 
 
 class Primitive(Surface):
-    """A box, sphere, capsule, cylinder or ellipsoid: exact as coal's shape, and just inside of its triangles.
+    """A box, sphere, capsule, cylinder, cone or ellipsoid: exact as coal's shape, and just inside of its triangles.
 
     Its `sizes` are half the sides of a box, the radius of a sphere, the radius and half the length between the ends of
-    a capsule or cylinder along z, and the radii of an ellipsoid.
+    a capsule, a cylinder or a cone along z, whose tip is above, and the radii of an ellipsoid.
     """
 
     def __init__(self, kind: str, sizes: Sequence[float], place: FloatArray) -> None:
@@ -141,7 +141,9 @@ class Primitive(Surface):
     @cached_property
     def as_convex(self) -> Any:
         """For coal, the solid itself."""
-        sizes = self.sizes * np.array({"box": [2], "capsule": [1, 2], "cylinder": [1, 2]}.get(self.kind, [1]))
+        sizes = self.sizes * np.array(
+            {"box": [2], "capsule": [1, 2], "cylinder": [1, 2], "cone": [1, 2]}.get(self.kind, [1])
+        )
         return getattr(get_coal(), self.kind.capitalize())(*sizes.tolist())
 
     @cached_property
@@ -165,9 +167,9 @@ def _points_around(kind: str, sizes: FloatArray) -> FloatArray:
         return _points_around_ball() * sizes
     turns = np.arange(64) * np.pi / 32
     ring = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1) / np.cos(np.pi / 64)
-    end = sizes[0] * (ring if kind == "cylinder" else _points_around_ball())
+    end = sizes[0] * (_points_around_ball() if kind == "capsule" else ring)
     half = np.array([0, 0, sizes[1]])
-    return np.concatenate([end - half, end + half])
+    return np.concatenate([end - half, half[None] if kind == "cone" else end + half])
 
 
 @dataclass(frozen=True, eq=False)

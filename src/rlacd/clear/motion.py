@@ -422,7 +422,7 @@ class _Mjcf:
 
 def _mjcf_shapes(kinds: Any, model: Any) -> dict[int, list[_Shape]]:
     """What of each body collides, by its contact properties or as one of a pair."""
-    names = {int(getattr(kinds, f"mjGEOM_{name.upper()}")): name for name in (*PRIMITIVES, "mesh")}
+    names = {int(getattr(kinds, f"mjGEOM_{name.upper()}")): name for name in (*PRIMITIVES.keys() - {"cone"}, "mesh")}
     collides = (model.geom_contype | model.geom_conaffinity) != 0
     collides[[*model.pair_geom1, *model.pair_geom2]] = True
     found: dict[int, list[_Shape]] = {}

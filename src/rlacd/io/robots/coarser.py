@@ -9,7 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from rlacd.decomposition import Decomposition
 from rlacd.errors import OptionError
+from rlacd.find_parts import Repaired
 from rlacd.fit import Unit
 from rlacd.io.robots.decomposed import SHARE, check_options, fitting, options_of_bodies, with_lengths
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
@@ -107,10 +109,15 @@ def tradeoff_of(robot: Robot, options: Mapping[str, Any]) -> RobotTradeoff:
     return RobotTradeoff(made.name, thresholds, links, pick, is_complete, robot.unit)
 
 
-def many_told(robot: Robot, results: Results, options: Sequence[Mapping[str, Any]]) -> list[str]:
+def many_told(
+    robot: Robot,
+    results: Results,
+    options: Sequence[Mapping[str, Any]],
+    repaired: Mapping[Hashable, Repaired],
+) -> list[str]:
     """What to say of links of many hulls, if their tolerance is a length: how many at others, and how to ask for that.
 
-    The counts are of one pass without a search.
+    The counts are of one pass without a search. `repaired` are the solids of colliders, by their keys.
     """
     said, known = [], dict[Hashable, list[TradeoffRow]]()
     for body, own in zip(robot.bodies, options, strict=True):
@@ -119,16 +126,17 @@ def many_told(robot: Robot, results: Results, options: Sequence[Mapping[str, Any
             continue
         length = own["threshold_abs"]
         wider, quick = {**own, "threshold_abs": 2 * length, "quality": FAST}, {**own, "quality": FAST}
-        sums = [_hulls(body, collider, wider, (1, 2), known) for collider in body.colliders]
+        sums = [_hulls(body, collider, wider, (1, 2), known, repaired.get(collider.key)) for collider in body.colliders]
         if not all(sums):
             continue
         twice, four = (sum(counts) for counts in zip(*sums, strict=True))
+        enough = 2 if twice <= MANY else 4
         said.append(
             f"{body.name} is {count} hulls; about {twice} at twice the tolerance and {four} at four times, "
-            f"--link '{re.escape(body.name)}={4 * length:.3g}'"
+            f"--link '{re.escape(body.name)}={enough * length:.3g}'"
         )
-        steps = {one.step for collider in body.colliders for one in results[collider].report.repair}
-        if "slab" in steps and own["openings"] in ("auto", "small"):
+        of_open = sum(_of_open_bodies(results[collider]) for collider in body.colliders)
+        if count - of_open <= MANY and own["openings"] in ("auto", "small"):
             filled = [
                 _hulls(body, collider, {**quick, "openings": "solid"}, (1,), known) for collider in body.colliders
             ]
@@ -138,12 +146,20 @@ def many_told(robot: Robot, results: Results, options: Sequence[Mapping[str, Any
     return said
 
 
+def _of_open_bodies(result: Decomposition) -> int:
+    """How many hulls are of bodies that stayed thin shells."""
+    steps = [body.step for body in result.report.repair]
+    owners = [hull.metadata.get("body") for hull in result.hulls]
+    return sum(owner is not None and steps[owner] == "slab" for owner in owners)
+
+
 def _hulls(
     body: Body,
     collider: Collider,
     options: Mapping[str, Any],
     factors: Sequence[float],
     known: dict[Hashable, list[TradeoffRow]],
+    repaired: Repaired | None = None,
 ) -> list[int]:
     """How many hulls a tolerance leads to times each factor; empty if there was no time. The same solids share that."""
     key = collider.key, options["threshold_abs"], options["openings"]
@@ -153,7 +169,7 @@ def _hulls(
         own = Options.of(given)
         with Run(own.threads, own.timeout, options.get("progress")) as run:
             source = InputMesh(mesh.vertices, mesh.faces, collider.name, ())
-            known[key] = rows_of(source, own, options["threshold_abs"], factors, run)
+            known[key] = rows_of(source, own, options["threshold_abs"], factors, run, repaired)
     counts = [row.hulls for row in known[key]]
     if len(counts) < len(factors) and counts and counts[-1] == 1:
         counts += [1] * (len(factors) - len(counts))

@@ -28,6 +28,7 @@ from rlacd.clear.mend import Exact, Redo
 from rlacd.decompose_mesh import Memory, decompose_quietly
 from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshError, MissingExtraError, OptionError
+from rlacd.find_parts import Repaired
 from rlacd.fit import Unit
 from rlacd.io.robots.robot import Body, Collider, Results, Robot
 from rlacd.options import Options
@@ -108,8 +109,12 @@ def with_lengths(
     return replace(robot, told_in=told_in), in_unit(given, metres, name), replace(asked, links=links)
 
 
-def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptions) -> Checked:
+def decomposed_robot(
+    robot: Robot, options: Mapping[str, Any], asked: RobotOptions, repaired: dict[Hashable, Repaired] | None = None
+) -> Checked:
     """Decompose all colliders, those that are the same solid once, and again what touches as hulls only.
+
+    Each solid is repaired once; those in `repaired`, by the key of their collider, not again, and the others are added.
 
     Raises
     ------
@@ -123,6 +128,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
     found: dict[Hashable, Memory] = {}
+    repaired = {} if repaired is None else repaired
 
     def decompose_body(number: int) -> None:
         body, own = bodies[number], each[number]
@@ -130,7 +136,8 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
         for collider in body.colliders:
             parts = collider.key, own.get("threshold_abs"), own["openings"]
             if (key := (parts, own.get("detail"))) not in done:
-                done[key] = decomposed(body, collider, own, robot.unit, found.setdefault(parts, Memory()))
+                memory = found.setdefault(parts, Memory(repaired=repaired.setdefault(collider.key, {})))
+                done[key] = decomposed(body, collider, own, robot.unit, memory)
             results[collider] = done[key]
 
     for number in range(len(bodies)):
@@ -142,7 +149,7 @@ def decomposed_robot(robot: Robot, options: Mapping[str, Any], asked: RobotOptio
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
         tell(LINK + bodies[number].name, number)
-        again = results | _clear_of(obstacles, bodies[number], results, each[number], robot.unit)
+        again = results | _clear_of(obstacles, bodies[number], results, each[number], robot.unit, repaired)
         hulls = _moving(bodies[number], again).hulls
         if len(hulls) > most:
             return None
@@ -279,7 +286,12 @@ def _moving(body: Body, results: Results) -> Moving:
 
 
 def _clear_of(
-    obstacles: Sequence[Obstacle], body: Body, results: Results, options: Mapping[str, Any], unit: Unit
+    obstacles: Sequence[Obstacle],
+    body: Body,
+    results: Results,
+    options: Mapping[str, Any],
+    unit: Unit,
+    repaired: Mapping[Hashable, Repaired],
 ) -> dict[Collider, Decomposition]:
     """Decompose the colliders of a body again that come near obstacles."""
     again = {}
@@ -288,7 +300,8 @@ def _clear_of(
         placed = [Obstacle(o.name, moved(back, o.vertices), o.faces, o.margin, is_told=False) for o in obstacles]
         near = [obstacle for obstacle in placed if _is_near(obstacle, results[collider])]
         if near:
-            again[collider] = decomposed(body, collider, {**options, "avoid": near}, unit)
+            memory = Memory(repaired=repaired[collider.key])
+            again[collider] = decomposed(body, collider, {**options, "avoid": near}, unit, memory)
     return again
 
 

@@ -6,12 +6,13 @@ import inspect
 import os
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
+from rlacd.find_parts import Repaired
 from rlacd.io.robots.coarser import many_told
 from rlacd.io.robots.decomposed import check_options, decomposed_robot, options_of_bodies, with_lengths
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
@@ -123,9 +124,10 @@ def rewrite(
     check_options(options)
     check_places(robot.source, place, asked, keep_input=keep_input)
     robot, options, asked = with_lengths(robot, options, asked)
-    done = decomposed_robot(robot, options, asked)
+    repaired: dict[Hashable, Repaired] = {}
+    done = decomposed_robot(robot, options, asked, repaired)
     if all(result.report.complete for result in done.results.values()):
-        many = many_told(robot, done.results, options_of_bodies(robot, options, asked))
+        many = many_told(robot, done.results, options_of_bodies(robot, options, asked), repaired)
         done = replace(done, warnings=[*many, *done.warnings])
     pairs = done.pairs if done.samples or robot.is_alone else None
     written = robot.write(place, done.results, pairs, asked, whole=keep_input)

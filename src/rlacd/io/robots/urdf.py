@@ -24,6 +24,7 @@ from rlacd.io.robots.spans import Edit, Element
 from rlacd.io.write import write_file
 from rlacd.options.robots import RobotOptions
 from rlacd.solid.arrays import FloatArray
+from rlacd.solid.frame import ROUNDING
 from rlacd.solid.poses import product
 
 
@@ -121,7 +122,7 @@ def read_urdf(source: Path, files: Files, *, apart: bool, from_visual: bool) -> 
     others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced]
     names = [each.attributes.get("filename", "") for each in others]
     relative = [name for name in names if name and "://" not in name and not name.startswith("/")]
-    said, of_file = _of_mass(root, bodies), (root, files.references, relative, found)
+    said, of_file = [*_of_mass(root, bodies), *_of_inertia(root)], (root, files.references, relative, found)
     return Urdf(source, bodies, said, 1.0, "z", *of_file, seen=seen, bare=frozenset(bare))
 
 
@@ -133,6 +134,29 @@ def _of_mass(root: Element, bodies: Sequence[Body]) -> list[str]:
         return []
     some = f"The link {light[0]} has" if len(light) == 1 else f"{len(light)} links, such as {light[0]}, have"
     return [f"{some} no <inertial>: MuJoCo takes the mass from the hulls, which differs from that of the meshes."]
+
+
+def _of_inertia(root: Element) -> list[str]:
+    """What to say of links with an inertia that is no positive matrix: MuJoCo refuses the file, whatever collides."""
+    stated = [
+        (link.attributes.get("name", "?"), inertia.attributes)
+        for link in root.named("link")
+        for inertial in link.named("inertial")
+        for inertia in inertial.named("inertia")
+    ]
+    if not (wrong := [name for name, inertia in stated if _is_impossible(inertia)]):
+        return []
+    some = f"the link {wrong[0]}" if len(wrong) == 1 else f"{len(wrong)} links, such as {wrong[0]},"
+    return [f"The <inertia> of {some} cannot be one of a body, and MuJoCo refuses it: correct it."]
+
+
+def _is_impossible(inertia: Mapping[str, str]) -> bool:
+    try:
+        xx, xy, xz, yy, yz, zz = (float(inertia.get(name, 0)) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+        least, _, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    except ValueError:  # no numbers; LinAlgError is one, too
+        return False
+    return bool(least < -ROUNDING * most)
 
 
 def _collision(element: Element, link: Element, files: Files) -> _Collision | None:

@@ -129,11 +129,11 @@ def _primitive(prim: Any) -> Values:
             kind, sizes = "box", (of("size") / 2 * scale).tolist()
         elif kind == "sphere":
             kind, sizes = ("sphere" if is_even else "ellipsoid"), (of("radius") * scale).tolist()
-        elif kind in ("capsule", "cylinder"):
+        elif kind in ("capsule", "cylinder", "cone"):
             about = "XYZ".index(str(prim.GetAttribute("axis").Get()))
             turn[:3, :3] = np.roll(np.eye(3), 2 - about, axis=1)  # z to the axis
             around = np.delete(scale, about)
-            if is_even or (kind == "cylinder" and np.ptp(around) <= ROUND * around.max()):
+            if is_even or (kind != "capsule" and np.ptp(around) <= ROUND * around.max()):
                 sizes = [of("radius") * float(around.max()), of("height") / 2 * float(scale[about])]
     return {"kind": kind if sizes else "", "sizes": sizes, "turn": turn.ravel().tolist()}
 
