@@ -20,7 +20,7 @@ from rlacd.solid.balls import Balls
 LARGEST_DRIFT = 0.25
 """Share of its way by which a held ball may drift: the walls that hold it open by up to 30 degrees."""
 
-STEPS = (1 / 2, 1 / 8, 1 / 64)
+STEPS = (1 / 2, 1 / 8, 1 / 32, 1 / 128)
 """Shares of its radius by which a ball is pushed to the middle between walls, ..."""
 
 PUSHES, MORE = 12, 8
