@@ -14,7 +14,7 @@ from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.holes import HOLE
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
-from rlacd.repair.voxels import DEFAULT_GAP
+from rlacd.repair.wanted import DEFAULT_GAP
 from rlacd.solid.distance import hull_union
 from rlacd.solid.frame import HALF_THICKNESS, Frame
 from rlacd.solid.hull import Hull

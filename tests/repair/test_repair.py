@@ -17,7 +17,7 @@ from rlacd.io.read.load import load_mesh
 from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.repair import repair
 from rlacd.repair.union import to_arrays
-from rlacd.repair.voxels import DEFAULT_GAP
+from rlacd.repair.wanted import DEFAULT_GAP
 from rlacd.solid.component import Component
 from rlacd.solid.manifold import to_manifold
 from tests.repair.repaired import BOX, check_closed, join, moved, solid_of, steps, volume, without

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rlacd.repair.distance import SurfaceQuery
 from rlacd.repair.union import to_arrays
-from rlacd.repair.voxels import DEFAULT_GAP
+from rlacd.repair.wanted import DEFAULT_GAP
 from rlacd.solid.frame import HALF_THICKNESS
 from tests.repair.repaired import BOX, join, moved, solid_of, steps, volume
 from tests.shapes_bad import band, klein_bottle

@@ -108,8 +108,12 @@ def _passages(balls: Balls, surface: _native.Surface, threads: int) -> NDArray[n
     ways = balls.centres[:, None] - balls.centres
     squares = dots(ways, ways)
     near = np.argsort(squares, axis=1, kind="stable")[:, 1 : 1 + _NEIGHBOURS]
-    pairs = np.stack([np.repeat(np.arange(len(balls)), near.shape[1]), near.ravel()])
-    joined, blocked = pairs[:, _have_a_way(balls, pairs, surface, threads)], np.zeros(squares.shape, dtype=bool)
+    joined, blocked = np.empty((2, 0), dtype=np.int64), np.zeros(squares.shape, dtype=bool)
+    for some in (near[:, :2], near[:, 2:]):  # most of the farther ones are in one passage by then
+        passage = _native.components(len(balls), *joined)[1]
+        pairs = np.stack([np.repeat(np.arange(len(balls)), some.shape[1]), some.ravel()])
+        pairs = pairs[:, passage[pairs[0]] != passage[pairs[1]]]
+        joined = np.concatenate([joined, pairs[:, _have_a_way(balls, pairs, surface, threads)]], axis=1)
     while True:  # join passages whose nearest balls have a way between them, until none have
         passage = _native.components(len(balls), *joined)[1]
         pairs = np.array(np.nonzero(passage[:, None] < passage))

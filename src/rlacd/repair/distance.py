@@ -37,6 +37,11 @@ class SurfaceQuery:
         """Return the distance ``[N]`` of each point to the faces."""
         return self.index.distance(points, threads=self.threads or 0)
 
+    def is_beyond(self, points: FloatArray, length: float) -> BoolArray:
+        """Return ``[N]`` whether each point is farther than that from the faces: quicker than how far it is."""
+        least, most = np.full((2, len(points)), [[length], [np.inf]])
+        return self.index.between(points, least, most, threads=self.threads or 0) > 0
+
     def closest(self, points: FloatArray) -> tuple[FloatArray, Int64Array]:
         """Return the closest point ``[N, 3]`` of the faces and the face ``[N]`` it lies on."""
         found, face = self.index.closest(points, threads=self.threads or 0)

@@ -14,7 +14,8 @@ from rlacd.repair.cracks import close_cracks
 from rlacd.repair.distance import SurfaceQuery, affordable, points_covering, shared_faces
 from rlacd.repair.soup import Soup
 from rlacd.repair.union import Walls, cavities_in, emptied, filled, hollowed, to_arrays, unite, united
-from rlacd.repair.voxels import DEFAULT_GAP, Reach
+from rlacd.repair.voxels import Reach
+from rlacd.repair.wanted import DEFAULT_GAP, Wanted
 from rlacd.report import BodyRepair, Hole
 from rlacd.solid.arrays import BoolArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS, Frame
@@ -33,24 +34,6 @@ _NAMED = 5
 # Filled cavities are reported from this share of the solid's volume on: crevices where walls meet, up to hundreds in a
 # mesh, have up to 0.0005, rooms from 0.0024.
 _CREVICES = 1e-3
-
-
-class Wanted(NamedTuple):
-    """What the caller wants of a repair; see `rlacd.repair.repair.repair`.
-
-    Attributes
-    ----------
-    open_bodies : str
-    gap : float
-    cells : int
-        Cells along the longest side of the grid on which a ball of radius `gap` rolls.
-    keep_cavities : bool
-    """
-
-    open_bodies: str
-    gap: float
-    cells: int
-    keep_cavities: bool
 
 
 def query_of(solid: Shape, threads: int | None) -> SurfaceQuery:
@@ -175,13 +158,17 @@ class State:
         if self.wanted.keep_cavities:
             self.solid = unite([*bounded, *rest], keep_cavities=True)
             return
-        self.solid, self.cavity_walls = filled(united([part.shape for part in self.parts]))
-        if bounded is not closed or (rest and self.cavity_walls):
+        if bounded is not closed:
+            self.solid, self.cavity_walls = filled(united([part.shape for part in self.parts]))
             bare, self.cavity_walls = filled(united(bounded))
-            if bounded is not closed:
-                whole = unite(closed) if rest else self.solid
-                if whole.volume() - bare.volume() > _CREVICES * whole.volume():
-                    self.cavity_walls = emptied(whole, bounded)
+            whole = unite(closed) if rest else self.solid
+            if whole.volume() - bare.volume() > _CREVICES * whole.volume():
+                self.cavity_walls = emptied(whole, bounded)
+            return
+        bare = united(closed)
+        self.solid, self.cavity_walls = filled(united([bare, *rest]) if rest else bare)
+        if rest and self.cavity_walls:
+            self.cavity_walls = filled(bare)[1]
 
     def of_bodies(self, marked: BoolArray) -> Soup:
         """The faces of marked bodies."""
@@ -266,13 +253,13 @@ def measure(state: State) -> Int64Array:
     faces = surface.faces[replaced]
     spacing = affordable(DEFAULT_GAP, surface.vertices, faces)
     points, on = points_covering(surface.vertices, faces, spacing)
-    distance = solid.distance(points)
-    lost = np.flatnonzero(distance > 2 * HALF_THICKNESS)  # the middle of a slab is half as far from its surface
+    # The middle of a slab is half as far from its surface.
+    lost = np.flatnonzero(solid.is_beyond(points, 2 * HALF_THICKNESS))
     lost = lost[~solid.inside(points[lost])]
     corners = np.unique(faces[_native.longest_edges(surface.vertices, faces) <= spacing])  # the first of the points
     is_out = marked(corners[lost[lost < len(corners)]], len(surface.vertices))
     leads_out = np.asarray(is_out[faces].any(axis=1))
     leads_out[on[lost]] = True
     state.set_apart(replaced[leads_out & state.is_gone[replaced]])
-    np.maximum.at(state.lost, state.body_of_input[replaced[on[lost]]], distance[lost])
+    np.maximum.at(state.lost, state.body_of_input[replaced[on[lost]]], solid.distance(points[lost]))
     return replaced[leads_out]

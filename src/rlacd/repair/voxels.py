@@ -19,9 +19,6 @@ from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
 from rlacd.solid.manifold import to_manifold
 
-DEFAULT_GAP = 0.03
-"""Default radius of the ball, and greatest distance of a cap from the input's surface, in the frame."""
-
 FILLING_ERROR = 4 * HALF_THICKNESS
 """How far simplifying may move what fills a room."""
 

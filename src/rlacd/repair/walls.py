@@ -16,7 +16,7 @@ from rlacd.repair.distance import SurfaceQuery, points_covering
 from rlacd.repair.soup import FLAT, Soup, face_normals
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import slab_of_faces, to_arrays
-from rlacd.repair.voxels import DEFAULT_GAP
+from rlacd.repair.wanted import DEFAULT_GAP
 from rlacd.repair.wraps import keep_apart, wrap_sheets
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, dots
 from rlacd.solid.frame import HALF_THICKNESS
@@ -43,7 +43,7 @@ def _leads_away(shape: Manifold, surface: SurfaceQuery) -> bool:
     """Whether a skin leads farther away from the input than caps may."""
     vertices, faces = to_arrays(shape)
     points, _ = points_covering(vertices, faces, DEFAULT_GAP)
-    return bool((surface.distance(points) > DEFAULT_GAP).any())
+    return bool(surface.is_beyond(points, DEFAULT_GAP).any())
 
 
 def walls_and_sheets(state: State, as_sheets: Sequence[int]) -> tuple[Soup, Soup]:

@@ -11,7 +11,8 @@ from rlacd.repair.distance import MOST_POINTS, SurfaceQuery, is_tangle, points_c
 from rlacd.repair.soup import MOST_UNITED, Soup, boxes_of, face_normals
 from rlacd.repair.state import Piece, State
 from rlacd.repair.union import hull_of_points, slab_of_faces, unite
-from rlacd.repair.voxels import DEFAULT_GAP, Reach
+from rlacd.repair.voxels import Reach
+from rlacd.repair.wanted import DEFAULT_GAP
 from rlacd.solid.arrays import Int64Array
 from rlacd.solid.component import DENSE, concatenated
 from rlacd.solid.frame import HALF_THICKNESS, ROUNDING
@@ -150,11 +151,11 @@ def fill_slits(state: State) -> None:
     points, on = points[::every], on[::every]
     deep = state.reach.is_deep(points, _DEEP * gap)
     points, across = points[deep], face_normals(query.vertices, query.faces[on[deep]])
-    is_on_cap = state.surface.distance(points) > 2 * HALF_THICKNESS
+    is_on_cap = state.surface.is_beyond(points, 2 * HALF_THICKNESS)
     across *= gap * np.where(is_on_cap, _BETWEEN_CAPS, _BESIDE)[:, None]
     for side in (1, -1):  # the solid lies on both sides of a slit
         beside = points + side * across
-        off = np.flatnonzero(query.distance(beside) > ROUNDING)  # in a corner, that is on the other wall
+        off = np.flatnonzero(query.is_beyond(beside, ROUNDING))  # in a corner, that is on the other wall
         inside = off[query.inside(beside[off])]
         points, across = points[inside], across[inside]
     if len(points) == 0:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rlacd import _native
 from rlacd.solid.arrays import BoolArray, FloatArray, IntArray, dots
@@ -26,8 +27,9 @@ PUSHES, MORE = 12, 8
 """... so often by each, since in the corner of two walls it goes a third of its way; and then to and fro by the last,
 to see whether it drifts."""
 
-STRAY = 0.75
-"""A ball that goes so much of the way nearly straight finds no other wall: to the middle, it is a third or half."""
+STRAY = 0.6
+"""A ball that goes so much of the way nearly straight finds no other wall: to the middle, it is a third or half; in a
+right-angled crease, 0.7."""
 
 GROWTH = 1.5
 """A ball that touches walls beside its passage's middle is by less than this smaller than one in it."""
@@ -76,7 +78,7 @@ def passage_balls(
     balls = Balls(points + held[:, None] * normals, held).some(held > 0)
     if wanted is not None:
         balls = balls.some(wanted(balls))
-    balls = _pushed(_one_a_cell(balls, 2 * spacing), least / GROWTH, spacing, surface, threads)
+    balls = _pushed(balls.some(_one_a_cell(balls, 4 * spacing)), least / GROWTH, spacing, surface, threads)
     balls = balls.some((balls.radii >= least) & (balls.radii <= most))
     return spread(balls.some(surface.winding(balls.centres, threads=threads, is_closed=True) < 0.5), spacing)
 
@@ -95,10 +97,9 @@ def _starts(vertices: FloatArray, faces: IntArray, count: int) -> tuple[FloatArr
 def _apart(middles: FloatArray, normals: FloatArray) -> IntArray:
     """Numbers of triangles: all if they are few, else one in each cell and octant of directions."""
     some, size = np.arange(len(middles)), 2 / CELLS
+    octants = (normals > 0) @ np.array([1, 2, 4])
     while len(some) > FACES:
-        cells = np.floor(middles / size).astype(np.int64) + CELLS
-        x, y, z = cells.T
-        octants = ((normals > 0) * np.array([1, 2, 4])).sum(axis=1)
+        x, y, z = np.floor(middles / size).astype(np.int64).T + CELLS
         _, some = np.unique(((x * 2 * CELLS + y) * 2 * CELLS + z) * 8 + octants, return_index=True)
         size *= COARSER
     return some.astype(np.int32)
@@ -106,22 +107,24 @@ def _apart(middles: FloatArray, normals: FloatArray) -> IntArray:
 
 def _pushed(balls: Balls, least: float, spacing: float, surface: _native.Surface, threads: int) -> Balls:
     """The balls that are held, in the best place near theirs, one of those that meet there; and those in throats."""
-    throats = _in_throats(balls, least, surface, threads)
-    for step in STEPS:
-        balls, _, share = _pushed_by(step, PUSHES, balls, np.zeros_like(balls.centres), surface, threads)
-        balls = _one_a_cell(balls.some(share <= STRAY), spacing)
-    balls, _, share = _pushed_by(STEPS[-1], MORE, balls, np.zeros_like(balls.centres), surface, threads)
-    balls = balls.some(share <= LARGEST_DRIFT)
-    return Balls(np.concatenate([balls.centres, throats.centres]), np.concatenate([balls.radii, throats.radii]))
+    free = np.zeros_like(balls.centres)
+    pushed, drifts, share = _pushed_by(STEPS[0], PUSHES, balls, free, surface, threads)
+    drifting = np.flatnonzero(share > LARGEST_DRIFT)
+    drifting = drifting[_one_a_cell(balls.some(drifting), 4 * spacing)]
+    throats = _in_throats(balls.some(drifting), drifts[drifting], least, surface, threads)
+    for step, times in [*((step, PUSHES) for step in STEPS[1:]), (STEPS[-1], MORE)]:
+        pushed = pushed.some(share <= STRAY)
+        pushed = pushed.some(_one_a_cell(pushed, 2 * spacing))
+        pushed, _, share = _pushed_by(step, times, pushed, free[: len(pushed)], surface, threads)
+    pushed = pushed.some(share <= LARGEST_DRIFT)
+    return Balls(np.concatenate([pushed.centres, throats.centres]), np.concatenate([pushed.radii, throats.radii]))
 
 
-def _in_throats(balls: Balls, least: float, surface: _native.Surface, threads: int) -> Balls:
+def _in_throats(balls: Balls, drifts: FloatArray, least: float, surface: _native.Surface, threads: int) -> Balls:
     """Balls that drift, but are held where they go against their drift: there the way out is narrowest.
 
     Most find no throat but the bottom of a crease, where they become smaller than `least`.
     """
-    _, drifts, share = _pushed_by(STEPS[1], PUSHES, balls, np.zeros_like(balls.centres), surface, threads)
-    balls, drifts = balls.some(share > LARGEST_DRIFT), drifts[share > LARGEST_DRIFT]
     against = drifts / np.sqrt(dots(drifts, drifts))[:, None]
     for step, times, most in [*((step, 2 * PUSHES, STRAY) for step in STEPS[1:]), (STEPS[-1], MORE, LARGEST_DRIFT)]:
         _, ways, share = _pushed_by(step, times, balls, against, surface, threads, least)
@@ -154,11 +157,10 @@ def spread(balls: Balls, spacing: float) -> Balls:
     return balls.some(np.array(chosen, dtype=np.intp))
 
 
-def _one_a_cell(balls: Balls, spacing: float) -> Balls:
-    """The largest of those of about one size in each cell, which lie within that share of their radius."""
-    balls = balls.some(np.argsort(-balls.radii, kind="stable"))
-    _, size = np.frexp(balls.radii)  # a radius of 0.5 to 1 times a power of 2
-    cells = np.floor(balls.centres / np.ldexp(spacing / (2 * np.sqrt(3)), size)[:, None]).astype(np.int64)
+def _one_a_cell(balls: Balls, spacing: float) -> NDArray[np.intp]:
+    """Numbers of the largest of those of about one size in each cell, which lie within that share of their radius."""
+    order = np.argsort(-balls.radii, kind="stable")
+    _, size = np.frexp(balls.radii[order])  # a radius of 0.5 to 1 times a power of 2
+    cells = np.floor(balls.centres[order] / np.ldexp(spacing / (2 * np.sqrt(3)), size)[:, None]).astype(np.int64)
     x, y, z = cells.T + (1 << 17)
-    _, first = np.unique(((x << 18 | y) << 18 | z) << 6 | (size & 63), return_index=True)
-    return balls.some(first)
+    return order[np.unique(((x << 18 | y) << 18 | z) << 6 | (size & 63), return_index=True)[1]]
