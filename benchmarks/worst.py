@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from rlacd.clear import Body, Motion, check
 from rlacd.io.robots.read import read_robot
@@ -52,7 +53,7 @@ def film(path: Path, robots: Sequence[tuple[Path, Mapping[str, Path]]], packages
     shown[0].save(path, save_all=True, append_images=shown[1:], duration=durations, loop=0, optimize=True)
 
 
-def _panels(robot: Robot, ways: Sequence[Path], packages: Sequence[str]) -> Iterator[list[FloatArray]]:
+def _panels(robot: Robot, ways: Sequence[Path], packages: Sequence[str]) -> Iterator[list[NDArray[np.uint8]]]:
     """The frames of each way, to where that of the first is worst."""
     from benchmarks.robots import POSITIONS, SEED, moving
 
@@ -88,6 +89,6 @@ def _scene(bodies: Sequence[Body], motion: Motion, framed: FloatArray) -> list[D
     return scene
 
 
-def _on_white(picture: Any) -> FloatArray:
+def _on_white(picture: Any) -> NDArray[np.uint8]:
     color, covered = picture[..., :3], picture[..., 3:] / 255
-    return np.rint(color * covered + 255 * (1 - covered)).astype(np.uint8)
+    return np.asarray(np.rint(color * covered + 255 * (1 - covered)), np.uint8)

@@ -109,8 +109,11 @@ def with_lengths(
     return replace(robot, told_in=told_in), in_unit(given, metres, name), replace(asked, links=links)
 
 
+STOPPED = "Links were not checked against each other: the work was stopped before."
+
+
 def decomposed_robot(
-    robot: Robot, options: Mapping[str, Any], asked: RobotOptions, repaired: dict[Hashable, Repaired] | None = None
+    robot: Robot, options: Mapping[str, Any], asked: RobotOptions, repaired: dict[Hashable, Repaired]
 ) -> Checked:
     """Decompose all colliders, those that are the same solid once, and again what touches as hulls only.
 
@@ -128,7 +131,6 @@ def decomposed_robot(
     results: dict[Collider, Decomposition] = {}
     done: dict[Hashable, Decomposition] = {}
     found: dict[Hashable, Memory] = {}
-    repaired = {} if repaired is None else repaired
 
     def decompose_body(number: int) -> None:
         body, own = bodies[number], each[number]
@@ -142,10 +144,9 @@ def decomposed_robot(
 
     for number in range(len(bodies)):
         decompose_body(number)
-    if robot.is_alone:
-        return Checked(results)
-    if not all(result.report.complete for result in results.values()):
-        return Checked(results, ["Links were not checked against each other: the work was stopped before."])
+    is_whole = all(result.report.complete for result in results.values())
+    if robot.is_alone or not is_whole:
+        return Checked(results, [] if robot.is_alone else [STOPPED])
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
         tell(LINK + bodies[number].name, number)

@@ -58,7 +58,7 @@ def decompose_viewed(mesh: Path, *, package_dirs: Sequence[str] = (), **options:
     if robot is None:
         return decompose(mesh, **options)
     check_options(options)
-    done = decomposed_robot(robot, options, RobotOptions())
+    done = decomposed_robot(robot, options, RobotOptions(), {})
     said = [*robot.warnings, *warnings_of(robot, done.results), *done.warnings]
     return shown(robot, done, said, time.perf_counter() - began)
 
