@@ -184,8 +184,8 @@ def _line(row: dict[str, Any]) -> list[object]:
 def _shown(robot: Path, row: dict[str, Any], before: str) -> tuple[Path, dict[str, Path]]:
     """A robot, and the file of each way by its caption."""
     ways = {"before": BEFORE[before], "whole": "rlacd"}
-    said = {key: f"{name}: {row[key]['hulls']} hulls, {row[key]['false']} false contacts" for key, name in ways.items()}
-    return robot, {said[key]: row[key]["place"] for key in ways}
+    own = {name: row[key] for key, name in ways.items()}
+    return robot, {f"{name}: {r['hulls']} hulls, false contacts: {r['false']}": r["place"] for name, r in own.items()}
 
 
 def _paths(folder: Path, robots: Sequence[str], out: Path) -> list[Path]:

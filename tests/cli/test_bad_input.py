@@ -17,7 +17,7 @@ from trimesh import creation
 import rlacd
 from rlacd.cli.main import app
 from rlacd.errors import EmptyMeshError, MeshDataError, MeshFileError, OptionError, RlacdError
-from rlacd.repair import repair as repairing
+from rlacd.repair import steps as repairing
 from tests.hulls import assert_convex_hull, strict_json
 from tests.shapes_bad import arrays, ell
 
