@@ -158,17 +158,13 @@ class State:
         if self.wanted.keep_cavities:
             self.solid = unite([*bounded, *rest], keep_cavities=True)
             return
-        if bounded is not closed:
-            self.solid, self.cavity_walls = filled(united([part.shape for part in self.parts]))
+        self.solid, self.cavity_walls = filled(united([part.shape for part in self.parts]))
+        if bounded is not closed or (rest and self.cavity_walls):
             bare, self.cavity_walls = filled(united(bounded))
-            whole = unite(closed) if rest else self.solid
-            if whole.volume() - bare.volume() > _CREVICES * whole.volume():
-                self.cavity_walls = emptied(whole, bounded)
-            return
-        bare = united(closed)
-        self.solid, self.cavity_walls = filled(united([bare, *rest]) if rest else bare)
-        if rest and self.cavity_walls:
-            self.cavity_walls = filled(bare)[1]
+            if bounded is not closed:
+                whole = unite(closed) if rest else self.solid
+                if whole.volume() - bare.volume() > _CREVICES * whole.volume():
+                    self.cavity_walls = emptied(whole, bounded)
 
     def of_bodies(self, marked: BoolArray) -> Soup:
         """The faces of marked bodies."""
