@@ -163,7 +163,7 @@ def _certainty(rows: Sequence[Row]) -> str:
     if rows[0]["exceeding"] is None:
         return "none to keep"
     over = [f"up to {max(row['concavity'] for row in rows):.2f}"] if any(row["exceeding"] for row in rows) else []
-    return "; ".join(["by samples", *over] if rows[0]["method"] == "coacd" else over or ["certified"])
+    return "; ".join(["by samples" if rows[0]["method"] == "coacd" else "certified", *over])
 
 
 def comparison(groups: Mapping[str, Sequence[Row]]) -> Table:

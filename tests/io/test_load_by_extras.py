@@ -41,7 +41,7 @@ def test_a_format_whose_extra_is_missing_names_it(tmp_path: Path, ending: str, m
     path = tmp_path / f"box.{ending}"
     path.write_bytes(next(seed.content for kind, seed in written_by_extras(BOX) if kind == ending))
     monkeypatch.setitem(sys.modules, EXTRAS[extra], None)
-    with pytest.raises(MissingExtraError, match=rf"pip install 'rlacd\[{extra}\]'"):
+    with pytest.raises(MissingExtraError, match=rf"pip install 'rlacd\[{extra}\] @ git"):
         load_mesh(path)
 
 
