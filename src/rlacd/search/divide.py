@@ -44,8 +44,8 @@ TAKERS = 6
 """Number of parts a piece is offered to, starting with those whose hulls would grow the least."""
 
 PIECE_HALVINGS = 3
-"""Maximum depth of halving for a piece that no part can take; where what is left may stay, pieces are halved once: to
-offer smaller ones took three quarters of the search's time, and seldom saves a part."""
+"""Maximum depth of halving for a piece that no part can take; where what is left may stay, pieces are halved once:
+offering smaller ones would take three quarters of the search's time, and seldom saves a part."""
 
 PATCHES = 4
 """Parts of more components than this are reunited into one if that meets the criterion."""
