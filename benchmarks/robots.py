@@ -216,8 +216,10 @@ def app(
     \b
     python -m benchmarks robots $(python -c "import example_robot_data as e; print(e.path)") --out RUN
     """
+    if shown is not None and not robots:
+        raise click.UsageError("--film shows robots that are named; name some.")
     with exit_codes():
-        out, rows = out.absolute(), []
+        out, rows, drawn = out.absolute(), [], []
         for path in _paths(folder, robots, out):
             try:
                 row = measure(path, before, {"quality": quality}, [*packages], out)
@@ -227,8 +229,9 @@ def app(
             if row["whole"]["links"]:
                 rows.append(row)
                 click.echo(_line(row))
-        if shown is not None:
-            film(shown, [_shown(folder / name, row, before) for name, row in zip(robots, rows, strict=False)], packages)
+                drawn += [_shown(path, row, before)] if path in [folder / name for name in robots] else []
+        if shown is not None and drawn:
+            film(shown, drawn, packages)
         click.echo(Table([head.format(BEFORE[before]) for head in HEAD], [_line(row) for row in rows]))
         click.echo(f"CPU seconds now, sum: {sum(row['whole']['cpu'] for row in rows):.0f}")
         for what, one, other in (

@@ -119,8 +119,9 @@ class TestRunner:
         ("limits", "says"), [({"seconds": 0.05}, "more than 0.05 s"), ({"memory": 2**25}, "more than 0.03125 GB")]
     )
     def test_a_hang_and_a_lack_of_memory_are_recorded(
-        self, meshes: Path, tmp_path: Path, limits: Any, says: str
+        self, meshes: Path, tmp_path: Path, limits: Any, says: str, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        monkeypatch.setattr("rlacd.pool.local.LOOK_EVERY", 0.001)  # boxes are done before the usual first look
         rows = bench_of(meshes, tmp_path / "run", process=ProcessLimits(**limits)).run("fast")
         assert all(says in row["error"] for row in rows)
         assert len(rows) == 2, "the run goes on"

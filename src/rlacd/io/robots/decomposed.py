@@ -55,6 +55,9 @@ FULL: DetailName = "full"
 LINK = "link "
 """What the stage of a report of progress begins with that names a link, before the reports of its meshes."""
 
+STOPPED = "Links were not checked against each other: the work was stopped before."
+"""The warning of robots that there was no time to check."""
+
 
 @dataclass(frozen=True)
 class Checked:
@@ -107,9 +110,6 @@ def with_lengths(
     told_in, metres = Unit.typed(unit_of(given), robot.metres), robot.metres
     links = None if asked.links is None else in_unit(asked.links, metres, name)
     return replace(robot, told_in=told_in), in_unit(given, metres, name), replace(asked, links=links)
-
-
-STOPPED = "Links were not checked against each other: the work was stopped before."
 
 
 def decomposed_robot(
