@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -11,7 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import trimesh
-from benchmarks import compare, curves
+from benchmarks import compare, curves, robots, worst
+from benchmarks.boxes import write_boxes
 from benchmarks.methods import make_method, rlacd_options
 from benchmarks.playback import seconds_on
 from benchmarks.runner import Bench, Limits, find_meshes
@@ -291,3 +293,30 @@ def test_played_back_work_shares_the_cores_and_the_main_thread_waits_for_what_it
     begin: list[tuple[str, Any]] = [("begin", number) for number in range(3)]
     steps = [*begin, ("alone", 2.0), ("wait", 0), ("wait", 1), ("wait", 2), ("map", [1.0] * 4)]
     assert seconds_on(cores, steps, {0: 2.0, 1: 2.0, 2: 1.0}) == pytest.approx(seconds)
+
+
+class TestFilm:
+    def test_shows_where_single_hulls_touch_in_red(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Of a fork between two plates: there and back, the worst position stays, and only single hulls are red."""
+        for package in ("coal", "mujoco", "yourdfpy", "mitsuba", "PIL"):
+            pytest.importorskip(package)
+        for what, value in {"SIZE": 48, "SAMPLES": 4, "FRAMES": 3}.items():
+            monkeypatch.setattr(worst, what, value)
+        monkeypatch.setattr(robots, "POSITIONS", 5)
+        fork = next(path for path in write_boxes(tmp_path / "boxes") if path.stem == "fork")
+        ways = {way: robots.rewritten(fork, way, {}, [], tmp_path / "run") for way in ("hull", "whole")}
+        assert ways["hull"]["false"] > 0 == ways["whole"]["false"]
+        worst.film(tmp_path / "film.gif", [(fork, {way: row["place"] for way, row in ways.items()})], [])
+        film = import_module("PIL.Image").open(tmp_path / "film.gif")
+        assert film.size == (2 * 48, 48)
+        assert film.n_frames == 4, "three there, one between on the way back"
+        film.seek(2)
+        red = np.asarray(film.convert("RGB"), int)
+        is_red = red[..., 0] > 2 * red[..., 1]
+        assert film.info["duration"] > 1000
+        assert is_red[:, :48].mean() > 0.01
+        assert not is_red[:, 48:].any()
+
+    def test_needs_names(self, tmp_path: Path) -> None:
+        said = run(robots.app, tmp_path, "--out", tmp_path / "run", "--film", tmp_path / "film.gif", code=2)
+        assert "--film shows robots that are named; name some." in said
