@@ -316,6 +316,15 @@ def test_a_cone_is_pointed_above(height: float, touches: bool) -> None:
     assert bool(found) == touches
 
 
+@pytest.mark.parametrize("apart", [-0.001, 0.001])
+def test_a_corner_may_have_any_number_of_neighbours(apart: float) -> None:
+    """The tip of a cone of 400 sides, which coal refuses, and a block above it."""
+    cone, roof = trimesh.creation.cone(1.0, 2.0, sections=400), block((-1, -1, 2 + apart), (1, 1, 3))
+    shapes = [Surface(mesh.vertices, mesh.faces) for mesh in (cone, roof)]
+    found = check([Body("", shape, [shape]) for shape in shapes], at_rest(["a", "b"]))
+    assert bool(found) == (apart < 0)
+
+
 def ball_and_wall(folder: Path, dent: float) -> Path:
     """An egg with a dent in its side that slides past a wall, 1 mm away at its nearest."""
     egg = trimesh.creation.icosphere(subdivisions=3)

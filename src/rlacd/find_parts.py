@@ -171,7 +171,8 @@ def covered(source: InputMesh, options: Options, run: Run) -> Reached:
     """Cover a mesh that there was no time to decompose, with one hull for each of its bodies."""
     solid, parts = cover(source, run)
     options = options.at_scale(solid.frame.scale)
-    return Reached(solid, options, LimitedCriterion.prepare(options, solid, None), parts)
+    with run.shielded():
+        return Reached(solid, options, LimitedCriterion.prepare(options, solid, None), parts)
 
 
 @dataclass(frozen=True)

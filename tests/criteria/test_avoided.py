@@ -125,3 +125,11 @@ def test_lengths_and_scale_are_those_of_the_input(tmp_path: Path) -> None:
 def test_what_is_no_list_of_meshes_is_refused(given: Any) -> None:
     with pytest.raises(OptionError, match="a list of meshes or of paths of meshes"):
         rlacd.decompose(RING, avoid=given)
+
+
+@pytest.mark.promise("timeout")
+def test_a_mesh_with_others_to_avoid_is_covered_when_time_is_over_before_the_work() -> None:
+    other = trimesh.creation.icosphere(subdivisions=5).apply_translation((3, 0, 0))
+    result = rlacd.decompose(trimesh.creation.torus(1.0, 0.3), avoid=[other], timeout=1e-6, threads=1)
+    assert not result.report.complete
+    assert len(result) == 1

@@ -542,6 +542,22 @@ def test_a_robots_tradeoff_has_the_hulls_of_each_link(rings: Path) -> None:
         assert says in refused.stderr
 
 
+@pytest.mark.parametrize("holds", ["", "<collision><geometry><sphere radius='1'/></geometry></collision>"])
+def test_a_tradeoff_of_a_robot_without_collision_meshes_is_refused(holds: str, tmp_path: Path) -> None:
+    robot = tmp_path / "robot.urdf"
+    robot.write_text(f"<robot name='r'><link name='l'>{holds}</link></robot>")
+    run = CliRunner().invoke(app, ["tradeoff", str(robot)])
+    assert run.exit_code == 2
+    assert run.stderr.endswith("robot.urdf has no collision mesh, so there is nothing to compare.\n")
+
+
+def test_a_tradeoff_without_time_for_any_link_is_an_empty_table(rings: Path) -> None:
+    run = CliRunner().invoke(app, ["tradeoff", str(rings), "--threads", "1", "--timeout", "1e-6"])
+    assert run.exit_code == 4
+    assert run.stdout.startswith("threshold_abs")
+    assert run.stdout.count("\n") == 1
+
+
 def test_a_log_tells_which_link_is_under_way(ear: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rlacd.cli.decompose, "LOG_EVERY", 0.0)
     run = CliRunner().invoke(app, ["decompose", str(ear), "--threads", "1"])

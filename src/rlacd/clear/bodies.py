@@ -14,14 +14,17 @@ import trimesh
 
 from rlacd import _native
 from rlacd.errors import RlacdError, import_extra
+from rlacd.options.presets import HullLimits
 from rlacd.solid.arrays import BoolArray, FloatArray, Int64Array, IntArray, dots
-from rlacd.solid.hull import Hull
+from rlacd.solid.hull import Hull, limit_hull
 from rlacd.solid.poses import moved
 from rlacd.solid.topology import compacted
 
 MOST_NEAR = 4_000_000
 """Pairs of boxes that come near each other along the x axis, over all samples; robots of a hundred links have fewer."""
 
+MOST_NEIGHBOURS = 255
+"""That coal takes of one corner of a polytope; the tip of a cone and the corners of a round plate can have more."""
 
 PRIMITIVES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "cone": 2, "ellipsoid": 3}
 """Kinds of primitives, and how many sizes each has."""
@@ -75,11 +78,13 @@ class Surface:
 
     @cached_property
     def as_convex(self) -> Any:
-        """For coal, a convex polytope."""
-        coal = get_coal()
+        """For coal, a convex polytope; a simpler one that holds it if a corner has too many neighbours."""
+        coal, hull = get_coal(), Hull(self.vertices, self.faces, 0.0)
+        while np.bincount(hull.faces.ravel()).max() > MOST_NEIGHBOURS:
+            hull = limit_hull(hull, HullLimits(3 * len(hull.vertices) // 4))
         points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-        points.extend([*self.vertices])
-        triangles.extend([coal.Triangle(*face) for face in self.faces.tolist()])
+        points.extend([*hull.vertices])
+        triangles.extend([coal.Triangle(*face) for face in hull.faces.tolist()])
         return coal.Convex(points, triangles)
 
     @cached_property

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rlacd.decomposition import Decomposition
-from rlacd.errors import OptionError
+from rlacd.errors import MeshFileError, OptionError
 from rlacd.find_parts import Repaired
 from rlacd.fit import Unit
 from rlacd.io.robots.decomposed import SHARE, check_options, fitting, options_of_bodies, with_lengths
@@ -67,8 +67,8 @@ class RobotTradeoff:
             ("threshold_abs", *(mark + words for mark, words in lengths)),
             *((n, *c) for n, c in self.links.items()),
         ]
-        rows += [("all links", *self.total)]
-        wide = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))] if self.links else [0]
+        rows += [("all links", *self.total)] if self.links else []
+        wide = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
         return "\n".join(
             "  ".join([f"{row[0]:{wide[0]}}", *(f"{one!s:>{w}}" for one, w in zip(row[1:], wide[1:], strict=True))])
             for row in rows
@@ -83,13 +83,15 @@ def tradeoff_of(robot: Robot, options: Mapping[str, Any]) -> RobotTradeoff:
     Raises
     ------
     MeshError
-        A mesh cannot be decomposed.
+        A mesh cannot be decomposed, or there is none.
     OptionError
         An option is out of range, or the criterion has no lengths.
     """
     if options.get("criterion") not in (None, "distance", "concavity"):
         raise OptionError("the thresholds of a robot are lengths: leave criterion out, or give distance or concavity.")
     check_options(options)
+    if not robot.replaced:
+        raise MeshFileError(f"{robot.source} has no collision mesh, so there is nothing to compare.")
     robot, given, asked = with_lengths(robot, options, RobotOptions())
     given = {name: value for name, value in given.items() if value is not None}
     if given.get("threshold") is None and given.get("threshold_abs") is None:
