@@ -14,6 +14,7 @@ import rlacd
 from rlacd.errors import MeshFileError
 from rlacd.io.robots.read import read_robot
 from rlacd.io.robots.robot import turned
+from tests.assets import png
 from tests.models import fall_in_mujoco, inside, mujoco_model, points_of_geom, table
 
 ARM = """<mujoco model="arm">
@@ -442,6 +443,43 @@ def test_a_model_split_over_files_is_rewritten_into_one(tmp_path: Path) -> None:
     (tmp_path / "floor.xml").write_text('<mujoco><include file="parts/robot.xml"/></mujoco>')
     with pytest.raises(MeshFileError, match="twice"):
         rlacd.rewrite_robot(tmp_path / "in.xml", tmp_path / "again.xml")
+
+
+@pytest.mark.parametrize("strip", ["false", "true"])
+def test_a_model_that_is_written_elsewhere_finds_its_files(tmp_path: Path, strip: str) -> None:
+    """Meshes, height fields, pictures and included files, in their folders or beside the file that names them."""
+    for folder in ("in/meshes", "in/looks", "in/parts", "out"):
+        (tmp_path / folder).mkdir(parents=True)
+    near = "parts" if strip == "false" else "meshes"  # stripped names are looked for in the folder of meshes only
+    for name in ("meshes/table.stl", "meshes/seen.stl", f"{near}/near.stl"):
+        table().export(tmp_path / "in" / name)
+    for name in ("looks/wood.png", "looks/side.png", "meshes/hills.png"):
+        (tmp_path / "in" / name).write_bytes(png())
+    sides = " ".join(f'file{side}="side.png"' for side in ("right", "left", "up", "down", "front", "back"))
+    parts = {
+        "in.xml": f'<mujoco><compiler meshdir="meshes" texturedir="looks" strippath="{strip}"/><asset>'
+        f'<mesh file="table.stl"/><mesh file="seen.stl"/><texture name="sky" type="skybox" {sides}/>'
+        '<texture name="wood" type="2d" file="wood.png"/><hfield name="hills" file="hills.png" size="1 1 1 1"/></asset>'
+        '<include file="parts/plain.xml"/><include file="parts/outer.xml"/></mujoco>',
+        "parts/plain.xml": "<mujoco><option timestep='0.004'/></mujoco>",
+        "parts/outer.xml": '<mujoco><include file="inner.xml"/><worldbody><geom type="hfield" hfield="hills"/>'
+        '<body name="b"><freejoint/><geom type="mesh" mesh="table"/>'
+        '<geom type="mesh" mesh="seen" contype="0" conaffinity="0"/></body></worldbody></mujoco>',
+        "parts/inner.xml": '<mujoco><asset><mesh file="near.stl"/></asset><worldbody><body name="c"><freejoint/>'
+        '<geom type="mesh" mesh="near"/></body></worldbody></mujoco>',
+    }
+    for name, text in parts.items():
+        (tmp_path / "in" / name).write_text(text)
+    before = mujoco_model(tmp_path / "in" / "in.xml")
+    done = rlacd.rewrite_robot(tmp_path / "in" / "in.xml", tmp_path / "out" / "out.xml", samples=0, threads=1)
+    after = mujoco_model(done.path)
+    assert after.ngeom == before.ngeom + sum(len(link.files) for link in done.links)
+    assert after.opt.timestep == 0.004
+    for what in ("tex_data", "hfield_data"):
+        assert (getattr(after, what) == getattr(before, what)).all()
+    assert after.body_inertia == pytest.approx(before.body_inertia, rel=1e-6)
+    again = rlacd.rewrite_robot(done.path, tmp_path / "again.xml", package_dirs=[str(tmp_path)], threads=1)
+    assert mujoco_model(again.path).ngeom >= after.ngeom
 
 
 def test_a_model_whose_paths_are_stripped_is_rewritten_with_the_paths_that_count(tmp_path: Path) -> None:

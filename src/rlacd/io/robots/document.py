@@ -58,7 +58,6 @@ class Document(Robot):
 
     root: Element
     references: References
-    others: list[str]  # files that it names relative to its folder: they break if the result goes elsewhere
     seen: Sequence[Element] = field(default=(), kw_only=True)  # primitives that are shown, and are to collide too
     bare: frozenset[str] = field(default=frozenset(), kw_only=True)  # bodies that collide as what they show
 
@@ -70,6 +69,11 @@ class Document(Robot):
         links = (each for each in self.root.walk() if each.tag in ("link", "body"))
         count = sum(any(link.named("collision", "geom", "frame")) for link in links)
         return not self.bodies or max(count, len(self.bodies)) < 2
+
+    def elsewhere(self, place: Path) -> Path | None:
+        """The folder of a result that is not that of the file: names of files are then to be seen from there."""
+        folder = place.absolute().parent
+        return None if os.path.realpath(folder) == os.path.realpath(self.root.file.folder) else folder
 
     @abstractmethod
     def edits(
@@ -114,7 +118,7 @@ class Document(Robot):
         data = edited(self.root, edits)
         check_names(folder, stem, list(files))
         write_folder(folder, stem, files, then=lambda: write_file(place, data))
-        return Written(folder, names, [*left_behind(self.others, self.root.file.folder, place), *said])
+        return Written(folder, names, said)
 
 
 def opened(source: Path, tag: str) -> Element:

@@ -14,7 +14,6 @@ only visible one of its body; unless another geom shows the same mesh there, it 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -27,8 +26,9 @@ import trimesh
 from rlacd.clear import PRIMITIVES, LinkPair, Motion, Primitive, mjcf_motion
 from rlacd.io.robots.document import Document, Files, HullFiles, opened, unused_stem
 from rlacd.io.robots.matrix import excludes
-from rlacd.io.robots.mjcf_model import FILES, TURNED, Compiler, Defaults, geom_numbers, mujoco_reads, read_model
+from rlacd.io.robots.mjcf_model import FOLDERS, TURNED, Compiler, Defaults, geom_numbers, mujoco_reads, read_model
 from rlacd.io.robots.poses import Angles, numbers, read_scale
+from rlacd.io.robots.references import seen_from
 from rlacd.io.robots.robot import Body, Collider, MeshFile, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
 from rlacd.options.robots import RobotOptions
@@ -126,14 +126,13 @@ class Mjcf(Document):
         self, place: Path, folder: Path, hulls: HullFiles, copies: Mapping[Path, str], said: list[str]
     ) -> list[Edit]:
         """See `Document`."""
-        within = os.path.relpath(self.root.file.folder / self.compiler.mesh_folder, self.root.file.folder)
-        there = os.path.abspath(place.absolute().parent / within)  # the folder of meshes, seen from the new file
-        target = Path(os.path.relpath(folder.absolute(), there))
+        elsewhere = self.elsewhere(place)
+        target = Path(seen_from(place.absolute().parent / self.compiler.mesh_folder, folder))
         taken = {*self.assets, *(str(e.attributes.get("name")) for e in self.root.walk() if e.tag == "geom")}
         names, edits = _hull_assets(self.found, self.meshes_of, hulls, target, {*taken})
         of_geom: dict[str, list[str]] = {}
         for mesh in self.meshes_of.values():
-            values = {"file": moved} if (moved := self.compiler.relocated(mesh.asset)) is not None else {}
+            values = self.compiler.relocated(mesh.asset, elsewhere)
             path = mesh.placed.file.path
             if path in copies:
                 values["file"] = (target / copies[path]).as_posix()
@@ -153,7 +152,8 @@ class Mjcf(Document):
             copy = geom.with_attributes(_colliding_too(geom, "collision", taken))
             edits.append(Edit(geom.file, geom.end, geom.end, geom.indent + copy))
         edits += _pair_edits(self.root, of_geom, {str(pair.attributes.get("name")) for pair in _pairs(self.root)})
-        return edits + _relocations(self.compiler, edits, {mesh.asset for mesh in self.meshes_of.values()})
+        done = {mesh.asset for mesh in self.meshes_of.values()}
+        return edits + _relocations(self.compiler, edits, done, elsewhere)
 
 
 def read_mjcf(source: Path, files: Files, *, apart: bool, from_visual: bool) -> Mjcf:
@@ -177,14 +177,11 @@ def read_mjcf(source: Path, files: Files, *, apart: bool, from_visual: bool) -> 
             warnings.append(f"The mesh {name} is left unchanged: it {why}.")
     geoms = [geom for geom in geoms if geom.mesh in meshes]
     warnings += _caveats(root, geoms)
-    rewritten = {mesh.asset for mesh in meshes.values()}
-    names = [defaults.full(each).get("file") for each in root.walk() if each.tag in FILES and each not in rewritten]
-    relative = [name for name in names if name and not Path(name).is_absolute()]
     primitives = [own for body in bodies_of for own in _primitives(body, defaults, compiler, paired, bare)]
     bodies, found = _bodies(geoms, primitives, meshes, compiler, apart=apart)
     shown = [geom for geom, owner, _ in primitives if owner in bare]
     seen_as = frozenset(_body_name(body, root) for body in bare)
-    of_file = (root, files.references, relative, compiler, [*assets], meshes, found)
+    of_file = (root, files.references, compiler, [*assets], meshes, found)
     return Mjcf(source, bodies, warnings, 1.0, "z", *of_file, seen=shown, bare=seen_as)
 
 
@@ -276,10 +273,13 @@ def _hull_assets(
     return names, edits
 
 
-def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) -> list[Edit]:
-    """Correct the paths in included files that are to be written into the main file, where another folder counts."""
+def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element], elsewhere: Path | None) -> list[Edit]:
+    """Correct the paths of a file that is written elsewhere, and those in files that are written into the main one."""
+    every = compiler.strips or elsewhere is not None
+    naming = [element for element in compiler.root.walk() if element.tag in FOLDERS and element not in done]
     changed = {id(edit.file) for edit in edits}
-    includes = [element for element in compiler.root.walk() if element.included is not None]
+    changed |= {id(element.file) for element in naming if every and compiler.relocated(element, elsewhere)}
+    includes = [element for element in naming if element.included is not None]
     for element in reversed(includes):  # what an inner file changes, the outer ones hold
         if element.included is not None and id(element.included.file) in changed:
             changed.add(id(element.file))
@@ -288,12 +288,11 @@ def _relocations(compiler: Compiler, edits: Sequence[Edit], done: set[Element]) 
         for element in compiler.root.named("compiler")
         if compiler.strips and "strippath" in element.attributes
     }
-    for element in compiler.root.walk():
-        if element.tag in FILES and (compiler.strips or id(element.file) in changed) and element not in done:
-            written = element.included is not None and id(element.included.file) in changed
-            if not written and (name := compiler.relocated(element)) is not None:
-                moved[element] = {"file": name}
-    return [element.replaced(element.with_attributes(values)) for element, values in moved.items()]
+    for element in naming:
+        written = element.included is not None and id(element.included.file) in changed
+        if (every or id(element.file) in changed) and not written:
+            moved[element] = compiler.relocated(element, elsewhere)
+    return [element.replaced(element.with_attributes(values)) for element, values in moved.items() if values]
 
 
 def _geom_edits(
@@ -443,7 +442,7 @@ def _unplaced(asset: Element, full: Mapping[str, str], compiler: Compiler, files
     """Read the file of an asset; its coordinates are taken from ``refpos`` and ``refquat``, then scaled."""
     where = f"mesh {full.get('name', full['file'])} of {asset.file.path}"
     folder = compiler.root.file.folder / compiler.mesh_folder
-    file = files.mesh(compiler.relocated(asset) or full["file"], folder)
+    file = files.mesh(compiler.relocated(asset).get("file", full["file"]), folder)
     turned = Angles().pose({"pos": full.get("refpos", "0 0 0"), "quat": full.get("refquat", "1 0 0 0")}, where)
     return PlacedMesh(file, read_scale(full.get("scale"), where), np.eye(4), inverse(turned))
 

@@ -15,13 +15,17 @@ from pathlib import Path
 from rlacd.errors import MeshFileError
 from rlacd.io.read.open_file import read_named
 from rlacd.io.robots.poses import Angles
-from rlacd.io.robots.references import References
+from rlacd.io.robots.references import References, seen_from
 from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, expand
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.poses import product
 
-STRIPPED = ("mesh", "texture", "hfield", "skin")
-FILES = (*STRIPPED, "include", "model")
+FOLDERS = {"include": "", "model": "", "mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "flexcomp": "meshdir"}
+FOLDERS["texture"] = "texturedir"
+"""Elements that name files, and the setting with the folder of these; without one it is that of the main file."""
+
+NAMES = ("file", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))
+"""Attributes that name files; a texture may be six pictures."""
 
 MOST_STL_FACES = 200_000
 """Triangles of the largest STL file that MuJoCo reads."""
@@ -116,17 +120,26 @@ class Compiler:
         angles = Angles(self.settings.get("angle") != "radian", self.settings.get("eulerseq", "xyz"))
         return angles.pose(attributes, where)
 
-    def relocated(self, element: Element) -> str | None:
-        """The file that an element names, seen from the main file and not stripped, if its text is not that."""
-        own, main = element.attributes.get("file", ""), self.root.file.folder
-        name = re.split(r"[/\\]", own)[-1] if self.strips and element.tag in STRIPPED else own
-        where = {"include": "", "texture": "texturedir"}.get(element.tag, "meshdir")
-        folder = main / self.settings.get(where, "")
-        inner = element.file.folder
-        if name and inner != main and inner.is_relative_to(main) and not (folder / name).exists():
-            moved = inner.relative_to(main) / name
-            name = moved.as_posix() if (folder / moved).exists() else name
-        return None if name == own else name
+    def relocated(self, element: Element, place: Path | None = None) -> dict[str, str]:
+        """The files that an element names, seen from a main file in a folder and not stripped, if its text is not that.
+
+        By default, the main file is where it is.
+        """
+        main, inner = self.root.file.folder, element.file.folder
+        setting = FOLDERS[element.tag]
+        folder, there = (at / self.settings.get(setting, "") for at in (main, place or main))
+        names = {}
+        for attribute in (each for each in NAMES if element.attributes.get(each)):
+            name = own = element.attributes[attribute]
+            if self.strips and setting:
+                name = re.split(r"[/\\]", own)[-1]
+            if inner != main and not (folder / name).exists() and (inner / name).exists():
+                name = seen_from(folder, inner / name)
+            if there != folder:
+                name = seen_from(there, folder / name) if not Path(name).is_absolute() else name
+            if name != own:
+                names[attribute] = name
+        return names
 
     def is_weighed(self, geom: Element, full: Mapping[str, str]) -> bool:
         """Tell whether the mass of the geom's body follows from the geom."""

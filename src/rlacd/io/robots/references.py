@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -118,6 +119,16 @@ class References:
             yield path / "share" / name
         for path in _paths("ROS_PACKAGE_PATH"):
             yield path if path.name == name else path / name
+
+
+def seen_from(folder: Path, path: Path) -> str:
+    """The name of a file relative to a folder; absolute where links or drives make that another file."""
+    there, name = os.path.abspath(folder), os.path.abspath(path)
+    with suppress(ValueError):  # another drive
+        relative = os.path.relpath(name, there)
+        if os.path.realpath(os.path.join(there, relative)) == os.path.realpath(name):
+            name = relative
+    return Path(name).as_posix()
 
 
 def _package_name(folder: Path) -> str | None:

@@ -19,6 +19,7 @@ from rlacd.errors import MeshFileError
 from rlacd.io.robots.document import Document, Files, HullFiles, opened
 from rlacd.io.robots.matrix import srdf
 from rlacd.io.robots.poses import numbers, read_scale, urdf_origin
+from rlacd.io.robots.references import seen_from
 from rlacd.io.robots.robot import Body, Collider, PlacedMesh, colliders
 from rlacd.io.robots.spans import Edit, Element
 from rlacd.io.write import write_file
@@ -62,7 +63,8 @@ class Urdf(Document):
 
     def edits(self, place: Path, folder: Path, hulls: HullFiles, *_: object) -> list[Edit]:
         """See `Document`."""
-        edits = [_behind(one, [_colliding(one, next(one.named("geometry")).with_attributes({}))]) for one in self.seen]
+        edits = self._relocations(self.elsewhere(place))
+        edits += [_behind(one, [_colliding(one, next(one.named("geometry")).with_attributes({}))]) for one in self.seen]
         for collider, (first, *others) in self.found.items():
             names = [self._reference(first.mesh.attributes["filename"], hull, folder) for hull in hulls[collider]]
             if first.element.tag == "visual":
@@ -73,6 +75,18 @@ class Urdf(Document):
             pieces = [_with_mesh(first, name, index) for index, name in enumerate(names)]
             edits.append(first.element.replaced(first.element.indent.join(pieces)))
             edits += [other.element.removed() for other in others]
+        return edits
+
+    def _relocations(self, elsewhere: Path | None) -> list[Edit]:
+        """Correct the names of other files, which are relative to the folder of the file."""
+        taken = {one.mesh for together in self.found.values() for one in together if one.element.tag == "collision"}
+        named = [each for each in self.root.walk() if each.tag in ("mesh", "texture") and each not in taken]
+        edits = []
+        for each in named if elsewhere is not None else ():
+            name = each.attributes.get("filename", "")
+            if elsewhere is not None and name and "://" not in name and not Path(name).is_absolute():
+                moved = seen_from(elsewhere, self.root.file.folder / name.replace("\\", "/"))
+                edits.append(each.replaced(each.with_attributes({"filename": moved})))
         return edits
 
     def paired(self, pairs: Sequence[LinkPair], asked: RobotOptions, said: list[str]) -> list[Edit]:
@@ -117,12 +131,7 @@ def read_urdf(source: Path, files: Files, *, apart: bool, from_visual: bool) -> 
         bare |= {name} if is_bare else set()
         if own or (primitives and name != "world"):
             bodies.append(Body(name, poses.get(name, np.eye(4)), [*own], primitives=primitives))
-    taken = (collision for together in found.values() for collision in together)
-    replaced = {collision.mesh for collision in taken if collision.element.tag == "collision"}
-    others = [each for each in root.walk() if each.tag in ("mesh", "texture") and each not in replaced]
-    names = [each.attributes.get("filename", "") for each in others]
-    relative = [name for name in names if name and "://" not in name and not name.startswith("/")]
-    said, of_file = [*_of_mass(root, bodies), *_of_inertia(root)], (root, files.references, relative, found)
+    said, of_file = [*_of_mass(root, bodies), *_of_inertia(root)], (root, files.references, found)
     return Urdf(source, bodies, said, 1.0, "z", *of_file, seen=seen, bare=frozenset(bare))
 
 
