@@ -5,8 +5,9 @@ The hulls of a body hold its surface, so bodies whose hulls are apart need no te
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -96,19 +97,21 @@ def _touching(first: Body, second: Body, samples: Int64Array, poses: FloatArray,
     """What two bodies do, looked at once for each way in which they are to each other."""
     rounded = np.round(poses / (SAME * np.array([1, 1, 1, size])))
     _, chosen, same = np.unique(rounded.reshape(len(poses), 16), axis=0, return_index=True, return_inverse=True)
-    touch, meet, offences = np.zeros(len(chosen), dtype=bool), np.zeros(len(chosen), dtype=bool), []
-    ours, theirs = first.shapes, second.shapes
+    ours, theirs, deep = first.shapes, second.shapes, dict[int, tuple[float, Iterator[float]]]()
     near = _near(ours, theirs, poses[chosen])
     for rows in np.split(near, np.flatnonzero(np.diff(near[:, 0])) + 1) if len(near) else []:
-        place, pose = int(rows[0, 0]), poses[chosen[rows[0, 0]]]
-        depths = (_depth(ours[a], theirs[b], pose) for _, a, b in rows.tolist())
-        deep = next((depth for depth in depths if depth > TOUCH * size), None)
-        touch[place] = deep is not None
-        meet[place] = deep is not None and any(
-            _meets(one, other, pose, TOUCH * size) for one in first.solids for other in second.solids
-        )
-        if deep is not None and not meet[place]:
-            offences.append(Offence(int(samples[chosen[place]]), pose, max([deep, *depths])))
+        pose = poses[chosen[rows[0, 0]]]
+        depths = map(_depth, *zip(*((ours[a], theirs[b], pose) for _, a, b in rows.tolist()), strict=True))
+        if (least := next((depth for depth in depths if depth > TOUCH * size), None)) is not None:
+            deep[int(rows[0, 0])] = least, depths
+    touch, meet = np.zeros(len(chosen), dtype=bool), np.zeros(len(chosen), dtype=bool)
+    touch[[*deep]] = True
+    meet[touch] = _meet(first, second, poses[chosen[touch]], TOUCH * size)
+    offences = [
+        Offence(int(samples[chosen[place]]), poses[chosen[place]], max([least, *depths]))
+        for place, (least, depths) in deep.items()
+        if not meet[place]
+    ]
     hulls, meshes = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     hulls[samples], meshes[samples] = touch[same.ravel()], meet[same.ravel()]
     return Touching(hulls, meshes, tuple(sorted(offences, key=lambda one: (-one.depth, one.sample))))
@@ -135,37 +138,62 @@ def _depth(first: Surface, second: Surface, pose: FloatArray) -> float:
     return max(0.0, -float(result.getContact(0).penetration_depth)) if found else 0.0
 
 
-def _reaches(first: Surface, as_first: Any, second: Surface, pose: FloatArray, reach: float) -> bool:
-    """Whether the first, as one of coal's shapes, is within reach of the second's surface, seen at a pose."""
+def _meet(first: Body, second: Body, poses: FloatArray, reach: float) -> BoolArray:
+    """Seen at which poses [K, 4, 4] the second body meets the first."""
+    meet = np.zeros(len(poses), dtype=bool)
+    for one, other in product(first.solids, second.solids):
+        meet[~meet] = _meets(one, other, poses[~meet], reach)
+    return meet
+
+
+def _meets(first: Surface, second: Surface, poses: FloatArray, reach: float) -> BoolArray:
+    """Whether surfaces are within reach of each other, the second seen at each pose, or one holds the other.
+
+    If they are farther apart, they do not meet either where no point of one is moved by what is left.
+    """
+    keys = [(second, pose.tobytes()) for pose in poses]
+    places = _corners(first, second, poses)
+    for key, pose, place in zip(keys, poses, places, strict=True):
+        if key not in first.met:
+            apart = distance(first, second, pose)
+            first.met[key] = (
+                apart <= reach
+                or first.holds(moved(pose, second.corner))
+                or second.holds(moved(inverse(pose), first.corner))
+            )
+            if not first.met[key]:
+                moves = np.linalg.norm(places - place, axis=-1).max(axis=-1).min(axis=-1)
+                first.met |= dict.fromkeys((keys[i] for i in np.flatnonzero(moves < apart - reach)), False)
+    return np.array([first.met[key] for key in keys], dtype=bool)
+
+
+def _corners(first: Surface, second: Surface, poses: FloatArray) -> FloatArray:
+    """Corners of a box around each surface, seen from the other [K, 2, 8, 3]."""
+    ways = (second, poses), (first, _seen_from(poses, np.broadcast_to(np.eye(4), poses.shape)))
+    turned = [np.array([*product(*own.box.T)]) @ np.swapaxes(seen[:, :3, :3], 1, 2) for own, seen in ways]
+    return np.stack([turned[i] + seen[:, None, :3, 3] for i, (_, seen) in enumerate(ways)], axis=1)
+
+
+def distance(first: Surface, second: Surface, pose: FloatArray) -> float:
+    """How far surfaces are apart, the second seen at a pose; at most 0 if they cross."""
     coal = get_coal()
-    request, there = coal.CollisionRequest(), _seen(second, pose)
-    request.enable_contact, request.security_margin = False, reach
-    return bool(coal.collide(as_first, first.where, second.as_mesh, there, request, coal.CollisionResult()))
-
-
-def _meets(first: Surface, second: Surface, pose: FloatArray, reach: float) -> bool:
-    """Whether surfaces are within reach of each other, the second seen at a pose, or one holds the other."""
-    key = second, pose.tobytes()
-    if key not in first.met:
-        first.met[key] = (
-            _reaches(first, first.as_mesh, second, pose, reach)
-            or first.holds(moved(pose, second.corner))
-            or second.holds(moved(inverse(pose), first.corner))
-        )
-    return first.met[key]
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    return float(coal.distance(first.as_mesh, first.where, second.as_mesh, _seen(second, pose), request, result))
 
 
 def enters(body: Body, other: Body, pose: FloatArray) -> bool:
     """Whether a hull of a body touches the solids of another, seen at a pose."""
-    return any(_reaches(hull, hull.as_convex, solid, pose, 0.0) for hull in body.hulls for solid in other.solids)
+    return any(_crosses(hull, solid, pose) for hull in body.hulls for solid in other.solids)
+
+
+def _crosses(hull: Surface, surface: Surface, pose: FloatArray) -> bool:
+    """Whether a hull crosses a surface, seen at a pose."""
+    coal = get_coal()
+    request, there = coal.CollisionRequest(), _seen(surface, pose)
+    request.enable_contact = False
+    return bool(coal.collide(hull.as_convex, hull.where, surface.as_mesh, there, request, coal.CollisionResult()))
 
 
 def gap(first: Body, second: Body, pose: FloatArray) -> float:
     """How far the solids of bodies are apart, the second seen at a pose."""
-    coal = get_coal()
-
-    def between(one: Surface, other: Surface) -> float:
-        request, result, there = coal.DistanceRequest(), coal.DistanceResult(), _seen(other, pose)
-        return float(coal.distance(one.as_mesh, one.where, other.as_mesh, there, request, result))
-
-    return min(between(one, other) for one in first.solids for other in second.solids)
+    return min(distance(one, other, pose) for one in first.solids for other in second.solids)
