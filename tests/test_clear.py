@@ -22,6 +22,7 @@ from rlacd.clear import (
     check,
     kept_clear,
     mjcf_motion,
+    touching,
     urdf_motion,
     warnings_of,
 )
@@ -412,6 +413,14 @@ def test_joints_without_limits_are_told_in_one_sentence_and_a_floating_base_in_n
         assert {*motion.warnings} == {turns, apart} if more else {turns}
 
 
+def test_words_name_the_joints_between_two_links_and_those_that_drive_them(arm: Path) -> None:
+    """The joint k follows j, and so moves b to a; the cup hangs by none of them."""
+    motion = mjcf_motion(arm, 4, links=["a", "b", "c", "cup"])
+    moved = f"at j = {motion.positions[2, 0]:.4g}"
+    assert [motion.words(2, pair) for pair in [(0, 1), (0, 2), (2, 3), (1, 2)]] == [moved, moved, moved, "at rest"]
+    assert motion.words(0, (0, 1)) == "at rest"
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_joints_follow_in_a_chain_whatever_the_order_of_the_lines(arm: Path, order: tuple[int, int]) -> None:
     def body(number: int, inner: str) -> str:
@@ -495,6 +504,26 @@ def test_the_broad_phase_finds_what_all_pairs_would() -> None:
     around = placed_boxes(boxes[0], np.tile(turn, (1, 40, 1, 1)))[0]
     corners = trimesh.bounds.corners(boxes[0, 0]) @ turn[:3, :3].T
     assert around[0] == pytest.approx(np.stack([corners.min(axis=0), corners.max(axis=0)]))
+
+
+def test_what_one_distance_settles_is_what_asking_everywhere_finds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bar that turns and slides by a ring, through its hole and into it: within reach, inside, or apart."""
+    random, asked = np.random.default_rng(5), list[float]()
+    poses = np.stack([trimesh.transformations.random_rotation_matrix(random.random(3)) for _ in range(40)])
+    poses = np.repeat(poses, 10, axis=0)
+    poses[:, :3, 3] = np.repeat(random.uniform(-1, 1, (40, 3)), 10, axis=0) + random.normal(0, 0.02, (400, 3))
+    ring, bar = trimesh.creation.annulus(0.5, 1.0, 0.3), trimesh.creation.box((0.2, 0.3, 0.6))
+
+    def pair() -> tuple[Surface, Surface]:
+        return Surface(ring.vertices, ring.faces), Surface(bar.vertices, bar.faces)
+
+    alone = [bool(touching._meets(*pair(), pose[None], 0.01)[0]) for pose in poses]
+    measure = touching.distance
+    monkeypatch.setattr(touching, "distance", lambda *given: asked.append(0.0) or measure(*given))
+    together = touching._meets(*pair(), poses, 0.01)
+    assert together.tolist() == alone
+    assert 50 < sum(alone) < 350
+    assert len(asked) < 320, "distances settle neighbours"
 
 
 def test_a_body_inside_another_touches_it_and_one_in_its_hollow_does_not() -> None:

@@ -110,12 +110,26 @@ class Motion:
         row = np.array([positions], dtype=np.float64)
         return replace(self, positions=row, poses=_placed(self.poses[0], self.joints, self.carried, row))
 
-    def words(self, sample: int) -> str:
-        """The joint position of a sample, as text."""
-        if sample == 0 or not self.sampled:
+    def words(self, sample: int, links: tuple[int, int]) -> str:
+        """The joint position of a sample, as text: of the joints that move one of two links to the other."""
+        between = sorted({self._leading(number) for number in self._below(links[0]) ^ self._below(links[1])})
+        if sample == 0 or not between:
             return "at rest"
-        moved = zip(self.sampled, self.positions[sample], strict=True)
-        return "at " + ", ".join(f"{joint.name} = {value:.4g}" for joint, value in moved)
+        moved = ((self.joints[number].name, self.positions[sample, number]) for number in between)
+        return "at " + ", ".join(f"{name} = {value:.4g}" for name, value in moved)
+
+    def _below(self, link: int) -> set[int]:
+        """The joints that carry a link, each of the next."""
+        found, number = set[int](), self.carried[link]
+        while number >= 0:
+            found.add(number)
+            number = self.joints[number].parent
+        return found
+
+    def _leading(self, number: int) -> int:
+        """The sampled joint that a joint follows, or is."""
+        leader = self.joints[number].leader
+        return number if leader < 0 else self._leading(leader)
 
 
 def at_rest(

@@ -77,7 +77,7 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
         more = "" if places == 1 else f", the deepest of {places} places"
         sentences.append(
             f"Hulls of {names[pair[0]]} and {names[pair[1]]} touch though the links do not, up to "
-            f"{length(deepest.depth)} deep {motion.words(deepest.sample)}{more}"
+            f"{length(deepest.depth)} deep {motion.words(deepest.sample, pair)}{more}"
             f"{'' if cleared.given_up.isdisjoint(pair) else TOO_MANY}."
         )
     if others := deepest_first[MOST_SAID:]:

@@ -149,17 +149,18 @@ def _meet(first: Body, second: Body, poses: FloatArray, reach: float) -> BoolArr
 def _meets(first: Surface, second: Surface, poses: FloatArray, reach: float) -> BoolArray:
     """Whether surfaces are within reach of each other, the second seen at each pose, or one holds the other.
 
-    If they are farther apart, they do not meet either where no point of one is moved by what is left.
+    If they are farther apart, they do not meet either where no point of one is moved by what is left. Surfaces that
+    meet answer sooner whether they do, others how far they are apart: what is asked first is what the last ones were.
     """
     keys = [(second, pose.tobytes()) for pose in poses]
-    places = _corners(first, second, poses)
+    places, met = _corners(first, second, poses), True
     for key, pose, place in zip(keys, poses, places, strict=True):
         if key not in first.met:
-            apart = distance(first, second, pose)
+            crosses = met and _reaches(first, first.as_mesh, second, pose, reach)
+            apart = 0.0 if crosses else distance(first, second, pose)
+            met = apart <= reach
             first.met[key] = (
-                apart <= reach
-                or first.holds(moved(pose, second.corner))
-                or second.holds(moved(inverse(pose), first.corner))
+                met or first.holds(moved(pose, second.corner)) or second.holds(moved(inverse(pose), first.corner))
             )
             if not first.met[key]:
                 moves = np.linalg.norm(places - place, axis=-1).max(axis=-1).min(axis=-1)
@@ -183,15 +184,15 @@ def distance(first: Surface, second: Surface, pose: FloatArray) -> float:
 
 def enters(body: Body, other: Body, pose: FloatArray) -> bool:
     """Whether a hull of a body touches the solids of another, seen at a pose."""
-    return any(_crosses(hull, solid, pose) for hull in body.hulls for solid in other.solids)
+    return any(_reaches(hull, hull.as_convex, solid, pose, 0.0) for hull in body.hulls for solid in other.solids)
 
 
-def _crosses(hull: Surface, surface: Surface, pose: FloatArray) -> bool:
-    """Whether a hull crosses a surface, seen at a pose."""
+def _reaches(first: Surface, as_first: Any, second: Surface, pose: FloatArray, reach: float) -> bool:
+    """Whether the first, as one of coal's shapes, is within reach of the second's surface, seen at a pose."""
     coal = get_coal()
-    request, there = coal.CollisionRequest(), _seen(surface, pose)
-    request.enable_contact = False
-    return bool(coal.collide(hull.as_convex, hull.where, surface.as_mesh, there, request, coal.CollisionResult()))
+    request, there = coal.CollisionRequest(), _seen(second, pose)
+    request.enable_contact, request.security_margin = False, reach
+    return bool(coal.collide(as_first, first.where, second.as_mesh, there, request, coal.CollisionResult()))
 
 
 def gap(first: Body, second: Body, pose: FloatArray) -> float:
