@@ -509,6 +509,21 @@ def test_a_link_of_many_hulls_is_told_with_what_makes_it_fewer(rings: Path) -> N
     assert not [warning for warning in own.warnings if "twice" in warning]
 
 
+@pytest.mark.parametrize("filled", [14, 15])
+def test_to_fill_a_link_is_told_only_where_it_helps_more_than_twice_the_tolerance(
+    filled: int, rings: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def counted(body: object, collider: object, options: dict[str, Any], *_: object) -> list[int]:
+        return [filled] if options["openings"] == "solid" else [15, 10]
+
+    monkeypatch.setattr("rlacd.io.robots.coarser._hulls", counted)
+    done = rlacd.rewrite_robot(
+        rings, rings.with_name("out.urdf"), threshold_abs=0.004, samples=0, threads=1, quality="fast"
+    )
+    told = next(warning for warning in done.warnings if warning.startswith("bowl is "))
+    assert ("; with its open bodies filled 14, --openings solid." in told) == (filled < 15)
+
+
 def test_a_link_with_a_small_opening_is_a_solid_and_told(rings: Path) -> None:
     """A palm without the cap beneath its wrist; a ball cannot roll in only if it is larger than that."""
     palm = trimesh.creation.icosphere(subdivisions=3, radius=0.4)

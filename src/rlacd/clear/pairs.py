@@ -85,7 +85,7 @@ def warnings_of(cleared: Cleared, motion: Motion, length: Callable[[float], str]
         sentences.append(f"Hulls of other links touch too, up to {depth} deep: {_listed(others, names)}.")
     always = [pair for pair, found in cleared.touching.items() if found.meshes.all() and pair not in motion.adjacent]
     if always:
-        more = "" if len(always) == 1 else f", and {len(always) - 1} more pairs,"
+        more = "" if len(always) == 1 else f", and {len(always) - 1} more pair{'s' * (len(always) > 2)},"
         moves = any(len(touching.meshes) > 1 for touching in cleared.touching.values())
         both = f"{names[always[0][0]]} and {names[always[0][1]]}"
         sentences.append(f"{both}{more} touch in the input itself{' wherever the joints are' if moves else ''}.")

@@ -13,8 +13,8 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import MeshFileError, OptionError
 from rlacd.find_parts import Repaired
 from rlacd.fit import Unit
-from rlacd.io.robots.decomposed import SHARE, check_options, fitting, options_of_bodies, with_lengths
-from rlacd.io.robots.robot import Body, Collider, Results, Robot
+from rlacd.io.robots.decomposed import SHARE, Checked, check_options, fitting, options_of_bodies, with_lengths
+from rlacd.io.robots.robot import Body, Collider, Robot
 from rlacd.options import Options
 from rlacd.options.ranges import FAST
 from rlacd.options.robots import RobotOptions
@@ -111,18 +111,13 @@ def tradeoff_of(robot: Robot, options: Mapping[str, Any]) -> RobotTradeoff:
     return RobotTradeoff(made.name, thresholds, links, pick, is_complete, robot.unit)
 
 
-def many_told(
-    robot: Robot,
-    results: Results,
-    options: Sequence[Mapping[str, Any]],
-    repaired: Mapping[Hashable, Repaired],
-) -> list[str]:
+def many_told(robot: Robot, done: Checked, repaired: Mapping[Hashable, Repaired]) -> list[str]:
     """What to say of links of many hulls, if their tolerance is a length: how many at others, and how to ask for that.
 
     The counts are of one pass without a search. `repaired` are the solids of colliders, by their keys.
     """
-    said, known = [], dict[Hashable, list[TradeoffRow]]()
-    for body, own in zip(robot.bodies, options, strict=True):
+    said, known, results = [], dict[Hashable, list[TradeoffRow]](), done.results
+    for body, own in zip(robot.bodies, done.options, strict=True):
         count = sum(len(results[collider]) for collider in body.colliders)
         if count <= MANY or "threshold_abs" not in own:
             continue
@@ -142,8 +137,8 @@ def many_told(
             filled = [
                 _hulls(body, collider, {**quick, "openings": "solid"}, (1,), known) for collider in body.colliders
             ]
-            if all(filled):
-                said[-1] += f"; with its open bodies filled {sum(counts[0] for counts in filled)}, --openings solid"
+            if all(filled) and (fewer := sum(counts[0] for counts in filled)) < twice:
+                said[-1] += f"; with its open bodies filled {fewer}, --openings solid"
         said[-1] += "."
     return said
 

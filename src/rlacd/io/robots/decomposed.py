@@ -67,6 +67,8 @@ class Checked:
     """
 
     results: dict[Collider, Decomposition]
+    options: Sequence[Mapping[str, Any]]
+    """Those of each body, with what was changed to keep links clear."""
     warnings: list[str] = field(default_factory=list)
     motion: Motion | None = None
     cleared: Cleared | None = None
@@ -146,7 +148,7 @@ def decomposed_robot(
         decompose_body(number)
     is_whole = all(result.report.complete for result in results.values())
     if robot.is_alone or not is_whole:
-        return Checked(results, [] if robot.is_alone else [STOPPED])
+        return Checked(results, each, [] if robot.is_alone else [STOPPED])
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
         tell(LINK + bodies[number].name, number)
@@ -165,7 +167,7 @@ def decomposed_robot(
         return _moving(bodies[number], results).hulls
 
     tell("clear", 0)
-    return _checked(robot, results, asked, options.get("seed") or 0, (redo, exact))
+    return _checked(robot, Checked(results, each), asked, options.get("seed") or 0, (redo, exact))
 
 
 def _finer(options: Mapping[str, Any], is_entered: bool) -> dict[str, Any]:
@@ -174,20 +176,18 @@ def _finer(options: Mapping[str, Any], is_entered: bool) -> dict[str, Any]:
     return finer | ({"openings": "auto"} if is_entered and options["openings"] == SMALL else {})
 
 
-def _checked(
-    robot: Robot, results: dict[Collider, Decomposition], asked: RobotOptions, seed: int, ways: tuple[Redo, Exact]
-) -> Checked:
+def _checked(robot: Robot, done: Checked, asked: RobotOptions, seed: int, ways: tuple[Redo, Exact]) -> Checked:
     """Check links against each other, and mend those that touch in two ways (see `kept_clear`)."""
     try:
         motion, said = _motion(robot, asked.samples, seed)
-        cleared = kept_clear([*_links(robot.bodies, results, motion)], motion, *ways)
+        cleared = kept_clear([*_links(robot.bodies, done.results, motion)], motion, *ways)
     except (MissingExtraError, CrowdedError) as error:
         if asked.exclude or asked.srdf:
             raise
-        return Checked(results, [f"Links were not checked against each other: {error}"])
+        return replace(done, warnings=[f"Links were not checked against each other: {error}"])
     found = warnings_of(cleared, motion, robot.unit.words)
     ranges = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in motion.warnings]
-    return Checked(results, [*said, *ranges, *found], motion, cleared)
+    return replace(done, warnings=[*said, *ranges, *found], motion=motion, cleared=cleared)
 
 
 def _teller(total: int, progress: ProgressCallback | None) -> Callable[[str, int], None]:

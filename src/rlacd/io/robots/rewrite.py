@@ -14,7 +14,7 @@ from typing import Any
 from rlacd.errors import DecompositionWarning, MeshFileError, OptionError
 from rlacd.find_parts import Repaired
 from rlacd.io.robots.coarser import many_told
-from rlacd.io.robots.decomposed import check_options, decomposed_robot, options_of_bodies, with_lengths
+from rlacd.io.robots.decomposed import check_options, decomposed_robot, with_lengths
 from rlacd.io.robots.read import KINDS, STAGES, is_robot, read_robot
 from rlacd.io.robots.rewritten import RewrittenRobot, rewritten
 from rlacd.io.robots.robot import Robot
@@ -127,7 +127,7 @@ def rewrite(
     repaired: dict[Hashable, Repaired] = {}
     done = decomposed_robot(robot, options, asked, repaired)
     if all(result.report.complete for result in done.results.values()):
-        many = many_told(robot, done.results, options_of_bodies(robot, options, asked), repaired)
+        many = many_told(robot, done, repaired)
         done = replace(done, warnings=[*many, *done.warnings])
     pairs = done.pairs if done.samples or robot.is_alone else None
     written = robot.write(place, done.results, pairs, asked, whole=keep_input)
