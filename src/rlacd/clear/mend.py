@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain
 from typing import NamedTuple
 
@@ -44,9 +45,9 @@ tolerance between them take seven times as many, which costs more in every step 
 Redo = Callable[[int, Sequence[Obstacle], int], Sequence[Surface] | None]
 """Decomposes the body of this number again, clear of obstacles in its frame; None if that takes more hulls."""
 
-Exact = Callable[[int, bool], Sequence[Surface] | None]
-"""The body of this number as the exact hulls of its parts, as open as it is if others move in it; None if its hulls are
-that already."""
+Exact = Callable[[int, Callable[[], bool]], Sequence[Surface] | None]
+"""The body of this number as the exact hulls of its parts, as open as it is if others move in it, which is costly to
+ask; None if its hulls are that already."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def kept_clear(bodies: Sequence[Body], motion: Motion, redo: Redo, exact: Exact 
     finer = {
         i: hulls
         for i in sorted({*chain(*(pair for pair, found in touching.items() if found.offences))})
-        if bodies[i].hulls and (hulls := exact(i, _is_entered(i, bodies, touching))) is not None
+        if bodies[i].hulls and (hulls := exact(i, partial(_is_entered, i, bodies, touching))) is not None
     }
     bodies = [body.with_hulls(finer[i]) if i in finer else body for i, body in enumerate(bodies)]
     touching = _renewed(bodies, motion, touching, {*finer})

@@ -148,7 +148,7 @@ def _outside(triangles: FloatArray, surface: _native.Surface) -> tuple[FloatArra
             break
     off = np.concatenate(kept)
     inside = (
-        surface.winding(np.ascontiguousarray(off.mean(axis=1)), accuracy=4.0) > 0.5 if len(off) else off[:0, 0, 0] > 0
+        surface.winding(np.ascontiguousarray(off.mean(axis=1)), is_closed=True) > 0.5 if len(off) else off[:0, 0, 0] > 0
     )
     return off[~inside], is_crossed or bool(inside.any())
 

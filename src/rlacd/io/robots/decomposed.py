@@ -159,8 +159,9 @@ def decomposed_robot(
         results.update(again)
         return hulls
 
-    def exact(number: int, is_entered: bool) -> list[Surface] | None:
-        if not (finer := _finer(each[number], is_entered)):
+    def exact(number: int, is_entered: Callable[[], bool]) -> list[Surface] | None:
+        repairs = [body for collider in bodies[number].colliders for body in results[collider].report.repair]
+        if not (finer := _finer(each[number], any(body.step != "closed" for body in repairs) and is_entered())):
             return None
         each[number] |= finer
         decompose_body(number)
