@@ -146,8 +146,7 @@ def decomposed_robot(
 
     for number in range(len(bodies)):
         decompose_body(number)
-    is_whole = all(result.report.complete for result in results.values())
-    if robot.is_alone or not is_whole:
+    if robot.is_alone or not all(result.report.complete for result in results.values()):
         return Checked(results, each, [] if robot.is_alone else [STOPPED])
 
     def redo(number: int, obstacles: Sequence[Obstacle], most: int) -> list[Surface] | None:
