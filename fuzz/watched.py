@@ -61,7 +61,8 @@ class Watched:
 
     def decompose(self, spec: JobSpec, mesh: Path, stem: str) -> tuple[dict[str, Any], dict[str, bytes]]:
         """Decompose a mesh as a batch does; the answer of `rlacd.batch.server.MeshServer`."""
-        values = {"spec": asdict(spec), "path": str(mesh), "name": mesh.name, "stem": stem, "hull_only": False}
+        where = {"path": str(mesh), "name": mesh.name, "stem": stem, "home": str(mesh.parent)}
+        values = {"spec": asdict(spec), **where, "hull_only": False}
         answer = self.ask(SERVER, values)
         return answer.values, answer.blobs
 

@@ -517,10 +517,10 @@ def test_what_one_distance_settles_is_what_asking_everywhere_finds(monkeypatch: 
     def pair() -> tuple[Surface, Surface]:
         return Surface(ring.vertices, ring.faces), Surface(bar.vertices, bar.faces)
 
-    alone = [bool(touching._meets(*pair(), pose[None], 0.01)[0]) for pose in poses]
+    alone = [bool(touching._surfaces_meet(*pair(), pose[None], 0.01)[0]) for pose in poses]
     measure = touching.distance
     monkeypatch.setattr(touching, "distance", lambda *given: asked.append(0.0) or measure(*given))
-    together = touching._meets(*pair(), poses, 0.01)
+    together = touching._surfaces_meet(*pair(), poses, 0.01)
     assert together.tolist() == alone
     assert 50 < sum(alone) < 350
     assert len(asked) < 320, "distances settle neighbours"

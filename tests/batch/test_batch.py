@@ -144,8 +144,8 @@ def test_no_name_stops_a_batch_and_no_file_of_others_is_replaced(tmp_path: Path)
         assert rows(out)["x.obj"]["status"] == "done", "tried again by the next run"
 
 
-URDF = """<robot name="r"><link name="l"><collision><geometry><mesh filename="meshes/l.obj"/></geometry></collision>
-</link></robot>"""
+URDF = """<robot name="r"><link name="l"><visual><geometry><mesh filename="meshes/l.obj"/></geometry></visual>
+<collision><geometry><mesh filename="meshes/l.obj"/></geometry></collision></link></robot>"""
 MJCF = """<mujoco><asset><mesh name="m" file="meshes/l.obj"/></asset>
 <worldbody><body><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
 
@@ -170,7 +170,10 @@ def test_robots_and_stages_are_worked_on_like_meshes_and_other_xml_is_passed_ove
     }
     assert "save it as UTF-8" in told["wide.xml"]["error"]
     assert set(told["r.urdf"]["outputs"]) == {"r.urdf", "r_urdf/r_l_000.obj", "r_urdf/r_hulls.json"}
-    assert b"r_urdf/r_l_000.obj" in (out / "r.urdf").read_bytes()
+    for name in ("r.urdf", "r.xml"):
+        named = re.findall(r'file(?:name)?="([^"]+)"', (out / name).read_text(encoding="utf-8"))
+        assert len(named) == 2, "what is shown and a hull"
+        assert all((out / one).is_file() for one in named)
     (assets / "stage.usda").unlink()
     stage = robots_usd.Usd.Stage.Open(str(out / "stage.usd"))
     assert stage.GetPrimAtPath("/robot/table")

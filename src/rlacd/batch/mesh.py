@@ -104,7 +104,8 @@ def process(task: Task, work: Work, died: WorkerDiedError | None = None) -> Outc
     except MeshFileError as error:
         return Outcome("failed", error=str(error), unusable=True)
     name, stem = task.asset.name, PurePosixPath(task.asset.place).name
-    values = {"spec": asdict(spec), "path": path, "name": name, "stem": stem, "hull_only": False}
+    home = str((work.store.folder / task.asset.place).absolute().parent)
+    values = {"spec": asdict(spec), "path": path, "name": name, "stem": stem, "home": home, "hull_only": False}
     blobs = files | spec.network
     request = Request(SERVER, values, blobs, work.batch.limits, spec.options["threads"], died is not None)
     outcome, last = _attempt(request, task, work.pool)

@@ -19,9 +19,9 @@ from rlacd.decomposition import Decomposition
 from rlacd.errors import ImplausibleBodyWarning, MeshError, sentence_of
 from rlacd.io.read.beside import lay_out
 from rlacd.io.read.load import load_mesh
-from rlacd.io.robots import is_robot, rewrite_robot
+from rlacd.io.robots import is_robot
 from rlacd.io.robots.read import STAGES, robot_or_none
-from rlacd.io.robots.rewrite import rewrite
+from rlacd.io.robots.rewrite import rewrite, rewrite_quietly
 from rlacd.io.robots.robot import Robot
 from rlacd.options.robots import RobotOptions
 from rlacd.plain_json import as_plain
@@ -47,8 +47,9 @@ class MeshServer:
         ----------
         values : dict
             ``spec``, as plain values; the mesh's ``path`` if it can be read from this machine; its ``name``, for
-            messages; the ``stem`` of its result, a file or a folder; and ``hull_only``, whether to compute the convex
-            hull of all points instead, within the limits on hulls that the options set.
+            messages; the ``stem`` of its result, a file or a folder; ``home``, the folder that this is moved to; and
+            ``hull_only``, whether to compute the convex hull of all points instead, within the limits on hulls that the
+            options set.
         blobs : dict of bytes
             The files of the mesh (`rlacd.io.read.beside.mesh_files`), if it cannot be read from this machine; and
             `JobSpec.network`.
@@ -68,7 +69,8 @@ class MeshServer:
             path = (laid or Path(values["path"])).absolute()  # as messages name it
             try:
                 spec = self._spec(values["spec"], blobs)
-                answer: dict[str, Any] = {"report": _write(spec, path, Path(made, values["stem"]), values["hull_only"])}
+                place, home = Path(made, values["stem"]), Path(values["home"])
+                answer: dict[str, Any] = {"report": _write(spec, path, place, home, values["hull_only"])}
                 files = _files_in(Path(made))
             except Exception as error:
                 said = sentence_of(error).replace(f"{path.parent}{os.sep}", values["name"].removesuffix(path.name))
@@ -87,12 +89,12 @@ class MeshServer:
         return replace(spec, options={**spec.options, "policy": str(network)})
 
 
-def _write(spec: JobSpec, mesh: Path, place: Path, hull_only: bool) -> dict[str, Any]:
+def _write(spec: JobSpec, mesh: Path, place: Path, home: Path, hull_only: bool) -> dict[str, Any]:
     """Decompose a mesh file and write its result to a place, which has no ending yet; returns facts about it."""
     stage = robot_or_none(mesh) if spec.ending in STAGES and mesh.suffix.lower() in STAGES else None
     if is_robot(mesh) or stage is not None:
         ending = mesh.suffix if stage is None else spec.ending
-        return _robot(spec, stage or mesh, Path(f"{place}{ending}"), hull_only)
+        return _robot(spec, stage or mesh, Path(f"{place}{ending}"), home, hull_only)
     result = _hull(spec, mesh) if hull_only else decompose_quietly(mesh, **spec.options)
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", ImplausibleBodyWarning)
@@ -101,11 +103,11 @@ def _write(spec: JobSpec, mesh: Path, place: Path, hull_only: bool) -> dict[str,
     return facts | {"warnings": [*facts["warnings"], *(str(doubt.message) for doubt in doubts)]}
 
 
-def _robot(spec: JobSpec, robot: Path | Robot, place: Path, hull_only: bool) -> dict[str, Any]:
+def _robot(spec: JobSpec, robot: Path | Robot, place: Path, home: Path, hull_only: bool) -> dict[str, Any]:
     """Rewrite a robot, or a stage as one file, with hulls in place of its collision meshes; returns facts."""
     options = {**_limits(spec), "max_hulls": 1, "quality": "fast"} if hull_only else spec.options
     if isinstance(robot, Path):
-        done = rewrite_robot(robot, place, **options)
+        done = rewrite_quietly(robot, place, home=home, **options)
     else:
         done = rewrite(robot, place, options, RobotOptions(), keep_input=True)
         robot = robot.source

@@ -119,7 +119,7 @@ class Motion:
         return "at " + ", ".join(f"{name} = {value:.4g}" for name, value in moved)
 
     def _below(self, link: int) -> set[int]:
-        """The joints that carry a link, each of the next."""
+        """All joints below a link, which move it."""
         found, number = set[int](), self.carried[link]
         while number >= 0:
             found.add(number)

@@ -106,7 +106,7 @@ def _touching(first: Body, second: Body, samples: Int64Array, poses: FloatArray,
             deep[int(rows[0, 0])] = least, depths
     touch, meet = np.zeros(len(chosen), dtype=bool), np.zeros(len(chosen), dtype=bool)
     touch[[*deep]] = True
-    meet[touch] = _meet(first, second, poses[chosen[touch]], TOUCH * size)
+    meet[touch] = _bodies_meet(first, second, poses[chosen[touch]], TOUCH * size)
     offences = [
         Offence(int(samples[chosen[place]]), poses[chosen[place]], max([least, *depths]))
         for place, (least, depths) in deep.items()
@@ -138,15 +138,15 @@ def _depth(first: Surface, second: Surface, pose: FloatArray) -> float:
     return max(0.0, -float(result.getContact(0).penetration_depth)) if found else 0.0
 
 
-def _meet(first: Body, second: Body, poses: FloatArray, reach: float) -> BoolArray:
+def _bodies_meet(first: Body, second: Body, poses: FloatArray, reach: float) -> BoolArray:
     """Seen at which poses [K, 4, 4] the second body meets the first."""
     meet = np.zeros(len(poses), dtype=bool)
     for one, other in product(first.solids, second.solids):
-        meet[~meet] = _meets(one, other, poses[~meet], reach)
+        meet[~meet] = _surfaces_meet(one, other, poses[~meet], reach)
     return meet
 
 
-def _meets(first: Surface, second: Surface, poses: FloatArray, reach: float) -> BoolArray:
+def _surfaces_meet(first: Surface, second: Surface, poses: FloatArray, reach: float) -> BoolArray:
     """Whether surfaces are within reach of each other, the second seen at each pose, or one holds the other.
 
     If they are farther apart, they do not meet either where no point of one is moved by what is left. Surfaces that

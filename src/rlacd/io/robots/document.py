@@ -71,7 +71,7 @@ class Document(Robot):
         return not self.bodies or max(count, len(self.bodies)) < 2
 
     def elsewhere(self, place: Path) -> Path | None:
-        """The folder of a result that is not that of the file: names of files are then to be seen from there."""
+        """The folder of a result that is not that of the file: names of files are then as seen from there."""
         folder = place.absolute().parent
         return None if os.path.realpath(folder) == os.path.realpath(self.root.file.folder) else folder
 
@@ -109,10 +109,12 @@ class Document(Robot):
     ) -> Written:
         """See `Robot`."""
         folder, stem, said = mesh_folder(place, self.kind), file_stem(place.stem), list[str]()
+        last = place if self.home is None else self.home / place.name
         files, names = _hull_files(stem, results)
         copies = self.copied(stem)
         files |= {name: encode_plain_obj(mesh) for mesh, name in copies.items()}
-        edits = self.edits(place, folder, names, {mesh.path: name for mesh, name in copies.items()}, said)
+        named = {mesh.path: name for mesh, name in copies.items()}
+        edits = self.edits(last, mesh_folder(last, self.kind), names, named, said)
         if pairs is not None:
             edits += self.paired(pairs, asked, said)
         data = edited(self.root, edits)
@@ -134,15 +136,6 @@ def opened(source: Path, tag: str) -> Element:
         kind = {"robot": "URDF", "mujoco": "MJCF"}[tag]
         raise MeshFileError(f"{source} is not {kind}: it starts with <{root.tag}>, not <{tag}>.")
     return root
-
-
-def left_behind(files: Sequence[str], source: Path, place: Path) -> list[str]:
-    """Warn about other files that are named relative to a folder which the result does not lie in."""
-    if not files or os.path.realpath(place.absolute().parent) == os.path.realpath(source):
-        return []
-    said = f"{len(files)} other files, such as {files[0]}, are referred to relative to {source}"
-    lost = f"will not be found from {place.absolute().parent}: write the result beside the input, or copy them too"
-    return [f"{said} and {lost}."]
 
 
 def _hull_files(stem: str, results: Results) -> tuple[dict[str, bytes], dict[Collider, list[str]]]:

@@ -20,8 +20,9 @@ from rlacd.io.robots.spans import LARGEST_DESCRIPTION, Element, expand
 from rlacd.solid.arrays import FloatArray
 from rlacd.solid.poses import product
 
-FOLDERS = {"include": "", "model": "", "mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "flexcomp": "meshdir"}
-FOLDERS["texture"] = "texturedir"
+FOLDERS = {"include": "", "model": "", "texture": "texturedir"} | dict.fromkeys(
+    ("mesh", "hfield", "skin", "flexcomp"), "meshdir"
+)
 """Elements that name files, and the setting with the folder of these; without one it is that of the main file."""
 
 NAMES = ("file", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))

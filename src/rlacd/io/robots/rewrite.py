@@ -94,9 +94,10 @@ def rewrite_quietly(
     package_dirs: Sequence[str] = (),
     keep_input: bool = False,
     progress: ProgressCallback | None = None,
+    home: Path | None = None,
     **options: Any,
 ) -> RewrittenRobot:
-    """Rewrite as `rewrite_robot` does, but warn of nothing."""
+    """Rewrite as `rewrite_robot` does, but warn of nothing; `home` is the folder that the result is moved to."""
     source, place = Path(read(path_like(), "robot", robot)), Path(read(path_like(), "output", output))
     check_names("rewrite_robot", options, inspect.signature(rewrite_robot).parameters, ELSEWHERE)
     own = {field.name for field in fields(RobotOptions)}
@@ -107,7 +108,7 @@ def rewrite_quietly(
     packages = checked(OutputOptions, "package_dirs", package_dirs) or ()
     began = time.perf_counter()
     description = read_robot(source, packages, apart=asked.per == "mesh", from_visual=asked.from_visual)
-    return rewrite(description, place, options, asked, keep_input=keep_input, began=began)
+    return rewrite(replace(description, home=home), place, options, asked, keep_input=keep_input, began=began)
 
 
 def rewrite(

@@ -156,6 +156,7 @@ class Robot(ABC):
     metres: float  # its unit of length
     up: Axis
     told_in: Unit | None = field(default=None, kw_only=True)  # the unit in which lengths are told; None for its own
+    home: Path | None = field(default=None, kw_only=True)  # the folder that its result is moved to once it is written
 
     @abstractmethod
     def motion(self, samples: int, seed: int) -> Motion:

@@ -79,12 +79,13 @@ class Urdf(Document):
 
     def _relocations(self, elsewhere: Path | None) -> list[Edit]:
         """Correct the names of other files, which are relative to the folder of the file."""
+        if elsewhere is None:
+            return []
         taken = {one.mesh for together in self.found.values() for one in together if one.element.tag == "collision"}
-        named = [each for each in self.root.walk() if each.tag in ("mesh", "texture") and each not in taken]
         edits = []
-        for each in named if elsewhere is not None else ():
+        for each in (each for each in self.root.walk() if each.tag in ("mesh", "texture") and each not in taken):
             name = each.attributes.get("filename", "")
-            if elsewhere is not None and name and "://" not in name and not Path(name).is_absolute():
+            if name and "://" not in name and not Path(name).is_absolute():
                 moved = seen_from(elsewhere, self.root.file.folder / name.replace("\\", "/"))
                 edits.append(each.replaced(each.with_attributes({"filename": moved})))
         return edits

@@ -14,7 +14,6 @@ import trimesh
 from rlacd.clear import LinkPair, Motion, Primitive, Solids, at_rest
 from rlacd.decompose_mesh import decompose
 from rlacd.io.read.apart import answer_of
-from rlacd.io.robots.document import left_behind
 from rlacd.io.robots.robot import Body, Collider, MeshFile, PlacedMesh, Results, Robot, Written, colliders
 from rlacd.io.write import write_file
 from rlacd.io.write.encode import hull_name
@@ -72,7 +71,7 @@ class Stage(Robot):
         answer = answer_of(SERVER, self.source, "USD", {**given, **how}, hulls)
         write_file(place, answer.blobs["layer"])
         names = {collider: [*map(hull_name, range(len(result)))] for collider, result in results.items()}
-        lost = left_behind(answer.values["files"], self.source.parent, place)
+        lost = _left_behind(answer.values["files"], self.source.parent, place.absolute().parent)
         return Written(place, names, [*answer.values["warnings"], *lost])
 
 
@@ -122,6 +121,16 @@ def read_stage(source: Path, *, apart: bool = False) -> Stage:
         prims |= joined
     warnings, metres, up = (answer.values[name] for name in ("warnings", "metres", "up"))
     return Stage(source, bodies, warnings, metres, up, nodes, prims, answer.values["joints"], solids)
+
+
+def _left_behind(files: Sequence[str], source: Path, folder: Path) -> list[str]:
+    """Warn about other files that are named relative to a folder which the result does not lie in."""
+    if not files or os.path.realpath(folder) == os.path.realpath(source):
+        return []
+    many = len(files) > 1
+    said = f"{len(files)} other files, such as {files[0]}, are" if many else f"{files[0]} is"
+    lost = f"will not be found from {folder}: write the result beside the input, or copy {'them' if many else 'it'} too"
+    return [f"{said} referred to relative to {source} and {lost}."]
 
 
 def _primitive(node: Mapping[str, Any], pose: FloatArray) -> Primitive | None:
